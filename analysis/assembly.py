@@ -10,7 +10,9 @@ from numba import njit
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics.layout import Effects
-from hpcclear.dynamics.linkage.rhs import SIGNATURE, written_by
+from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.rhs import SIGNATURE
+from hpcclear.dynamics.problem import Problem
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
 _X86 = re.compile(
@@ -100,10 +102,14 @@ def executed_arithmetic(assembly: str) -> Arithmetic:
     return Arithmetic(everything.packed, +scalar, everything.vector_bits, left_out)
 
 
+def force_evaluation(problem: Problem, width: int) -> str:
+    """Assembly of a problem's force evaluation for `width` lanes, as steppers call it."""
+    return _compiled(problem.linkage, problem.effects, width)
+
+
 @cache
-def force_evaluation(effects: Effects, width: int) -> str:
-    """Assembly of the kernel's force evaluation for `width` lanes, as steppers call it."""
-    text = one_text(written_by(effects).motion, f"motion_{width}", effects=effects, W=width)
+def _compiled(linkage: Linkage, effects: Effects, width: int) -> str:
+    text = one_text(linkage.module(effects).motion, f"motion_{width}", effects=effects, W=width)
     compiled = njit(
         SIGNATURE,
         error_model="numpy",

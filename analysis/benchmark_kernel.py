@@ -26,7 +26,7 @@ from scenes import Setup, ensemble, scene
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.linkage.rhs import motion_of, run_motion
+from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.views import Outcome
 from hpcclear.results.dataset import provenance
 
@@ -103,7 +103,7 @@ def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
         work[at.WORK : at.WORK + rows] = np.repeat(setup.par[:1].T, width, 1)
         work[at.QS : at.QS + 4], work[at.VS : at.VS + 4] = q[:, None], v[:, None]
         work[[at.ACTIVE, at.ACTIVE + 1, at.INVERSE_IMPACT, at.INVERSE_IMPACT + 1]] = 1.0
-        motion = motion_of(setup.problem.effects, width).address
+        motion = setup.problem.motion(setup.problem.effects, width).address
         arguments = (motion, work.ravel(), setup.problem.tables)
         repeat(*arguments, 1)
         tasks[f"W = {width}"] = lambda f=repeat, a=arguments: f(*a, count)
@@ -116,7 +116,7 @@ def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
 
 def assembly_of(setup: Setup, width: int) -> Arithmetic:
     """The force evaluation's arithmetic as emitted for this processor."""
-    return executed_arithmetic(force_evaluation(setup.problem.effects, width))
+    return executed_arithmetic(force_evaluation(setup.problem, width))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH)

@@ -1,36 +1,13 @@
 """What several of these programs draw, or ask, alike."""
 
-import argparse
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hpcclear import report
-from hpcclear.base.errors import InputError
 from hpcclear.results.rows import Columns
-
-
-def figure_options(words: str, name: str, what: str) -> argparse.Namespace:
-    """What is drawn, named `name` and described by `what`, and where figures go in which format."""
-    parser = argparse.ArgumentParser(description=words.splitlines()[0])
-    parser.add_argument(name, type=Path, help=what)
-    parser.add_argument("-o", "--output", type=Path, default=Path("figures"), help="directory")
-    parser.add_argument("--format", choices=["png", "svg", "pdf"], default="png")
-    return parser.parse_args()
-
-
-def save_figures(figures: Mapping[str, Callable[[], Figure]], options: argparse.Namespace) -> None:
-    """Draw and write each; one whose data are not there is said."""
-    options.output.mkdir(parents=True, exist_ok=True)
-    for name, draw in figures.items():
-        try:
-            print(report.save(draw(), options.output / f"{name}.{options.format}"))
-        except InputError as error:
-            print(f"no {name}: {error}")
 
 
 def by_code(runs: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:

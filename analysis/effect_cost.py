@@ -17,10 +17,10 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.layout import TURN
-from hpcclear.dynamics.linkage.ideal import ideal_response
+from hpcclear.dynamics.linkage.prescribed import prescribed_motion
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import effects_of, problem_of
+from hpcclear.dynamics.planar.tables import mechanism_of
+from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
@@ -168,13 +168,14 @@ def closed_form(options: argparse.Namespace) -> np.ndarray:
     content = load_scene(JOB, entries[2:]).resolved()
     content.pop("study")  # no clearance is left to vary
     bare = load_scene(content, entries)
-    par, angles = parameters(bare)[0], np.linspace(0.0, TURN, 720)
+    mechanism = mechanism_of(bare.linkage)
+    instants = np.linspace(0.0, mechanism.period.seconds, 720)
     times = []
     for _ in range(options.pairs + 1):
         start = time.process_time()
-        for _ in range(100):
-            ideal_response(effects_of(bare), par, None, angles)
-        times.append((time.process_time() - start) / (100 * len(angles)))
+        for _ in range(10):
+            prescribed_motion(mechanism, instants)
+        times.append((time.process_time() - start) / (10 * len(instants)))
     return np.array(times[1:])
 
 

@@ -27,7 +27,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.dynamics.energy import energies
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import outcome_records
+from hpcclear.dynamics.evaluator import KICKS, outcome_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
@@ -70,7 +70,7 @@ def cut(scene: Scene, rtol: float, longest: int) -> Scene:
     """The scene at another tolerance, over so many revolutions at most, half of them averaged."""
     numerics = scene.numerics
     transient, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
-    if averaged == "auto" or transient + averaged > longest:
+    if transient + averaged > longest:
         transient = min(transient, longest // 2)
         averaged = longest - transient
     return scene.with_(
@@ -160,8 +160,7 @@ def closed_form(scene: Scene) -> Run:
 
 def uncertainty(scene: Scene) -> float:
     """How far f may be off, by kicked and stricter copies, m."""
-    asked = scene.with_({"numerics.uncertainty": True})
-    return float(evaluate_records(asked, NOTHING, lanes=1)["objective_uncertainty"][0])
+    return float(evaluate_records(scene, NOTHING, 1, KICKS)["objective_uncertainty"][0])
 
 
 CASES = ("case", "rtol")

@@ -19,8 +19,7 @@ import xarray as xr
 from hard_cases import balance, chunks, recorded
 
 from hpcclear import __version__
-from hpcclear.dynamics.linkage import baumgarte
-from hpcclear.dynamics.parameters import topology
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene, load_scene
 
@@ -33,7 +32,7 @@ FIRST = 100  # revolutions that later ones are compared with
 def largest_by_revolution(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Relative energy residual and constraint violation in m, the largest of each revolution."""
     lanes, par, start = recorded(scene)
-    n, (first, second, _) = lanes.problem.coordinates, topology(scene)
+    n = lanes.problem.coordinates
     turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
     begun, sizes = balance(scene, par[0], start, n)
     size = sizes[0]
@@ -45,8 +44,8 @@ def largest_by_revolution(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         size = sizes[-1]
         np.maximum.at(residual, turn, np.abs(total - begun) / sizes)
         if scene.numerics.formulation == "baumgarte":
-            q = rows[:, rec.STATE : rec.STATE + n].T
-            unmet = baumgarte.constraint_violation(first, second, par[0], q)
+            q, v = (rows[:, rec.STATE + k * n : rec.STATE + (k + 1) * n].T for k in range(2))
+            unmet = violation(linkage_of(scene), q, v, rows[:, rec.TURN_TIME])
             violation[turn] = np.fmax(violation[turn], 0.0)
             np.maximum.at(violation, turn, unmet)
     return residual, violation

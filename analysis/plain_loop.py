@@ -10,16 +10,29 @@ import math
 
 import numpy as np
 from numba import njit
+from scenes import scene
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.tableau import TSITOURAS
+from hpcclear.dynamics.laws import laws
+from hpcclear.dynamics.planar.problem import linkage_of
 
 STATES = 10  # rod x, y, angle, slider x, their rates, integrals of both | |e| - c |
-# first numbers of the laws that it has
-STIFFNESS, COEFFICIENT = at.CONTACT_NUMBERS, at.FRICTION_NUMBERS
+# numbers of the laws that it has
+STIFFNESS = at.CONTACT_NUMBERS + laws("contact")["hunt-crossley"].read.index("stiffness")
+COEFFICIENT = at.FRICTION_NUMBERS
 OUTPUTS = ("objective", "slider_position", "slider_velocity", "evaluations", "steps", "status")
+
+FIRST, SECOND = (joint.block for joint in at.JOINTS[:2])
+NUMBERS = (
+    "crank_a_b_x", "rod_a_center_x", "rod_center_b_x", "rod_mass", "rod_inertia", "slider_mass",
+)  # fmt: skip
+CRANK, NEAR, FAR, ROD_MASS, ROD_INERTIA, SLIDER_MASS = (
+    linkage_of(scene("hunt-crossley", 1e-6, 0, 1)).rows[name] for name in NUMBERS
+)
+"""Rows of the mechanism's numbers, the same in all scenes of the benchmarks."""
 
 _C = TSITOURAS.a.sum(axis=1)
 _A, _B, _E = TSITOURAS.a, TSITOURAS.b, TSITOURAS.e
@@ -54,26 +67,26 @@ def motion(t, y, dy, p, latched, active, inverse_impact, gaps):
     phi, omega = p[at.SPEED] * t, p[at.SPEED]
     sphi, cphi = math.sin(phi), math.cos(phi)
     st, ct = math.sin(y[2]), math.cos(y[2])
-    near, far, crank = p[at.ROD_NEAR], p[at.ROD_FAR], p[at.CRANK_LENGTH]
+    near, far, crank = p[NEAR], p[FAR], p[CRANK]
     spin = y[6]
     gap1, rate1, fx1, fy1, mb1, _ = joint(
-        p, at.JOINT_12, latched, active[0], inverse_impact[0],
+        p, FIRST, latched, active[0], inverse_impact[0],
         crank * cphi - (y[0] - near * ct), crank * sphi - (y[1] - near * st),
         -crank * omega * sphi - (y[4] + near * spin * st),
         crank * omega * cphi - (y[5] - near * spin * ct), omega, spin,
     )  # fmt: skip
     gap2, rate2, fx2, fy2, mb2, _ = joint(
-        p, at.JOINT_23, latched, active[1], inverse_impact[1],
+        p, SECOND, latched, active[1], inverse_impact[1],
         y[3] - (y[0] + far * ct), -(y[1] + far * st),
         y[7] - (y[4] - far * spin * st), -(y[5] + far * spin * ct), 0.0, spin,
     )  # fmt: skip
     moment = near * (st * fx1 - ct * fy1) + far * (ct * fy2 - st * fx2) + mb1 + mb2
     for k in range(4):
         dy[k] = y[4 + k]
-    dy[4] = (fx1 + fx2) / p[at.ROD_MASS]
-    dy[5] = (fy1 + fy2) / p[at.ROD_MASS]
-    dy[6] = moment / p[at.ROD_INERTIA]
-    dy[7] = -fx2 / p[at.SLIDER_MASS]
+    dy[4] = (fx1 + fx2) / p[ROD_MASS]
+    dy[5] = (fy1 + fy2) / p[ROD_MASS]
+    dy[6] = moment / p[ROD_INERTIA]
+    dy[7] = -fx2 / p[SLIDER_MASS]
     gaps[0], gaps[1], gaps[2], gaps[3] = gap1, gap2, rate1, rate2
 
 
@@ -119,7 +132,7 @@ def error_norm(h, k, y, new, rtol, atol, period, p):
         if i < 8:
             scale = atol[i] + rtol * max(abs(y[i]), abs(new[i]))
         else:
-            scale = rtol * period * p[(at.JOINT_12 if i == 8 else at.JOINT_23) + at.CLEARANCE]
+            scale = rtol * period * p[(FIRST if i == 8 else SECOND) + at.CLEARANCE]
         total += (h * error / scale) ** 2
     return total / 8.0
 

@@ -68,8 +68,8 @@ def scene(
 def setup(chosen: Scene, par: Array) -> Setup:
     """Problem, parameters and start states; without friction its coefficient is 0 for codes that always ask."""
     if chosen.effects.friction.law == "none":
-        for joint in (at.JOINT_12, at.JOINT_23):
-            par[:, joint + at.FRICTION_NUMBERS] = 0.0
+        for joint in at.JOINTS[:2]:
+            par[:, joint.block + at.FRICTION_NUMBERS] = 0.0
     return Setup(problem_of(chosen), par, start_states(chosen, par))
 
 

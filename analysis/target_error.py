@@ -23,7 +23,6 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.problem import tables_of
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
@@ -107,7 +106,7 @@ def random_linkage(number: int) -> tuple[str, Scene]:
 
 def linkage_changes(scene: Scene, rng: np.random.Generator) -> dict[str, object]:
     """Lengths 10 % about those of the scene, masses and inertias up to threefold, play, speed, contact and friction."""
-    tables = tables_of(scene)
+    tables = scene.linkage
     changes: dict[str, object] = {
         "numerics.target_error": None,
         "numerics.max_steps": 10**9,

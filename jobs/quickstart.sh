@@ -10,5 +10,5 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . jobs/environment.sh mpich,analysis "$@"
 mkdir -p results
 mpiexec -n "${RANKS:-2}" hpcclear run jobs/quickstart.toml -o results/quickstart
-python analysis/plot_samples.py results/quickstart/samples.nc -o results/quickstart/samples.png
+hpcclear plot results/quickstart/samples.nc --figure samples -o results/quickstart/samples.png
 hpcclear report results/quickstart

@@ -92,13 +92,14 @@ class Dense:
     o23: Joint | None = None
     alpha: float = 0.0
     beta: float = 0.0
+    offset: float = 0.0  # of the slider's line from the crank's axis
     seen: dict = field(default_factory=dict)
 
     def constraints(self, q, t):
         """Position constraints, one row each; the first two hold the crank's bearing."""
         crank, rod = self.crank, self.rod
         bearing = np.array([q[X1], q[Y1]]) + turned([-crank["u"], 0.0], q[PHI])
-        rows = [*bearing, q[Y3], q[THETA3]]
+        rows = [*bearing, q[Y3] - self.offset, q[THETA3]]
         if self.speed is not None:
             rows.append(q[PHI] - self.speed * t)
         if self.o12 is None:
@@ -232,12 +233,12 @@ def assembled(mech, phi, e12, e23):
     crank, rod = mech.crank, mech.rod
     pin = crank["length"] * np.array([np.cos(phi), np.sin(phi)])
     near = pin - e12
-    theta = np.arcsin((-e23[1] - near[1]) / rod["length"])
+    theta = np.arcsin((mech.offset - e23[1] - near[1]) / rod["length"])
     along = np.array([np.cos(theta), np.sin(theta)])
     slider = near[0] + rod["length"] * along[0] + e23[0]
     q = np.zeros(9)
     q[[X1, Y1]] = pin * crank["u"] / crank["length"]
-    q[[PHI, THETA2, X3]] = phi, theta, slider
+    q[[PHI, THETA2, X3, Y3]] = phi, theta, slider, mech.offset
     q[[X2, Y2]] = near + rod["u"] * along
     return q
 

@@ -19,7 +19,7 @@ from hpcclear.scene import load_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-READ_ONLY = ("text", "singularity")
+READ_ONLY = ("text", "singularity", "matlab")
 """Languages of blocks that are there to be read: what a command prints, a diagram, a recipe for another program."""
 
 

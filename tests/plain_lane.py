@@ -70,7 +70,9 @@ class Lane:
 
     def __init__(self, mechanism, on=EVERYTHING, *, feedback=(ALPHA, BETA), **options):
         self.mechanism = mechanism
-        rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, 401, 402, free=100)
+        tabled = (*mechanism.drives, *mechanism.loads)
+        curves = {one.name: 401 for one in tabled if getattr(one, "table", False)}
+        rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, free=100, curves=curves)
         self.text = generate(mechanism, on, rows, **options)
         names = {
             "joint_force": plain(motion.joint_force),
@@ -104,7 +106,7 @@ class Lane:
         work = np.zeros(2000)
         n = len(q)
         work[:n], work[100 : 100 + n], work[400] = q, v, t
-        work[401] = work[402] = 1.0
+        work[401] = 1.0
         self.run(EFFECTS, joints_of(self.mechanism), work, self.par, 0, 1)
         return work[200 : 200 + n], work
 

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from bending_by_lagrange import Rod
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
+from some_laws import row
 
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.recorded import Recording, Steps
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Outcome
@@ -53,6 +55,13 @@ def scene_with(changes=None, revolutions=1, rtol=1e-8) -> Scene:
     return load_scene(SCENE).with_(numerics | (changes or {}))
 
 
+def integrate(scene: Scene):
+    """All steps of a response, its outcome record (1,) and parameters, SI."""
+    recording = Recording(scene)
+    steps = Steps.of(np.concatenate(list(recording.chunks())))
+    return steps, recording.record(), recording.par
+
+
 def kept_steps(problem, par, start, rows: int, budget: int) -> list[np.ndarray]:
     """Every accepted step of one sample, in the pieces that a record of so many rows is emptied in."""
     lanes = Lanes(problem, 1, np.zeros((rows, rec.columns(problem.coordinates))))
@@ -70,8 +79,8 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
     if effects:
         problem = replace(problem, effects=problem.effects._replace(**effects))
     par = parameters(scene)
-    for row, value in (par_changes or {}).items():
-        par[:, row] = value
+    for column, value in (par_changes or {}).items():
+        par[:, column] = value
     start = start_states(scene, par)
     n = problem.coordinates
     if shift is not None:
@@ -110,23 +119,23 @@ def lanes_have_single_bits(scene: Scene, columns: Mapping[tuple[str, ...], np.nd
     np.testing.assert_array_equal(together.rows, alone.rows)
 
 
-def rod_of(scene: Scene, par) -> Rod:
+def rod_of(scene: Scene) -> Rod:
     """A slider-crank's rod that bends, as its points."""
-    table = scene.slider_crank.rod.bending
-    rows = (at.ROD_MASS, at.ROD_INERTIA, at.ROD_LENGTH, at.ROD_NEAR)
-    return Rod(*(par[row] for row in rows), table.stiffness, table.damping, table.modes)
+    rod, table = scene.slider_crank.rod, scene.slider_crank.rod.bending
+    bar = (rod.mass, rod.inertia, rod.length, rod.mass_center)
+    return Rod(*bar, table.stiffness, table.damping, table.modes)
 
 
-def bent(scene: Scene, par, q, v, nine, rates) -> tuple[float, float]:
+def bent(scene: Scene, q, v, nine, rates) -> tuple[float, float]:
     """Energy and first moment against y = 0 that bending adds to the rigid bodies, J and kg m."""
-    k, rod = scene.modes, rod_of(scene, par)
-    near = par[at.ROD_NEAR] * np.exp(1j * nine[THETA2])
+    k, rod, bar = scene.modes, rod_of(scene), scene.slider_crank.rod
+    near = bar.mass_center * np.exp(1j * nine[THETA2])
     end = nine[X2] + 1j * nine[Y2] - near
     speed = rates[X2] + 1j * rates[Y2] - 1j * rates[THETA2] * near
     y = np.array([end.real, end.imag, nine[THETA2], *q[:k]])
     w = np.array([speed.real, speed.imag, rates[THETA2], *v[:k]])
-    rigid = par[at.ROD_MASS] * (rates[X2] ** 2 + rates[Y2] ** 2)
-    rigid += par[at.ROD_INERTIA] * rates[THETA2] ** 2
+    rigid = bar.mass * (rates[X2] ** 2 + rates[Y2] ** 2)
+    rigid += bar.inertia * rates[THETA2] ** 2
     return sum(rod.energy(y, w)) - 0.5 * rigid, rod.raised(y)
 
 
@@ -137,15 +146,16 @@ def bodies(scene: Scene, par, q, v):
     """
     if scene.numerics.formulation == "baumgarte":
         nine, rates = np.zeros(9), np.zeros(9)
-        nine[KERNEL_ORDER], rates[KERNEL_ORDER] = q, v
+        nine[KERNEL_ORDER], rates[KERNEL_ORDER] = q[scene.modes :], v[scene.modes :]
         return nine, rates
     free = scene.drive.kind == "torque"
     phi, omega = (q[-1], v[-1]) if free else (0.0, par[at.SPEED])
-    crank, length = par[at.CRANK_LENGTH], par[at.ROD_LENGTH]
-    far, k, rate = par[at.ROD_FAR], scene.modes, 0.0
+    m = scene.slider_crank
+    crank, length, near = m.crank.length, m.rod.length, m.rod.mass_center
+    far, k, rate = length - near, scene.modes, 0.0
     if k:
         y, w = np.array([0, 0, 0, *q[:k]]), np.array([0, 0, 0, *v[:k]])
-        rod = rod_of(scene, par)
+        rod = rod_of(scene)
         drawn, rate = rod.place_of_end(y)[0] - length, (rod.end(y).real @ w)[0]
         length, far, q, v = length + drawn, far + drawn, q[k:], v[k:]
     pin = crank * np.exp(1j * phi)
@@ -155,25 +165,16 @@ def bodies(scene: Scene, par, q, v):
         theta, spin, slider, slider_v = q[2], v[2], q[3], v[3]
         centre, centre_v = q[0] + 1j * q[1], v[0] + 1j * v[1]
     else:
-        if first or second or k:
-            theta, spin, slider, slider_v = q[0], v[0], q[1], v[1]
-        else:
-            theta = np.arcsin(-pin.imag / length)
-            spin = -pin_v.imag / (length * np.cos(theta))
+        theta, spin, slider, slider_v = q[0], v[0], q[1], v[1]
         along = np.exp(1j * theta)
-        if not (first or second or k):
-            slider, slider_v = (
-                (pin + length * along).real,
-                (pin_v + 1j * spin * length * along).real,
-            )
         if first:
             centre = slider - far * along
             centre_v = slider_v - (1j * spin * far + rate) * along
         else:
-            centre = pin + par[at.ROD_NEAR] * along
-            centre_v = pin_v + 1j * spin * par[at.ROD_NEAR] * along
+            centre = pin + near * along
+            centre_v = pin_v + 1j * spin * near * along
     nine, rates = np.zeros(9), np.zeros(9)
-    u1 = par[at.CRANK_NEAR] / crank
+    u1 = m.crank.mass_center / crank
     nine[[X1, Y1, PHI]] = (pin * u1).real, (pin * u1).imag, phi
     rates[[X1, Y1, PHI]] = (pin_v * u1).real, (pin_v * u1).imag, omega
     nine[[X2, Y2, THETA2, X3]] = centre.real, centre.imag, theta, slider
@@ -184,32 +185,36 @@ def bodies(scene: Scene, par, q, v):
 def energy(scene: Scene, par, q, v, active) -> float:
     """Kinetic, potential and stored energy, J."""
     nine, rates = bodies(scene, par, q, v)
-    m1, m2, m3 = par[at.CRANK_MASS], par[at.ROD_MASS], par[at.SLIDER_MASS]
-    masses = np.array([m1, m1, par[at.CRANK_OWN_INERTIA], m2, m2, par[at.ROD_INERTIA], m3, m3, 0])
+    m = scene.slider_crank
+    m1, m2, m3 = m.crank.mass, m.rod.mass, m.slider.mass
+    own = m.crank.inertia + getattr(scene.drive, "flywheel_inertia", 0.0)
+    masses = np.array([m1, m1, own, m2, m2, m.rod.inertia, m3, m3, 0])
     total = 0.5 * (masses * rates**2).sum()
     total += scene.effects.gravity * (m1 * nine[Y1] + m2 * nine[Y2] + m3 * nine[Y3])
-    near_end = nine[X2] + 1j * nine[Y2] - par[at.ROD_NEAR] * np.exp(1j * nine[THETA2])
-    far = par[at.ROD_FAR]
+    near_end = nine[X2] + 1j * nine[Y2] - m.rod.mass_center * np.exp(1j * nine[THETA2])
+    far = m.rod.length - m.rod.mass_center
     if scene.modes:
-        more, moment = bent(scene, par, q, v, nine, rates)
+        more, moment = bent(scene, q, v, nine, rates)
         total += more + scene.effects.gravity * moment
         y = np.array([0, 0, 0, *q[: scene.modes]])
-        far += rod_of(scene, par).place_of_end(y)[0] - par[at.ROD_LENGTH]
+        far += rod_of(scene).place_of_end(y)[0] - m.rod.length
     far_end = nine[X2] + 1j * nine[Y2] + far * np.exp(1j * nine[THETA2])
-    pin = (nine[X1] + 1j * nine[Y1]) + (par[at.CRANK_LENGTH] - par[at.CRANK_NEAR]) * np.exp(
+    pin = (nine[X1] + 1j * nine[Y1]) + (m.crank.length - m.crank.mass_center) * np.exp(
         1j * nine[PHI]
     )
     latched = scene.effects.contact is not None and scene.effects.contact.latched
-    for k, (name, base, e) in enumerate(
+    for k, (name, e) in enumerate(
         (
-            ("crank_rod", at.JOINT_12, pin - near_end),
-            ("rod_slider", at.JOINT_23, nine[X3] + 1j * nine[Y3] - far_end),
+            ("crank_rod", pin - near_end),
+            ("rod_slider", nine[X3] + 1j * nine[Y3] - far_end),
         )
     ):
+        base = at.JOINTS[k].block
         if name in scene.clearance_joints():
             depth = max(abs(e) - par[base + at.CLEARANCE], 0.0)
             on = active[k] if latched else 1.0
-            total += 0.4 * par[base + at.CONTACT_NUMBERS] * on * depth**2.5
+            stiffness = par[base + row("contact", scene.effects.contact.law, "stiffness")]
+            total += 0.4 * stiffness * on * depth**2.5
     return float(total)
 
 

@@ -8,12 +8,16 @@ CONTACT = {"fixed": "hunt-crossley", "latched": "lankarani-nikravesh"}
 FRICTION = ("coulomb", "ambrosio", "lugre")
 
 
+def contact_law(names) -> str:
+    """Name of the law of contact among these effects, Hertz' without."""
+    return next((law for name, law in CONTACT.items() if name in names), "hertz")
+
+
 def effects_with(names, **more) -> at.Effects:
     """Effects of these names that are on; with an open joint and no law of contact named, Hertz'."""
     on = set(names) - {*CONTACT, *FRICTION}
-    found = [CONTACT[name] for name in CONTACT if name in names]
-    is_open = bool({"crank_rod", "rod_slider", "joints"} & {*on, *more})
-    law = found[0] if found else "hertz" if is_open else None
+    is_open = "joints" in {*on, *more}
+    law = contact_law(names) if is_open or set(names) & {*CONTACT} else None
     rubs = [name for name in FRICTION if name in names]
     return at.Effects(
         **dict.fromkeys(on, 1) | more,
@@ -28,5 +32,5 @@ def row(kind: str, law: str, number: str) -> int:
     return first + laws(kind)[law].read.index(number)
 
 
-STIFFNESS = at.CONTACT_NUMBERS
-"""Row of Hertz' stiffness, of all our laws of contact."""
+STIFFNESS = row("contact", "hertz", "stiffness")
+"""Of Hertz' law alone; laws that damp have it elsewhere."""

@@ -371,11 +371,11 @@ def test_figures_and_tables(measured, tmp_path, capsys):
     describe(measured, {"accuracy": tmp_path})
     shown = capsys.readouterr().out
     for word in (
-        "A steady mean",
-        "of a core",
+        "Steady mean: bias",
+        "of one core",
         "tsitouras",
         "Kriging",
-        "floor",
+        "lower bound",
         "speed-up",
         str(measured.attrs["processor"]),
     ):

@@ -11,10 +11,12 @@ import report_data as data
 import xarray as xr
 from own_engine import engine
 
-from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.base.objectives import OURS
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report import beside
+from hpcclear.report.answer import answer, recommended
+from hpcclear.report.beside import beside_original
 from hpcclear.report.figures import style
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
@@ -96,7 +98,7 @@ def test_the_same_design_under_other_names_is_no_choice():
     [
         ((0.59, 2e-4, 0.4), 1e-4, "m2 59% ± 0.0%, m3 40% ± 0.0%", "C"),
         ((2e-4, 2e-4, 1.0), 1e-4, "m3 100% ± 0.0%", "m2, C"),
-        ((0.59, 2e-4, 0.4), 0.01, "m2 59% ± 2.0%, m3 40% ± 2.0%, C 0% ± 2.0%", None),
+        ((0.59, 2e-4, 0.4), 0.01, "m2 59% ± 2.0%, m3 40% ± 2.0%, C 0% within 2.0%", None),
         ((0.59, np.nan, 0.4), 0.01, None, None),
     ],
 )
@@ -225,7 +227,7 @@ SHORT |= {("one joint", "slider-acceleration-deviation"), ("damped", "mean-conta
     [
         pytest.param(s, o, marks=[] if (s, o) in SHORT else [pytest.mark.full], id=f"{s} {o}")
         for s in SCENES
-        for o in OBJECTIVES
+        for o in OURS
     ],
 )
 def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, scene, objective):
@@ -259,10 +261,47 @@ def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, 
         if objective != "mean-gap":
             assert "distance from the clearance" not in told
     assert all(len(line) <= 80 for line in printed.replace(str(tmp_path), ".").splitlines())
-    words = OBJECTIVES[objective].words
+    words = OURS[objective].words
     assert words in page
     assert words in " ".join(printed.split())
     for name in ("piston", "shank", "m1"):
         assert name in page
         assert f"{name} =" in printed
     assert "crank mass" not in " ".join(drawn)  # m1 is the centre of the rod here
+
+
+def test_designs_of_nearly_the_same_merit_are_listed_and_the_lightest_of_them():
+    """Told apart by their intervals, and 0.4 % from the least mean + 2 deviations: no "none" without them."""
+    near = verified([4e-4, 2e-4, 3e-4, 2.005e-4, 1e-4], [6e-5, 4e-5, 4e-5, 4.03e-5, 1e-5], 1e-8)
+    near["m2"][1], near["m2"][3] = 0.24, 0.1
+    lines = told(near)
+    assert lines["equivalent"].startswith("none")
+    assert lines["near"].startswith("robust front 1: merit within 1% of the recommended design")
+    assert "they differ in m2 from 0.1 kg to 0.24 kg" in lines["near"]
+    assert lines["near"].endswith("lightest: robust front 1, 0.14 kg less")
+    assert "near" not in told(verified(MEAN, DEVIATION, 1e-8))
+
+
+def test_each_distinct_design_is_shown_once_by_what_it_is():
+    """The recommended one and a twin of an end have no row of their own; a lighter one does."""
+    one = data.verification()
+    shown = beside.roles(one)["robust"]
+    assert [role.design for role in shown] == [
+        f"robust {end}" for end in ("original", "alpha", "beta")
+    ]
+    best = recommended(one)
+    assert [role.words.endswith(", recommended") for role in shown] == [
+        role.design == best for role in shown
+    ]
+    at = [str(name) for name in one["design"].to_numpy()].index("robust front 1")
+    for name in ("m2", "m3"):
+        one[name][at] = 0.5 * float(one[name].min())
+    assert beside.roles(one)["robust"][-1] == ("robust front 1", "front 1, lightest")
+    alpha = [str(name) for name in one["design"].to_numpy()].index("robust alpha")
+    beta = [str(name) for name in one["design"].to_numpy()].index("robust beta")
+    for variable in data.NAMES[:4]:
+        one[variable][alpha] = float(one[variable][beta])
+    words = [role.words for role in beside.roles(one)["robust"]]
+    assert any(
+        "lowest mean (alpha)" in each and "lowest std. dev. (beta)" in each for each in words
+    )

@@ -1,13 +1,23 @@
 """The public names: light to import, and what they return."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+import report_data as data
 from light import loaded_by
 
 import hpcclear
+import hpcclear.plugins
+from hpcclear import report
+from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE
+from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE, KICKS
+from hpcclear.ensemble.api import as_points
 
+ROOT = Path(__file__).parents[1]
 SCENE = "jobs/slider_crank.toml"
 SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
 
@@ -25,6 +35,23 @@ def test_every_public_name_is_there():
         hpcclear.no_such_name  # noqa: B018
 
 
+def test_the_page_says_of_every_public_name_what_it_is_and_how_long_it_stays():
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    table = page.partition("## What is stable")[2].partition("\n- ")[0]
+    rows = re.findall(r"^\| `(\w+)` \| (.+?) \| (\w+) \|$", table, re.MULTILINE)
+    assert sorted(name for name, *_ in rows) == sorted(hpcclear.__all__)
+    assert {promise for *_, promise in rows} <= {"stable", "provisional"}
+    for attribute in re.findall(r"`(\w+)`", {n: words for n, words, _ in rows}["Scene"]):
+        assert hasattr(hpcclear.Scene, attribute)
+    assert f"`{InputError.__module__}.InputError`" in page
+    assert hpcclear.plugins.trusting is not None
+
+
+def test_every_public_name_has_its_line_in_the_package_s_text():
+    for name in hpcclear.__all__:
+        assert f"`{name}`" in hpcclear.__doc__
+
+
 def test_evaluate_takes_paper_names_and_paths():
     scene = hpcclear.load_scene(SCENE, SHORT)
     result = hpcclear.evaluate(scene, {"C": [3e-4, 5e-4], "drive.speed": 500.0})
@@ -38,7 +65,7 @@ def test_evaluate_refuses_what_makes_no_mechanism():
     scene = hpcclear.load_scene(SCENE, SHORT)
     with pytest.raises(InputError, match=r"sample 1.*clearance as large"):
         hpcclear.evaluate(scene, {"C": [3e-4, 0.05]})
-    with pytest.raises(InputError, match="nothing"):
+    with pytest.raises(InputError, match="no entry is varied"):
         hpcclear.evaluate(scene, {})
     with pytest.raises(InputError, match="not a number of this scene"):
         hpcclear.evaluate(scene, {"drive.spead": 1.0})
@@ -58,8 +85,60 @@ def test_a_response_has_the_bits_of_the_sample_and_its_series_belong_to_it():
 def test_by_itself_a_response_is_integrated_as_a_sample_and_checked_by_its_replicas_and_more():
     scene = hpcclear.load_scene(SCENE, SHORT)
     response = hpcclear.simulate(scene)
-    sample = hpcclear.evaluate(scene.with_({"numerics.uncertainty": True}), {"m1": 0.3})
+    sample = evaluate_records(scene, as_points(scene, {"m1": 0.3}), kicks=KICKS)[0]
     assert response.attrs["integrator"] == "tsitouras"
     farthest = float(response["objective_uncertainty"]) / COVERAGE_ALONE
-    assert farthest >= float(sample["objective_uncertainty"][0]) / COVERAGE * (1.0 - 1e-12) > 0.0
+    assert farthest >= float(sample["objective_uncertainty"]) / COVERAGE * (1.0 - 1e-12) > 0.0
     assert farthest < 1e-3 * response["objective"]
+
+
+def test_commands_are_functions_that_return_datasets(tmp_path):
+    scene = hpcclear.load_scene("jobs/hunt_crossley.toml", SHORT)
+    cells = hpcclear.map(scene, "C=0.2mm:0.4mm:2", output=tmp_path / "map.nc", progress="quiet")
+    assert cells["kick_growth"].dims == ("C",)
+    np.testing.assert_allclose(cells["C"], [2e-4, 4e-4])
+    assert (tmp_path / "map.nc").exists()
+    seen = hpcclear.bifurcation(
+        scene, "C=0.2mm:0.4mm:2", observe="max crank_moment", transient=0, revolutions=2, progress="quiet"
+    )  # fmt: skip
+    assert seen["observed"].shape == (2, 2)
+    assert seen["observed"].attrs["units"] == "N m"
+    with pytest.raises(InputError, match="wear"):
+        hpcclear.wear(scene)
+    with pytest.raises(InputError, match=r"no \[study\] table"):
+        hpcclear.plan(scene)
+
+
+def test_a_study_may_be_called_and_refuses_alike_on_one_process_and_on_several(tmp_path):
+    scene = hpcclear.load_scene(SCENE)
+    for study in (hpcclear.study, hpcclear.run_study):
+        with pytest.raises(InputError, match="study"):
+            study(scene, tmp_path / "a")
+    with pytest.raises(InputError, match="study"):
+        hpcclear.run_study(scene, tmp_path / "b", ranks=2)
+
+
+def test_notebooks_show_scenes_and_plans_as_tables():
+    scene = hpcclear.load_scene("jobs/quickstart.toml")
+    shown = scene._repr_html_()
+    assert "contact law lankarani-nikravesh" in shown
+    assert scene.hash[:16] in shown
+    rows = (Row(None, scene, 2e-3, ""), Row(1e-3, scene, 4e-3, "<b>"))
+    plan = Plan(rows, 100, None, 3.0, 4e8, 5, workers=4)
+    assert "&lt;b&gt;" in plan._repr_html_()
+    assert "100 simulations on 4 ranks" in plan._repr_html_()
+
+
+def test_figures_are_drawn_into_axes_of_the_caller():
+    from matplotlib.figure import Figure
+
+    response = data.response()
+    page = Figure()
+    axes = page.subplots(2, 1)
+    assert report.penetration_figure(response, ax=axes) is page
+    assert axes[0].lines
+    with pytest.raises(InputError, match="this figure has 2 panels"):
+        report.penetration_figure(response, ax=axes[0])
+    with pytest.raises(InputError, match="layout of its own"):
+        report.poincare_figure(response, ax=axes)
+    assert report.penetration_figure(response) is not page

@@ -575,7 +575,7 @@ WRONG = {
         "mass": 1.0, "inertia": 1.0, "points": {"a": [0, 0], "b": [1, 0]}, "bending": {"stiffness": 1.0}}}, "bar", "no length"),
     "a point": ({"mechanism.bodies.bar.points": {"c": [0.1, 0.0]}}, "bar", "further point, c"),
     "driven": ({"mechanism.drives.motor.body": "bar"}, "bar", "clamp"),
-    "a torque": ({"mechanism.loads": {"turn": {"kind": "torque", "body": "bar", "torque": 1.0}}}, "bar", "no place"),
+    "a torque": ({"mechanism.loads": {"turn": {"kind": "torque", "body": "bar", "torque": 1.0}}}, "bar", "no point of appl"),
     "a guide": ({"mechanism.joints.left": {"kind": "slide", "point": "bar.a", "line": "ground.o"}}, "bar", "guides the bar"),
     "a free end": ({"mechanism.joints.right.bearing": "disc.o"}, "bar", "end b"),
     "waves": ({"mechanism.joints.left": {

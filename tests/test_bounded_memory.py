@@ -85,7 +85,7 @@ def test_dropped_steps_change_no_instant_s_state(monkeypatch, kind: str):
 def test_time_series_that_do_not_fit_are_refused(monkeypatch, count: int):
     monkeypatch.setattr(response, "MOST", 1e-9)
     scene = scene_with(SMOOTH | {"output.instants_per_revolution": count}, 10**6, 1e-6)
-    with pytest.raises(InputError, match="fewer instants a revolution"):
+    with pytest.raises(InputError, match="fewer instants per revolution"):
         simulate(scene)
 
 

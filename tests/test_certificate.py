@@ -261,11 +261,11 @@ def test_every_effect_of_a_slider_crank_is_found_and_its_entries_go():
     )  # fmt: skip
     found = {one.name: one for one in switches(scene)}
     assert list(found) == [
-        "play in crank_rod", "play in rod_slider", "friction in joints", "contact damping", "gravity",
+        "clearance in crank_rod", "clearance in rod_slider", "friction in joints", "contact damping", "gravity",
         "slider load", "guide friction", "speed fluctuation",
     ]  # fmt: skip
     off = {name: Off(scene, [one]).scene for name, one in found.items()}
-    assert off["play in crank_rod"].clearance_joints() == ("rod_slider",)
+    assert off["clearance in crank_rod"].clearance_joints() == ("rod_slider",)
     assert off["friction in joints"].effects.friction.law == "none"
     assert off["contact damping"].effects.contact.law == "hertz"
     assert off["gravity"].effects.gravity == 0.0
@@ -300,7 +300,7 @@ def test_cheaper_models_of_an_effect_are_tried_besides_its_absence():
     scene = rich()
     found = {one.name: one for one in switches(scene)}
     assert list(found) == [
-        "play in crank_rod", "play in rod_slider", "oil film in crank_rod", "finite length of the film in crank_rod",
+        "clearance in crank_rod", "clearance in rod_slider", "oil film in crank_rod", "finite length of the film in crank_rod",
         "friction in joints", "sticking in joints", "contact damping", "bending of rod", "bending of rod beyond 2 modes",
         "bending of rod beyond one mode", "slider load", "variation of slider load",
     ]  # fmt: skip
@@ -335,13 +335,13 @@ def test_two_models_of_one_effect_are_no_set():
     place = {one.name: k for k, one in enumerate(trial.switches)}
     for names in (
         ("oil film in crank_rod", "finite length of the film in crank_rod"),
-        ("play in crank_rod", "oil film in crank_rod"),
+        ("clearance in crank_rod", "oil film in crank_rod"),
         ("friction in joints", "sticking in joints"),
         ("bending of rod", "bending of rod beyond one mode"),
         ("slider load", "variation of slider load"),
     ):
         assert not trial.possible(tuple(sorted(place[name] for name in names))), names
-    assert trial.possible((place["play in rod_slider"], place["oil film in crank_rod"]))
+    assert trial.possible((place["clearance in rod_slider"], place["oil film in crank_rod"]))
 
 
 def test_ramps_that_call_for_implicit_steps_are_tried_wider():
@@ -416,8 +416,8 @@ def test_without_any_play_friction_in_it_goes_too():
 
 def test_what_the_study_asks_about_is_not_tried():
     scene = load_scene(SCENE, ['numerics.objective_joints=["crank_rod"]'])
-    assert "play in crank_rod" not in [one.name for one in switches(scene)]
-    assert "play in rod_slider" in [one.name for one in switches(scene)]
+    assert "clearance in crank_rod" not in [one.name for one in switches(scene)]
+    assert "clearance in rod_slider" in [one.name for one in switches(scene)]
 
 
 def test_columns_drive_what_is_left_and_the_study_forgets_what_is_gone():
@@ -428,7 +428,7 @@ def test_columns_drive_what_is_left_and_the_study_forgets_what_is_gone():
          'study.cases.heavy=["g"]', 'study.surrogate.optimisation=["m2", "m3", "u2", "I2", "C", "g"]'],
     )  # fmt: skip
     found = {one.name: one for one in switches(scene)}
-    off = Off(scene, [found["play in rod_slider"], found["gravity"]])
+    off = Off(scene, [found["clearance in rod_slider"], found["gravity"]])
     assert off.paths(scene.study.variable("C").paths) == ("joints.crank_rod.clearance",)
     assert off.paths(("effects.gravity",)) == ()
     study = off.scene.study
@@ -442,7 +442,7 @@ def test_cases_keep_what_they_ask_for():
         'study.cases={play={random=["C", "m2"], objectives=["mean", {statistic="quantile", level=0.9}]}}'
     ]
     scene = load_scene(JOBS / "quickstart.toml", settings)
-    play = next(one for one in switches(scene) if one.name == "play in rod_slider")
+    play = next(one for one in switches(scene) if one.name == "clearance in rod_slider")
     left = Off(scene, [play]).scene.study.cases[0]
     assert left.goals == scene.study.cases[0].goals
     assert left.random == ("C", "m2")
@@ -470,9 +470,9 @@ def test_a_moved_number_is_found_where_it_stands():
 def test_a_linkage_has_its_effects_by_name():
     scene = load_scene(JOBS / "linkages" / "four_stroke.toml")
     found = {one.name: one for one in switches(scene)}
-    assert {"play in big_end", "guide friction in bore", "force gas", "gravity"} <= set(found)
+    assert {"clearance in big_end", "guide friction in bore", "force gas", "gravity"} <= set(found)
     off = Off(
-        scene, [found["play in big_end"], found["guide friction in bore"], found["force gas"]]
+        scene, [found["clearance in big_end"], found["guide friction in bore"], found["force gas"]]
     )
     joints = off.scene.resolved()["mechanism"]["joints"]
     assert joints["big_end"]["kind"] == "revolute"
@@ -482,8 +482,8 @@ def test_a_linkage_has_its_effects_by_name():
 
 def test_a_study_that_would_have_nothing_to_vary_keeps_its_effect():
     trial = Trial(load_scene(JOBS / "linkages" / "quick_return.toml"))
-    assert "play in o2" in trial.kept
-    assert "play in o2" not in [one.name for one in trial.switches]
+    assert "clearance in o2" in trial.kept
+    assert "clearance in o2" not in [one.name for one in trial.switches]
 
 
 def test_what_is_far_dearer_without_an_effect_ends_as_failed():
@@ -646,8 +646,8 @@ def test_what_is_needed_is_said_so(certified):
     content = dataset.read(place / "e.nc", "effects")
     needed = {str(name) for name, row in zip(content["effect"].to_numpy(), content["off"].T, strict=True)
               if int(content["decision"][int(np.argmax(row.to_numpy()))]) == Verdict.BEYOND}  # fmt: skip
-    assert needed == {"play in crank_rod", "contact damping"}
-    assert "play in crank_rod changes f by -100.00 %" in output
+    assert needed == {"clearance in crank_rod", "contact damping"}
+    assert "clearance in crank_rod changes f by -100.00 %" in output
     assert "contact damping changes f by" in output
     flat = " ".join(output.split())
     assert "gravity changes f by 0.0" in flat
@@ -656,14 +656,14 @@ def test_what_is_needed_is_said_so(certified):
 
 def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
     place, _ = certified
-    timing = dataset.read(place / "timing.nc", "timing")
+    timing = dataset.read(place / "e.timing.nc", "timing")
     seconds = seconds_of(timing)
     assert set(seconds) >= {"all on", "gravity", "friction in joints + gravity + slider load"}
     assert all(0.0 < value < 10.0 for value in seconds.values())
     content = dataset.read(place / "e.nc", "effects")
     assert "seconds" not in " ".join([*content.variables, *content.attrs])
     assert saving(content, 1, {}) == pytest.approx(1.0 - float(content["work"][1]))
-    assert saving(content, 1, {"all on": 4.0, "play in crank_rod": 1.0}) == 0.75
+    assert saving(content, 1, {"all on": 4.0, "clearance in crank_rod": 1.0}) == 0.75
 
 
 def test_what_cannot_be_told_says_what_would_tell(certified):
@@ -684,7 +684,7 @@ def test_what_cannot_be_told_says_what_would_tell(certified):
 
 def test_figure_and_page(certified):
     place, _ = certified
-    content, timing = (dataset.read(place / name) for name in ("e.nc", "timing.nc"))
+    content, timing = (dataset.read(place / name) for name in ("e.nc", "e.timing.nc"))
     figure = effects_figure(content, timing)
     bars = figure.axes[0].patches
     names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
@@ -693,7 +693,7 @@ def test_figure_and_page(certified):
     assert bars[0].get_width() == pytest.approx(change)
     assert effects_figure(content) is not None
     page = write_report(place).read_text(encoding="utf-8")
-    assert "play in crank_rod changes f by" in page
+    assert "clearance in crank_rod changes f by" in page
     assert "the run time saved" in page
     page_numbers.check(place)
 
@@ -738,12 +738,12 @@ def test_a_linkage_is_certified(tmp_path):
     assert code == 0, output
     found = dataset.read(tmp_path / "e.nc", "effects")
     rows = {str(name): k + 1 for k, name in enumerate(found["effect"].to_numpy())}
-    assert set(rows) >= {"play in o2", "friction in joints", "gravity", "torque breath"}
-    assert float(found["change"][rows["play in o2"], 0]) == -1.0  # no other gap is left
+    assert set(rows) >= {"clearance in o2", "friction in joints", "gravity", "torque breath"}
+    assert float(found["change"][rows["clearance in o2"], 0]) == -1.0  # no other gap is left
     assert int(found["decision"][rows["torque breath"]]) == Verdict.WITHIN
     chosen = found.isel(variant=int(np.argmax(found["recommended"].to_numpy())))
     assert int(chosen["off"].sel(effect="torque breath")) == 1
-    assert int(chosen["off"].sel(effect="play in o2")) == 0
+    assert int(chosen["off"].sel(effect="clearance in o2")) == 0
 
 
 # ---- the stage of a study --------------------------------------------------------------------------
@@ -765,7 +765,7 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
         ranks = alone()
         simulations = Simulations(scene, ranks, checkpoint, "quiet")
         run = StudyRun(scene, tmp_path, ranks, checkpoint, simulations, told.append)
-        stage.certify(run)
+        stage.certify(run, certificate_extent)
         return run, (tmp_path / "effects.nc").read_bytes()
 
     first, written = once()
@@ -773,7 +773,9 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
     content = dataset.read(tmp_path / "effects.nc", "effects")
     chosen = content.isel(variant=int(np.argmax(content["recommended"].to_numpy())))
     assert int(chosen["off"].sum()) == 2  # the other play, and contact damping
-    assert any("can be neglected: play in rod_slider, contact damping" in text for text in told)
+    assert any(
+        "can be neglected: clearance in rod_slider, contact damping" in text for text in told
+    )
     monkeypatch.setattr(stage, "sample_points", None)  # all is kept: nothing is simulated again
     assert once()[1] == written
     assert statements(content, {}) is not None

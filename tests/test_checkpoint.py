@@ -265,7 +265,7 @@ def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp
     leftover, kept = ".hpcclear-0123456789abcdef.tmp", (".hpcclear-notes.tmp", "part.tmp")
     for name in (leftover, *kept):
         (tmp_path / name).touch()
-    rename, removed = os.rename, []
+    rename, removed = os.replace, []
 
     def rename_after_a_clean_up(source: str, target: str, **options: int) -> None:
         if not removed:
@@ -273,7 +273,7 @@ def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp
             files.remove_leftovers(tmp_path)
         rename(source, target, **options)
 
-    monkeypatch.setattr(os, "rename", rename_after_a_clean_up)
+    monkeypatch.setattr(os, "replace", rename_after_a_clean_up)
     files.write_bytes(tmp_path / "x", b"content")
     assert len(removed) == 1
     assert (tmp_path / "x").read_bytes() == b"content"

@@ -12,6 +12,7 @@ import xarray as xr
 from commands import MPIEXEC, warm
 from patience import crowded
 
+from hpcclear import __version__
 from hpcclear.cli import cli
 from hpcclear.results import dataset
 
@@ -130,10 +131,10 @@ def test_the_directories_of_the_results_are_made(tmp_path):
 
 
 def test_both_entry_points_give_version_and_help():
-    assert "0.1.0" in hpcclear("--version", module=True).stdout
+    assert __version__ in hpcclear("--version", module=True).stdout
     installed = Path(sys.executable).parent / "hpcclear"
     done = subprocess.run([installed, "--version"], capture_output=True, text=True, check=True)
-    assert "0.1.0" in done.stdout
+    assert __version__ in done.stdout
     for command in cli.commands:
         done = hpcclear(command, "--help")
         assert done.returncode == 0
@@ -177,7 +178,7 @@ def test_a_table_of_designs(tmp_path):
     assert done.returncode == 0, done.stderr
     samples = dataset.read(out, "samples")
     assert samples["C"].to_numpy().tolist() == [3e-4, 5e-4]
-    assert (tmp_path / "timing.nc").exists()
+    assert (tmp_path / "designs.timing.nc").exists()
 
 
 @pytest.mark.mpi

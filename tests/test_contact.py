@@ -16,7 +16,7 @@ from hpcclear.dynamics.laws.friction import ambrosio, coulomb
 from hpcclear.dynamics.laws.hertz_contact import (
     contact_stiffness,
     elastic,
-    latched_force,
+    latched_factor,
     reduced_compliance,
 )
 from hpcclear.dynamics.laws.lanes import in_lanes
@@ -35,7 +35,7 @@ def rebound(damping, mass=0.3, stiffness=5e9, speed=1.7):
     """Rebound over approach speed of a mass that strikes a wall with one of the latched laws."""
 
     def motion(t, y):
-        force = latched_force(max(y[0], 0.0), y[1], 1 / speed, stiffness, damping)
+        force = elastic(max(y[0], 0.0), stiffness) * latched_factor(y[1], 1 / speed, damping)
         return [y[1], -max(force, 0.0) / mass]
 
     def separates(t, y):

@@ -71,7 +71,7 @@ def test_equal_results_give_equal_crates_and_other_files_stay(results):
     first = write_crate(results).read_bytes()
     assert write_crate(results).read_bytes() == first
     (results / NAME).write_bytes(first.replace(b"not stated", b"CC-BY-4.0"))
-    with pytest.raises(InputError, match="did not write what is there"):
+    with pytest.raises(InputError, match="was not written by hpcclear"):
         write_crate(results)
     assert b"CC-BY-4.0" in (results / NAME).read_bytes()
 

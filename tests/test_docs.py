@@ -21,11 +21,13 @@ from hpcclear.scene import load_scene
 NOT_RUN = [
     ("CONTRIBUTING.md", "it runs these tests"),
     ("README.md", "it runs these tests"),
+    ("README.md", "needs a wheel"),
     ("docs/how-to/cluster.md", "installs Slurm on this machine"),
     ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
     ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
     ("docs/how-to/cluster.md", "needs a cluster"),
     ("docs/how-to/cluster.md", "needs a cluster"),
+    ("docs/how-to/cluster.md", "needs a container engine"),
     ("docs/how-to/cluster.md", "the end of a batch script"),
 ]
 """Page and reason of every block that no test runs. A longer list needs a better reason."""
@@ -34,7 +36,7 @@ BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
 RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
 SLOW = [name for name, found in BLOCKS.items() if any(b.runs and b.slow for b in found)]
 INFO = re.compile(
-    r'(bash|python|toml|csv|text|singularity)( title="[^"]+"| (no-run|slow): \S.*| from \S+)?'
+    r'(bash|python|toml|csv|text|singularity|matlab)( title="[^"]+"| (no-run|slow): \S.*| from \S+)?'
 )
 
 
@@ -128,7 +130,18 @@ def test_commands_and_options_that_are_named_exist(page):
 
 
 FOREIGN = {"--kill-on-bad-exit", "--mpi", "--help", "--contain", "--bind"}
-FOREIGN |= {"--full", "--quick", "--latest", "--lowest", "--with"}
+FOREIGN |= {
+    "--full",
+    "--quick",
+    "--nightly",
+    "--tests",
+    "--tagged",
+    "--changes",
+    "--shm-size",
+    "--latest",
+    "--lowest",
+    "--with",
+}
 """Options of other programs: srun, apptainer, the two commands, tests/elsewhere.sh."""
 
 

@@ -21,7 +21,6 @@ SHAPE = re.compile(
 PHYSICAL = (
     "ensemble/api",
     "dynamics/response",
-    "dynamics/linkage/geometry",
     "scene/points",
     "scene/table",
     "accuracy/equations",

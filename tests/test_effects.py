@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pairwise import CONTACTS, FRICTIONS, all_pairs, pairs_of, pairwise_table
 from running import HUNT_CROSSLEY, LATCHED, SCENE, energy_residual, run, scene_with
-from some_laws import FRICTION, effects_with
+from some_laws import effects_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -40,16 +40,10 @@ def allowed(row):
             return False
         if row.get("film") is not None:
             return False
-        # closed-form, not integrated: tests/test_ideal.py
-        if (
-            row.get("drive") == "speed"
-            and row.get("formulation") == "minimal"
-            and row.get("bending", 2) is None
-        ):
+        # prescribed, not integrated: tests/test_ideal.py
+        if row.get("drive") == "speed" and row.get("bending", 2) is None:
             return False
-    # neither bristles nor modes have a place among the nine coordinates
-    further = row.get("friction") == "lugre" or row.get("bending") is not None
-    return not further or row.get("formulation") != "baumgarte"
+    return True
 
 
 TABLE = pairwise_table(FACTORS, allowed)
@@ -113,18 +107,14 @@ def test_every_pair_of_effects_runs(row):
         assert abs(rest) < 1e-4 * passed
 
 
-ZEROS = {
-    "coulomb": dict.fromkeys(
-        (block + at.FRICTION_NUMBERS for block in (at.JOINT_12, at.JOINT_23)), 0.0
-    ),
-    "ambrosio": dict.fromkeys(
-        (block + at.FRICTION_NUMBERS for block in (at.JOINT_12, at.JOINT_23)), 0.0
-    ),
-    "gravity": {at.GRAVITY: 0.0},
-    "load": {at.LOAD: 0.0},
-    "load_table": {at.LOAD: 0.0},
-    "guide": {at.GUIDE_COEFFICIENT: 0.0},
-    "film": {},  # of no viscosity: rows of a scene without
+NO_FRICTION = {joint.block + at.FRICTION_NUMBERS: 0.0 for joint in at.JOINTS[:2]}
+ZEROS = {  # flags of the kernel and rows of parameters, or entries of the scene
+    "coulomb": ({"friction": effects_with({"coulomb"}).friction}, NO_FRICTION, {}),
+    "ambrosio": ({"friction": effects_with({"ambrosio"}).friction}, NO_FRICTION, {}),
+    "load": ({}, {}, {"effects.slider_load": 0.0}),
+    "load_table": ({}, {}, {"effects.slider_load": [[0.0, 0.0], [3.0, 0.0]]}),
+    "guide": ({}, {}, {"effects.guide_friction": {"coefficient": 0.0}}),
+    "film": (dict.fromkeys(("film", "short_film", "long_film"), 1), {}, {}),  # of no viscosity
 }
 
 
@@ -148,11 +138,9 @@ def assert_same_motion(one, other):
     ],
 )
 def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
-    scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
-    flags = dict.fromkeys((effect, "short_film", "long_film") if effect == "film" else (effect,), 1)
-    if effect in FRICTION:
-        flags = {"friction": effects_with({effect}).friction}
-    assert_same_motion(run(scene, flags, ZEROS[effect]), without)
+    flags, rows, changes = ZEROS[effect]
+    plain = {"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}}
+    assert_same_motion(run(scene_with(plain | changes), flags, rows), without)
 
 
 @pytest.mark.full
@@ -222,12 +210,12 @@ CONTRADICTIONS = [
     (
         {"effects.friction": FRICTIONS["lugre"], "numerics.formulation": "baumgarte"},
         "effects.friction.law",
-        "no place for bristles",
+        "does not include bristles",
     ),
     (
         {"mechanism.rod.bending": BENDING, "numerics.formulation": "baumgarte"},
         "mechanism.rod.bending",
-        "no place for modes",
+        "does not include bending modes",
     ),
     ({"mechanism.crank.bending": BENDING}, "mechanism.crank.bending", "clamps it"),
     (

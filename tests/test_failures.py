@@ -138,7 +138,7 @@ def test_check_prints_the_corners(tmp_path):
     assert "3 make a mechanism" in shown
 
 
-@pytest.mark.parametrize(("shortest", "word"), [(0.01, "close"), (0.088, "cannot turn")])
+@pytest.mark.parametrize(("shortest", "word"), [(0.01, "assembled"), (0.088, "cannot turn")])
 def test_short_couplers_at_which_a_linkage_does_not_close_or_locks_are_named(shortest, word):
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
     path = "mechanism.bodies.coupler.length"
@@ -193,7 +193,8 @@ def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
 
 
 def test_a_plan_answers_row_by_row(monkeypatch, capsys):
-    """Each rung as it is measured, and its samples counted meanwhile."""
+    """A first look at once, then each rung as it is measured, and its samples counted meanwhile."""
+    monkeypatch.setattr(planning, "_busy", lambda *others: (1e-3, np.zeros(1, OUTCOME)))
     monkeypatch.setattr(planning, "cost", lambda scene, *others: (2e-3, np.zeros(1, OUTCOME)))
     monkeypatch.setattr(planning.telling, "in_short", lambda *given: "")
     seen: list[str] = []
@@ -205,9 +206,12 @@ def test_a_plan_answers_row_by_row(monkeypatch, capsys):
         scene, alone(), (1e-2, 1e-3), show=lambda made: seen.append(preview(made, 2))
     )
     assert len(found.rows) == 3
-    assert len(seen) == 2
-    assert seen[0].startswith("settings of the file: 2 ms a sample, 10000 simulations take ")
-    assert seen[1].startswith("error 0.01: ")
+    assert len(seen) == 3
+    assert seen[0].startswith(
+        "first look, settings of the file: 1 ms per sample, 10000 simulations"
+    )
+    assert seen[1].startswith("settings of the file: 2 ms per sample, 10000 simulations take ")
+    assert seen[2].startswith("error 0.01: ")
 
 
 def test_samples_of_a_plan_are_counted_as_they_come(monkeypatch):
@@ -233,5 +237,5 @@ def test_a_preview_says_how_long_the_job_takes():
     scene = crank_and_rod()
     text = preview(Plan((Row(None, scene, 0.5, ""),), 1000, None, 3.0, 1e8, 2), 1)
     assert (
-        text == "settings of the file: 500 ms a sample, 1000 simulations take 8:23 min on 1 ranks"
+        text == "settings of the file: 500 ms per sample, 1000 simulations take 8:23 min on 1 rank"
     )

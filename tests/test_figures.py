@@ -52,7 +52,7 @@ PLAIN = {
 
 
 def _loaded() -> xr.Dataset:
-    """Every entry of the energy ledger is there."""
+    """Every entry of the energy balance is there."""
     made = data.response()
     for name in ("load_work", "potential_energy"):
         made[name] = made[name].copy(data=made["kinetic_energy"].to_numpy())
@@ -316,7 +316,7 @@ def test_refusals_name_what_is_missing() -> None:
         report.surfaces_figure(data.kriging().isel(model=[2]))
     with pytest.raises(InputError, match="4 whole revolutions"):
         report.orbit_figure(data.response(4), revolutions=5)
-    with pytest.raises(InputError, match="nothing to draw"):
+    with pytest.raises(InputError, match="no response to draw"):
         report.bifurcation_figure([])
 
 

@@ -57,10 +57,10 @@ def test_a_very_short_bearing_is_ocvirk_s():
 def evaluated(coefficients, eccentricity, angle):
     """What a lane makes of the coefficients, over mu R L^3/c^3: force against w and across it, of w along x."""
     par = np.zeros(at.PARAMETERS)
-    par[at.O12.finite : at.O12.finite + at.FINITE_ROWS] = coefficients
-    par[at.O12.block + at.FILM_FINITE] = 1.0
+    par[at.JOINTS[0].finite : at.JOINTS[0].finite + at.FINITE_ROWS] = coefficients
+    par[at.JOINTS[0].block + at.FILM_FINITE] = 1.0
     e = (eccentricity * np.cos(angle), -eccentricity * np.sin(angle))
-    x, y = finite_force(1, par, at.O12, e, (1.0, 0.0), 1.0 - eccentricity**2, 0, 1)
+    x, y = finite_force(1, par, at.JOINTS[0], e, (1.0, 0.0), 1.0 - eccentricity**2, 0, 1)
     return -np.array([x, y])
 
 

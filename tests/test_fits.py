@@ -260,7 +260,7 @@ def test_a_random_clearance_by_the_fit_of_its_joint():
 @pytest.mark.parametrize(
     ("row", "words"),
     [
-        ({}, "C12.bore = None: its limits are not known"),
+        ({}, "C12.bore = None: its limits of size are not known"),
         ({"fit": "20 H7/h6"}, "radial clearances from 0 to 17 um"),
         ({"fit": "20 H7/f7", "mean": 1e-5}, "does not belong"),
         ({"fit": "20 H7/f7", "bore": {"cp": 0}}, "must be above 0"),

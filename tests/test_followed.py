@@ -109,5 +109,5 @@ def test_what_is_not_followed_is_refused_as_an_objective():
     linkage_of(study)
     with pytest.raises(InputError, match="no point is followed"):
         linkage_of(study.with_({"mechanism.followed": None}))
-    with pytest.raises(InputError, match="a point is followed"):
+    with pytest.raises(InputError, match="has a followed point"):
         linkage_of(study.with_({"study.objective": "slider-acceleration-deviation"}))

@@ -329,7 +329,7 @@ def test_a_link_in_place_of_the_result_is_replaced_not_followed(hpcclear, tmp_pa
     answer = hpcclear(*words)
     assert refused(answer), answer
     parts.unlink()
-    (output.parent / "timing.nc").symlink_to(target)
+    output.with_suffix(".timing.nc").symlink_to(target)
     assert hpcclear(*words)[0] == 0
     assert target.read_bytes() == b"precious"
     assert list((tmp_path / "elsewhere").iterdir()) == []
@@ -383,7 +383,7 @@ def damaged(content: bytes, other: bytes, dice: random.Random) -> bytes:
 @pytest.mark.timeout(1800)
 def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     _, output = result
-    content, timing = output.read_bytes(), (output.parent / "timing.nc").read_bytes()
+    content, timing = output.read_bytes(), output.with_suffix(".timing.nc").read_bytes()
     good = dataset.read(output, "samples")
     names, records = tuple(dataset.designs(good)), dataset.records(good)
     values = list(dataset.designs(good).values())
@@ -419,7 +419,7 @@ def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
 @pytest.mark.timeout(1800)
 def test_commands_refuse_damaged_results(hpcclear, result, count):
     words, output = result
-    content, timing = output.read_bytes(), (output.parent / "timing.nc").read_bytes()
+    content, timing = output.read_bytes(), output.with_suffix(".timing.nc").read_bytes()
     dice = random.Random(count)
     try:
         for _ in range(count):

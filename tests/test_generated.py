@@ -1,6 +1,5 @@
-"""Generated motions: against a dense model that shares no formula, and the slider-crank's against those written by hand."""
+"""Generated motions: against a dense model that shares no formula."""
 
-import hashlib
 import sys
 from pathlib import Path
 
@@ -8,22 +7,17 @@ import numpy as np
 import pytest
 from dense_linkage import Dense
 from linkages import LINKAGES, four_bar, six_bar, slider_crank
-from motions_by_hand import all_by_hand
-from numba import njit
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from plain_lane import joints_of as joints_of_lane
 from scipy.integrate import solve_ivp
-from some_laws import STIFFNESS, effects_with
+from some_laws import effects_with
 
-from hpcclear.base.jit import FASTMATH
-from hpcclear.base.one_text import module_of, one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.compiled import _HEAD, module_with
+from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.parts import ConstantSpeed
 from hpcclear.dynamics.linkage.rhs import compiled_motion
-from hpcclear.dynamics.linkage.slider_crank import joints_of, motion_of
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 from assembly import executed_arithmetic
@@ -103,112 +97,6 @@ def test_trees_with_clearance_divide_by_nothing_but_parameters():
     for mechanism in (four_bar("o1", "o2", "o3", "o4"), four_bar("o2", "o3"), slider_crank("o12")):
         source = generate(mechanism, On(friction=True, gravity=True), Rows()).source
         assert source.count(" / ") == (1 if mechanism.joints[3].name == "o23" else 0)
-
-
-# ---- the slider-crank's text against the motions that were written by hand -------------------------
-FULL = {"gravity": 1, "load": 1, "guide": 1, "ledger": 1, "series": 1}
-TWO, O12, O23 = {"crank_rod": 1, "rod_slider": 1}, {"crank_rod": 1}, {"rod_slider": 1}
-LENGTH, CRANK = 0.12, 0.05
-
-
-def loop_over(source, joints):
-    """A function that runs a generated lane for each of W lanes, ready to be written out."""
-    rows = "".join(f"at.{joint!r}, " for joint in joints)
-    text = f"{_HEAD}\nJOINTS = ({rows})\n\n\n@apart\n@lane_function\n{source}\n{LOOP}"
-    name = f"tried_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    return module_of(name, lambda: text).one_after_the_other
-
-
-LOOP = """
-@lane_function
-def one_after_the_other(effects, work, par, W):
-    for i in range(W):
-        lane(effects, JOINTS, work, par, i, W)
-"""
-
-
-def compiled(text, effects, W):
-    """Both motions over W lanes."""
-    generated = loop_over(text.source, joints_of(effects))
-    texts = [
-        one_text(run, f"compared_{W}", effects=effects, W=W) for run in (generated, all_by_hand)
-    ]
-    return [njit(error_model="numpy", fastmath=FASTMATH)(text) for text in texts]
-
-
-def slider_crank_lanes(effects, coordinates, rng, W):
-    """Random parameters and states of W lanes, the joints near contact."""
-    par = rng.uniform(0.5, 2.0, (at.PARAMETERS, W))
-    near = rng.uniform(0.2, 0.8, W) * LENGTH
-    given = {
-        at.CRANK_LENGTH: CRANK, at.SPEED: 500.0, at.ROD_LENGTH: LENGTH,
-        at.ROD_NEAR: near, at.ROD_FAR: LENGTH - near,
-    }  # fmt: skip
-    for base in (at.JOINT_12, at.JOINT_23):
-        given |= {base + at.CLEARANCE: 3e-4, base + STIFFNESS: 1e9}
-    for row, value in given.items():
-        par[row] = value
-    for mass in (at.ROD_MASS, at.ROD_INERTIA, at.SLIDER_MASS):
-        par[mass + 1] = 1 / par[mass]
-    work = np.zeros((at.WORK, W))
-    work[at.STAGE_TIME] = rng.uniform(0, 0.01, W)
-    work[[at.TORQUE_VALUE, at.LOAD_VALUE]] = rng.normal(size=(2, W))
-    work[[at.ACTIVE, at.ACTIVE + 1]] = rng.integers(0, 2, (2, W))
-    work[[at.INVERSE_IMPACT, at.INVERSE_IMPACT + 1]] = rng.uniform(0.3, 3, (2, W))
-    phi = rng.uniform(0, 6, W) if effects.torque else par[at.SPEED] * work[at.STAGE_TIME]
-    e12, e23 = 4e-4 * rng.normal(size=(2, 2, W))
-    pin = CRANK * np.array([np.cos(phi), np.sin(phi)]) - (e12 if effects.crank_rod else 0.0)
-    height = pin[1] + (e23[1] if effects.rod_slider else 0.0)
-    theta = np.arcsin(-height / LENGTH)
-    along = np.array([np.cos(theta), np.sin(theta)])
-    x, y = pin + near * along
-    slider = (pin + LENGTH * along)[0] + e23[0] * bool(effects.rod_slider)
-    placed = {
-        "x_rod": x,
-        "y_rod": y,
-        "angle_rod": theta,
-        "slide_slider": slider,
-        "angle_crank": phi,
-    }
-    for k, one in enumerate(coordinates):
-        work[at.QS + k] = placed[one.name]
-        work[at.VS + k] = 100 * rng.normal(size=W)
-    return par.ravel(), work.ravel()
-
-
-@pytest.mark.parametrize(
-    ("W", "on"),
-    [
-        (8, TWO | FULL | {"latched": 1, "ambrosio": 1}),
-        (8, O12 | FULL | {"fixed": 1, "coulomb": 1, "torque": 1, "responses": 1}),
-        *(
-            pytest.param(W, topology | on, marks=pytest.mark.full)
-            for W in (1, 16)
-            for topology in (TWO, O12, O23)
-            for on in (
-                {"fixed": 1, "coulomb": 1},
-                {"gravity": 1, "torque": 1, "torque_table": 1, "load_table": 1, "ledger": 1},
-                {"guide": 1, "latched": 1, "ledger": 1, "responses": 1},
-                FULL | {"latched": 1, "ambrosio": 1},
-                FULL | {"fixed": 1, "coulomb": 1, "torque": 1},
-            )
-        ),
-    ],
-)  # fmt: skip
-def test_the_slider_crank_has_the_bits_of_the_motions_by_hand(W, on):
-    effects = effects_with(on)
-    text = motion_of(effects)
-    generated, by_hand = compiled(text, effects, W)
-    rng = np.random.default_rng(1)
-    moved = 0.0
-    for _ in range(20):
-        par, work = slider_crank_lanes(effects, text.forest.coordinates, rng, W)
-        other = work.copy()
-        generated(work, par)
-        by_hand(other, par)
-        np.testing.assert_array_equal(work, other)  # zeros of either sign are equal
-        moved += np.abs(work[at.ACC * W : (at.ACC + 2) * W]).sum()
-    assert moved > 0
 
 
 # ---- whole motions, and the machine code -----------------------------------------------------------

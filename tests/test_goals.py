@@ -11,7 +11,8 @@ from scipy import stats
 from scipy.stats import qmc
 
 from hpcclear.base.errors import InputError
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
@@ -83,8 +84,8 @@ def test_words_tables_and_units_of_the_objective() -> None:
     ("entries", "key", "reason"),
     [
         ({"objectives": ["mean", "median"]}, "objectives.1.statistic", "not one of the known"),
-        ({"objectives": ["mean"]}, "objectives", "two things or more"),
-        ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "not said"),
+        ({"objectives": ["mean"]}, "objectives", "two objectives or more"),
+        ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "threshold is missing"),
         ({"objectives": ["mean", {"statistic": "exceedance", "limit": "3 N"}]}, "objectives.1.limit", "does not fit"),
         ({"objectives": ["mean", {"statistic": "quantile", "level": 1.5}]}, "objectives.1.level", "below 1"),
         ({"objectives": ["mean", {"statistic": "mean", "level": 0.5}]}, "objectives.1.level", "belongs to"),
@@ -309,7 +310,7 @@ def test_the_answer_names_what_was_asked_for(study: tuple[Path, str]) -> None:
     found = verified(folder)
     lines = answer({"verification": found}, "out")
     assert (
-        "lowest share with f above 0.0003 m of" in dict(lines)["criterion"]
+        "lowest probability of f above 0.0003 m of" in dict(lines)["criterion"]
     )  # the case with most random inputs
     assert "lowest mean" not in dict(lines)["criterion"]
     tables = {case: lines for case, _, lines in beside_original(found)}
@@ -330,7 +331,7 @@ def test_the_page_tells_what_was_asked_for(study: tuple[Path, str]) -> None:
     (study[0] / "report.html").unlink()
     assert "95th percentile of f: 0." in page
     assert ">objective 1<" in page
-    assert "share with f above 0.0004 m" in page
+    assert "probability of f above 0.0004 m" in page
 
 
 @pytest.mark.mpi

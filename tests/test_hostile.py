@@ -61,13 +61,13 @@ def test_results_never_replace_what_this_program_did_not_write(thesis, words):
         assert code == 0, output
     else:
         assert refused((code, output)), output
-        assert "did not write" in output
+        assert "was not written by hpcclear" in output
 
 
 def test_times_beside_a_result_do_not_replace_a_users_file(tmp_path):
-    (tmp_path / "timing.nc").write_text("mine")
+    (tmp_path / "samples.timing.nc").write_text("mine")
     assert refused(run(sample(tmp_path / "samples.nc", 40), 0))
-    assert (tmp_path / "timing.nc").read_text() == "mine"
+    assert (tmp_path / "samples.timing.nc").read_text() == "mine"
 
 
 def test_our_own_files_are_replaced_and_a_link_is_not_followed(thesis, tmp_path):
@@ -309,7 +309,7 @@ def test_a_table_of_newlines_takes_no_memory(tmp_path):
     table = tmp_path / "points.csv"
     table.write_bytes(b"\n" * 8_000_000)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(InputError, match="holds no points"):
+    with pytest.raises(InputError, match="contains no points"):
         read_points(table, load_scene(SCENE))
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000  # kB
     table.write_bytes(b"C\n" + b"," * 1_000_000)

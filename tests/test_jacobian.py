@@ -12,7 +12,6 @@ from hpcclear.dynamics.implicit.control import fit_to_ramp
 from hpcclear.dynamics.implicit.memory import COLUMNS, Moved, N
 from hpcclear.dynamics.implicit.newton import evaluate_stages, new_jacobian
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.linkage.rhs import motion_of
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
@@ -60,7 +59,7 @@ def memory_of(changes: dict) -> tuple[Problem, np.ndarray]:
 
 def differentiate(problem: Problem, m: np.ndarray) -> None:
     """Evaluate the stages, and the Jacobians at the middle one."""
-    motion = motion_of(problem.effects, COLUMNS).address
+    motion = problem.motion(problem.effects, COLUMNS).address
     moved = Moved(0, motion, problem.coordinates, problem.tables)
     evaluate_stages(moved, m)
     new_jacobian(moved, m)
@@ -72,7 +71,7 @@ def test_columns_are_the_derivatives(name: str):
     problem, m = memory_of(changes)
     assert problem.coordinates == n
     rows = m.reshape(-1, COLUMNS)
-    motion = motion_of(problem.effects, 1).address
+    motion = problem.motion(problem.effects, 1).address
 
     def accelerations(states: np.ndarray, i: int) -> np.ndarray:
         out = np.zeros((len(states), n + at.RATES))

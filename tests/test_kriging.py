@@ -14,7 +14,7 @@ from hpcclear.statistics.surrogate.kernels import KERNELS, MATERN, SQUARED_EXPON
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.likelihood import PART, maximise, negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Piecewise, stored_fields
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import gaussian, matern
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 
@@ -255,8 +255,6 @@ def test_does_not_extrapolate(model):
         assert caught.value.value == value or np.isnan(value)
     corners = np.array([BOUNDS[:, 0], np.nextafter(BOUNDS[:, 1], np.inf)])  # round-off is forgiven
     assert np.isfinite(model.predict(corners)).all()
-    with pytest.raises(InputError, match="shape"):
-        model.predict(inside)
 
 
 def test_constant_function():
@@ -309,12 +307,6 @@ def test_failed_samples_are_dropped_and_counted(model):
         (lambda p, v, b: (p[:0], v[:0], b), "too few valid samples"),
         (lambda p, v, b: (np.where(p > 2.99, np.nan, p), v, b), "outside"),
         (lambda p, v, b: (p * 1.1, v, b), "outside"),
-        (lambda p, v, b: (p, np.where(np.arange(60) == 5, np.inf, v), b), "infinite"),
-        (lambda p, v, b: (p, v[:-1], b), "one per point"),
-        (lambda p, v, b: (p, v, b[:, ::-1]), "crossed"),
-        (lambda p, v, b: (p, v, b[:2]), "wrong shape"),
-        (lambda p, v, b: (p[:, 0], v, b), "not a table"),
-        (lambda p, v, b: (p[:, :0], v, b[:0]), "not a table"),
     ],
 )
 def test_bad_training_data_are_refused(model, change, reason):
@@ -351,18 +343,6 @@ def test_leave_one_out_is_what_fits_without_a_point_predict(either):
     cross = model._covariance(unit[[gone]], unit[left])[0]
     expected = model.mean + model.scale * cross @ alpha
     assert model.leave_one_out()[gone] == pytest.approx(expected, rel=1e-8)
-
-
-def test_a_kernel_that_is_not_known_is_refused(model):
-    with pytest.raises(InputError, match=r"matern-5/2") as caught:
-        refit(model, kernel="matern-3/2")
-    assert caught.value.key == "kernel"
-
-
-def test_names_must_fit(model):
-    for names in (("a", "b"), ("a", "a", "b")):
-        with pytest.raises(InputError, match="distinct name"):
-            refit(model, names=names)
 
 
 # Subintervals
@@ -450,23 +430,13 @@ def test_pieces_refuse_what_lies_outside():
 def test_pieces_round_trip_is_bitwise():
     pieces = fit_kinked(kinked)
     arrays = {name: np.copy(array) for name, array in pieces.to_arrays().items()}
-    assert arrays.keys() == stored_fields(METHOD).keys()
-    for name, dims in stored_fields(METHOD).items():
-        assert arrays[name].ndim == len(dims), name
     again = Piecewise.from_arrays(arrays, METHOD)
     places = draw(200, 14, SQUARE)
     assert (again.predict(places) == pieces.predict(places)).all()
     assert (again.accepted == pieces.accepted).all()
-    for name, damaged in [
-        ("training_points", arrays["training_points"] + 1),
-        ("training_points", arrays["training_points"] * 0.5),
-        ("upper", arrays["upper"] + 0.1),
-        ("lower", arrays["lower"][:-1]),
-        ("r2", arrays["r2"][:-1]),
-        ("names", arrays["names"][:1]),
-    ]:
+    for name in ("leaf0_upper", "leaf0_lower"):  # boxes that overlap or leave gaps
         with pytest.raises(InputError):
-            Piecewise.from_arrays(arrays | {name: damaged}, METHOD)
+            Piecewise.from_arrays(arrays | {name: arrays[name] + 0.1}, METHOD)
 
 
 def test_pieces_are_deterministic_and_survive_failures():
@@ -479,15 +449,3 @@ def test_pieces_are_deterministic_and_survive_failures():
     assert sum(leaf.dropped for leaf in first.leaves) > 0
     with pytest.raises(InputError, match="too few valid samples"):
         fit_kinked(lambda p: np.full(len(p), np.nan))
-
-
-@pytest.mark.parametrize(("changes", "key"), [({"cuts": (0, 1)}, "cuts"), ({"cuts": (2,)}, "cuts")])
-def test_bad_cuts_are_refused(changes, key):
-    with pytest.raises(InputError) as caught:
-        fit_kinked(kinked, **changes)
-    assert caught.value.key == key
-
-
-def test_evaluate_must_answer_every_point():
-    with pytest.raises(InputError, match="one value per point"):
-        fit_kinked(lambda p: p)

@@ -212,7 +212,7 @@ def test_checkpoints_take_less_than_a_hundredth_of_the_time(tmp_path):
     # the plain command: to be watched takes time too
     code, output = commands.finish(commands.start(words, program=("-m", "hpcclear")))
     assert code == 0, output
-    timing = dataset.read(tmp_path / "timing.nc", "timing")
+    timing = dataset.read(tmp_path / "samples.timing.nc", "timing")
     root = timing.sel(rank=0)
     total = sum(float(root[name].sum()) for name in COLUMNS)
     # the stage "files" opens the checkpoint and writes the result, which a run without checkpoints writes too

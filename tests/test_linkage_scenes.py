@@ -19,7 +19,7 @@ from hpcclear.cli.printing import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together, tables_of
+from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.ensemble.api import as_points, evaluate
@@ -311,7 +311,7 @@ def test_a_sample_that_does_not_close_has_failed_and_the_others_go_on():
 
 def test_a_number_that_is_nought_can_be_a_variable_of_the_study_only():
     scene = rocker()
-    with pytest.raises(InputError, match="nought in this scene"):
+    with pytest.raises(InputError, match="zero in this scene"):
         evaluate(scene, {"mechanism.bodies.coupler.center.y": [1e-3]})
 
 
@@ -350,8 +350,8 @@ BROKEN = {
     "bodies.coupler.inertia=0": "inertia",
     "bodies.coupler.center=[0.1, 0.0]": "mass_center",
     "bodies.coupler.inertia_ratio=1": "Remove one",
-    "drives.motor.body=shaft": "no such body",
-    "drives.motor.speed=0": "nothing would turn",
+    "drives.motor.body=shaft": "no such moving body",
+    "drives.motor.speed=0": "there would be no motion",
     "drives.motor.turns=0": "from 1",
     "drives.motor.torque=3": "not a known key",
     "loads.pull.kind=magnet": "known values",
@@ -376,7 +376,7 @@ def test_broken_linkages_are_refused_by_name(change):
 def test_a_linkage_that_does_not_close_is_refused():
     key, words = refusal("bodies.coupler.length=2 m")
     assert key.startswith("mechanism.joints")
-    assert "does not close" in words
+    assert "cannot be assembled" in words
 
 
 def test_a_slider_crank_s_tables_do_not_fit_a_linkage():
@@ -429,6 +429,6 @@ def test_a_row_like_another_takes_over_what_its_tables_do_not_say():
 def test_the_angle_of_a_body_that_is_held_is_told():
     """By the joint that holds it: it has no coordinate of its own."""
     examples = LINKAGES.parents[1] / "docs" / "mkdocs" / "examples"
-    told = put_together(mechanism_of(tables_of(load_scene(examples / "linkage.toml")))).report()
+    told = put_together(mechanism_of(load_scene(examples / "linkage.toml").linkage)).report()
     assert "frame: 90 deg (from 0)" in told
     assert "crank: 25 deg (from 25)" in told

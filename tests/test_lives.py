@@ -253,7 +253,6 @@ def test_quantiles_keep_what_is_infinite_and_leave_out_what_failed():
         ({"joints.crank_rod.wear": None, "joints.rod_slider.wear": None, "study": None, "wear.lives": 1}, "joints"),
         ({"study": None}, "wear.lives"),
         ({"numerics.target_error": 1e-3}, "numerics.target_error"),
-        ({"numerics.uncertainty": True}, "numerics.uncertainty"),
     ],
 )  # fmt: skip
 def test_what_has_no_lives_is_refused(changes, key):

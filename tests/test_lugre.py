@@ -356,7 +356,7 @@ def test_points_keep_friction_at_rest_above_that_of_sliding():
     points = Points(("mu",), np.array([[0.05], [0.15]]), ((paths[0],),))
     check_points(scene, points)
     assert parameters(scene, points)[
-        :, at.JOINT_12 + row("friction", "lugre", "coefficient")
+        :, at.JOINTS[0].block + row("friction", "lugre", "coefficient")
     ].tolist() == [0.05, 0.15]
 
 

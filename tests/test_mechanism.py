@@ -78,7 +78,7 @@ BROKEN = {
     "a drive of a guided body": (
         lambda: replace(slider_crank("o12"), drives=(replace(MOTOR, body="slider"),)),
         "drives.motor.body",
-        "guide holds it",
+        "prismatic joint",
     ),
     "two drives of one body": (
         with_more("drives", Harmonic("swing", "crank", 0.1, 1.0)), "drives.swing.body", "'motor'",
@@ -94,15 +94,15 @@ BROKEN = {
     "a drive that stands": (
         lambda: replace(BASE, drives=(ConstantSpeed("motor", "crank", 0.0),)),
         "drives.motor.speed",
-        "nothing would turn",
+        "there would be no motion",
     ),
     "a torque at rest": (
         lambda: replace(BASE, drives=(TorqueDrive("motor", "crank", 1.0, 0.0),)),
         "drives.motor.initial_speed",
-        "nothing would turn",
+        "there would be no motion",
     ),
-    "no mass": (with_body("coupler", mass=0.0), "bodies.coupler.mass", "has a mass"),
-    "no inertia": (with_body("rocker", inertia=0.0), "bodies.rocker.inertia", "has an inertia"),
+    "no mass": (with_body("coupler", mass=0.0), "bodies.coupler.mass", "needs a mass"),
+    "no inertia": (with_body("rocker", inertia=0.0), "bodies.rocker.inertia", "needs an inertia"),
     "a negative inertia": (with_body("crank", inertia=-1.0), "bodies.crank.inertia", "inertia"),
     "a point named like the centre": (
         with_body("crank", points={"a": (0, 0), "b": (1, 0), "center": (0, 0)}),
@@ -112,12 +112,12 @@ BROKEN = {
     "a name with a blank": (
         lambda: replace(BASE, bodies=(*BASE.bodies, replace(LONE, name="a b"))),
         "bodies.a b",
-        "no name",
+        "not a valid name",
     ),
     "a body named ground": (
         lambda: replace(BASE, bodies=(*BASE.bodies, replace(LONE, name="ground"))),
         "bodies.ground",
-        "no name",
+        "not a valid name",
     ),
     "a name twice": (with_more("bodies", BASE.bodies[0]), "bodies.crank", "twice"),
     "no clearance": (with_joint("o2", clearance=0.0), "joints.o2.clearance", "above 0"),
@@ -143,7 +143,7 @@ BROKEN = {
     "held on a body": (
         with_more("joints", Fixed("weld", "rocker.b", "coupler.b")),
         "joints.weld.line",
-        "on the ground only",
+        "to the ground only",
     ),
     "a ground that slides": (
         with_more("joints", Slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",

@@ -1,17 +1,21 @@
 """Equations of motion against a dense nine-coordinate model that shares no formula with them."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from dense_mechanism import PHI, THETA2, X2, X3, Y2, Dense, Joint, admissible, assembled
-from some_laws import STIFFNESS, effects_with, row
+from running import scene_with
+from some_laws import contact_law, row
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.linkage import baumgarte as bg
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.linkage.rhs import motion_of
+from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.response import violation
+from hpcclear.dynamics.problem import problem_of
 
 CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
 ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}
@@ -34,6 +38,9 @@ RUBBING = {
     "static_coefficient": BRISTLES["static"],
     "inverse_speed": 1 / BRISTLES["speed"],
 }
+OFFSET = 0.017
+LOADS = [[0.0, -30.0], [math.pi, 20.0], [3 * math.pi, -5.0]]
+"""N by the crank angle over two turns, straight between: rows at borders of the kernel's cells."""
 DEFLECTIONS = np.array([4e-6, -2e-6])  # of the bristles in both joints, m
 KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
 
@@ -62,55 +69,97 @@ MOTIONS = [
     ("none", {"torque", "ledger", "series"}),
     ("none", FULL | {"torque"}),
 ]
+FURTHER = [
+    ("two", FULL - {"load"} | {"latched", "coulomb", "offset", "clockwise", "two turns"}),
+    ("O12", FULL - {"load"} | {"fixed", "offset", "torque", "two turns"}),
+]
+"""An offset guide, a drive that turns clockwise, a load that repeats after two turns."""
 
 
 def clip(x):
     return min(max(x, -1.0), 1.0)
 
 
+BASES = {name: at.JOINTS[k].block for k, name in enumerate(("crank_rod", "rod_slider"))}
+
+
+def bar(numbers):
+    return {**{k: v for k, v in numbers.items() if k != "u"}, "mass_center": numbers["u"]}
+
+
+@lru_cache(maxsize=64)
+def scene_of(effects):
+    """The scene of these effects (a frozen set), with this file's constants."""
+    friction = {"law": "none"}
+    if "coulomb" in effects:
+        friction = {"law": "coulomb", "coefficient": MU, "ramp_speed": RAMP}
+    if "ambrosio" in effects:
+        friction = {"law": "ambrosio", "coefficient": MU, "speeds": [DEAD, DEAD + RAMP]}
+    if "lugre" in effects:
+        friction = {
+            "law": "lugre", "coefficient": MU, "static_coefficient": BRISTLES["static"],
+            "bristle_stiffness": BRISTLES["stiffness"], "bristle_damping": BRISTLES["damping"],
+            "viscous_coefficient": BRISTLES["viscous"], "stribeck_speed": BRISTLES["speed"],
+        }  # fmt: skip
+    law = {"law": "hertz"}
+    if "fixed" in effects:
+        law = {"law": "hunt-crossley", "damping": DAMPING}
+    if "latched" in effects:
+        law = {"law": "lankarani-nikravesh", "restitution": 0.9}
+    changes = {
+        "mechanism.crank": bar(CRANK), "mechanism.rod": bar(ROD), "mechanism.slider.mass": SLIDER_MASS,
+        "drive": {"kind": "constant-speed", "speed": SPEED},
+        "effects": {"contact": law, "friction": friction, "gravity": 9.81 * ("gravity" in effects)},
+        "numerics.alpha": 250.0, "numerics.beta": 240.0,
+        "numerics.formulation": "baumgarte" if "baumgarte" in effects else "minimal",
+    }  # fmt: skip
+    if "torque" in effects:
+        changes["drive"] = {"kind": "torque", "torque": 2.5, "initial_speed": SPEED}
+    if "clockwise" in effects:
+        changes["drive"]["speed"] = -SPEED
+    if "offset" in effects:
+        changes["mechanism.offset"] = OFFSET
+    if "two turns" in effects:
+        changes["drive"]["turns"] = 2
+        changes["effects"]["slider_load"] = LOADS
+        changes["numerics.interpolation"] = "linear"
+    if "load" in effects:
+        changes["effects"]["slider_load"] = -35.0
+    if "guide" in effects:
+        changes["effects"]["guide_friction"] = {"coefficient": GUIDE[0], "ramp_speed": GUIDE[1]}
+    models = [model for model in ("short", "long") if f"{model}_film" in effects]
+    for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
+        if name not in effects:
+            changes[f"joints.{name}"] = {"kind": "ideal"}
+            continue
+        changes[f"joints.{name}.clearance"] = clearance
+        if models:
+            film = {"viscosity": 0.05, "length": 0.02, "roughness": 1e-5}
+            changes[f"joints.{name}.film"] = {**film, "model": models.pop(0)}
+    return scene_with(changes)
+
+
 def row_of_parameters(effects, rng):
     """Parameters as the kernel reads them, with this file's constants and two different joints."""
-    par = np.ones(at.PARAMETERS)
-    values = {
-        at.SPEED: SPEED,
-        at.CRANK_LENGTH: CRANK["length"],
-        at.CRANK_MASS: CRANK["mass"],
-        at.CRANK_NEAR: CRANK["u"],
-        at.CRANK_OWN_INERTIA: CRANK["inertia"],
-        at.CRANK_MOMENT: CRANK["mass"] * CRANK["u"],
-        at.CRANK_INERTIA: CRANK["inertia"] + CRANK["mass"] * CRANK["u"] ** 2,
-        at.ROD_LENGTH: ROD["length"],
-        at.ROD_NEAR: ROD["u"],
-        at.ROD_FAR: ROD["length"] - ROD["u"],
-        at.ROD_MASS: ROD["mass"],
-        at.INV_ROD_MASS: 1 / ROD["mass"],
-        at.ROD_INERTIA: ROD["inertia"],
-        at.INV_ROD_INERTIA: 1 / ROD["inertia"],
-        at.SLIDER_MASS: SLIDER_MASS,
-        at.INV_SLIDER_MASS: 1 / SLIDER_MASS,
-        at.GRAVITY: 9.81,
-        at.LOAD: -35.0,
-        at.TORQUE: 2.5,
-        at.GUIDE_COEFFICIENT: GUIDE[0],
-        at.GUIDE_INVERSE_RAMP: 1 / GUIDE[1],
-        at.BAUMGARTE_ALPHA2: 2 * 250.0,
-        at.BAUMGARTE_BETA2: 240.0**2,
-    }
-    for base, clearance in ((at.JOINT_12, 3e-4), (at.JOINT_23, 5e-4)):
+    par = parameters(scene_of(frozenset(effects)))[0]
+    values, law = {}, contact_law(effects)
+    for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
+        base = BASES[name]
+        if name not in effects:
+            continue
         values |= {
-            base + at.CLEARANCE: clearance,
-            base + STIFFNESS: 3e9 * (1 + clearance),
-            base + STIFFNESS + 1: DAMPING if "fixed" in effects else RESTITUTION_FACTOR,
-            base + at.BEARING_RADIUS: 0.02,
-            base + at.JOURNAL_RADIUS: 0.02 - clearance,
+            base + row("contact", law, "stiffness"): 3e9 * (1 + clearance),
             base + at.FILM_SHORT: FILM["short"],
             base + at.FILM_LONG: FILM["long"],
             base + at.FILM_SHEAR: FILM["shear"],
             base + at.FILM_FLOOR: FILM["floor"],
         }
-        for law in {"coulomb", "ambrosio", "lugre"} & effects:
-            for name in laws("friction")[law].read:
-                values[base + row("friction", law, name)] = RUBBING[name]
+        if law != "hertz":
+            factor = DAMPING if "fixed" in effects else RESTITUTION_FACTOR
+            values[base + row("contact", law, "damping")] = factor
+        for rubs in {"coulomb", "ambrosio", "lugre"} & effects:
+            for name in laws("friction")[rubs].read:
+                values[base + row("friction", rubs, name)] = RUBBING[name]
     for place, value in values.items():
         par[place] = value
     return par
@@ -146,7 +195,10 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
             return spring + damper + BRISTLES["viscous"] * sliding
         return 0.0
 
-    clearance, stiffness = par[base + at.CLEARANCE], par[base + STIFFNESS]
+    clearance, stiffness = (
+        par[base + at.CLEARANCE],
+        par[base + row("contact", contact_law(effects), "stiffness")],
+    )
     factors = {name: FILM[name] * (f"{name}_film" in effects) for name in ("short", "long")}
     return Joint(
         clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0,
@@ -157,21 +209,25 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
 def dense_model(effects, par, contacts, feedback=False):
     on = effects.__contains__
     joints = {}
-    for k, (name, base, flag) in enumerate(
-        (("o12", at.JOINT_12, "crank_rod"), ("o23", at.JOINT_23, "rod_slider"))
-    ):
+    for k, (name, flag) in enumerate((("o12", "crank_rod"), ("o23", "rod_slider"))):
         if on(flag):
             joints[name] = joint_of(
-                effects, par, base, contacts[k], 1 / contacts[at.MAX_JOINTS + k], DEFLECTIONS[k]
+                effects,
+                par,
+                BASES[flag],
+                contacts[k],
+                1 / contacts[at.MAX_JOINTS + k],
+                DEFLECTIONS[k],
             )
     return Dense(
         CRANK,
         ROD,
         SLIDER_MASS,
-        speed=None if on("torque") else SPEED,
+        speed=None if on("torque") else SPEED * (-1 if on("clockwise") else 1),
         torque=2.5,
         gravity=9.81 if on("gravity") else 0.0,
         load=-35.0 if on("load") else 0.0,
+        offset=OFFSET if on("offset") else 0.0,
         guide=(lambda v: GUIDE[0] * clip(v / GUIDE[1])) if on("guide") else None,
         alpha=250.0 if feedback else 0.0,
         beta=240.0 if feedback else 0.0,
@@ -179,38 +235,41 @@ def dense_model(effects, par, contacts, feedback=False):
     )
 
 
-def random_state(mech, rng, par):
+def random_state(mech, rng, par, turns=1):
     """A state that meets the constraints, journals up to 1.3 clearances off centre; and its time."""
     eccentric = []
     for joint in (mech.o12, mech.o23):
         reach = 0.0 if joint is None else joint.clearance * rng.uniform(0.7, 1.3)
         angle = rng.uniform(0, at.TURN)
         eccentric.append(reach * np.array([np.cos(angle), np.sin(angle)]))
-    phi = rng.uniform(0, at.TURN)
+    speed = SPEED if mech.speed is None else mech.speed
+    phi = math.copysign(rng.uniform(0, at.TURN * turns), speed)
     q = assembled(mech, phi, *eccentric)
     wanted = rng.normal(size=9) * np.array([5, 5, SPEED, 8, 8, 90, 10, 0, 0])
-    wanted[PHI] = SPEED * rng.uniform(0.5, 1.5)
-    t = phi / SPEED
+    wanted[PHI] = speed * rng.uniform(0.5, 1.5)
+    t = phi / speed
     return q, admissible(mech, q, wanted, t), t
 
 
 def reduced(effects, values):
     """Minimal coordinates among the nine."""
     topology = ("crank_rod" in effects, "rod_slider" in effects)
-    rows = {(True, True): [X2, Y2, THETA2, X3], (False, False): []}.get(topology, [THETA2, X3])
+    rows = [X2, Y2, THETA2, X3] if all(topology) else [THETA2, X3]
     return values[rows + [PHI] * ("torque" in effects)]
 
 
 def seen_by_kernel(effects, par, q, v, contacts, t):
     """Accelerations, those of bristles first where there are any, and rates of one state from the kernel."""
-    flags = effects_with(effects)
+    problem = problem_of(
+        scene_of(frozenset(effects)), series="series" in effects, ledger="ledger" in effects
+    )
     if "lugre" in effects:
         z = deflected(effects)
         q, v = np.concatenate([np.full(len(z), 7.0), q]), np.concatenate([z, v])
     out = np.zeros((1, len(q) + at.RATES))
     states = np.concatenate([q, v])[None]
-    motion = motion_of(flags, 1).address
-    observe(motion, par, np.zeros(at.TABLES), states, contacts[None], np.array([t]), out)
+    motion = problem.motion(problem.effects, 1).address
+    observe(motion, par, problem.tables, states, contacts[None], np.array([t]), out)
     return out[0, : len(q)], out[0, len(q) :]
 
 
@@ -223,7 +282,11 @@ def cases(rng, effects, count=25):
         contacts[1, :2] = rng.uniform(0.3, 3.0, 2)
         contacts = contacts.ravel()
         mech = dense_model(effects, par, contacts)
-        yield par, contacts, mech, *random_state(mech, rng, par)
+        state = random_state(mech, rng, par, turns=2 if "two turns" in effects else 1)
+        if "two turns" in effects:
+            angles, loads = np.transpose([*LOADS, [2 * at.TURN, LOADS[0][1]]])
+            mech.load = np.interp(state[0][PHI] % (2 * at.TURN), angles, loads)
+        yield par, contacts, mech, *state
 
 
 def scale_of(reference):
@@ -232,7 +295,10 @@ def scale_of(reference):
 
 def check_rates(effects, mech, rates, v):
     """Gaps, forces and powers of the kernel against the dense model's."""
-    for name, flag, joint in (("o12", "crank_rod", at.O12), ("o23", "rod_slider", at.O23)):
+    for name, flag, joint in (
+        ("o12", "crank_rod", at.JOINTS[0]),
+        ("o23", "rod_slider", at.JOINTS[1]),
+    ):
         if flag in effects:
             seen = mech.seen[name]
             np.testing.assert_allclose(rates[joint.gap], seen["gap"], rtol=0, atol=1e-16)
@@ -255,7 +321,7 @@ def check_rates(effects, mech, rates, v):
 
 
 @pytest.mark.parametrize(
-    ("topology", "effects"), MOTIONS, ids=lambda x: x if isinstance(x, str) else ""
+    ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
 def test_minimal_accelerations_equal_the_dense_model(topology, effects):
     effects = effects | TOPOLOGIES[topology]
@@ -279,7 +345,7 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
 
 
 @pytest.mark.parametrize(
-    ("topology", "effects"), MOTIONS, ids=lambda x: x if isinstance(x, str) else ""
+    ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
 def test_power_balance_closes_at_every_instant(topology, effects):
     """Kinetic, potential and stored energy change by what the ledger says, state by state."""
@@ -292,7 +358,9 @@ def test_power_balance_closes_at_every_instant(topology, effects):
         kinetic = (mech.masses() * v) @ a
         weight = mech.gravity * (mech.masses() * v)[[1, 4]].sum()
         stored = sum(mech.seen[j]["elastic_power"] for j in ("o12", "o23") if j in mech.seen)
-        supplied = rates[at.DRIVE_POWER] + rates[at.LOAD_POWER] * ("load" in effects)
+        supplied = rates[at.DRIVE_POWER] + rates[at.LOAD_POWER] * bool(
+            {"load", "two turns"} & effects
+        )
         terms = np.array([kinetic, weight, stored, supplied, rates[at.DISSIPATION]])
         rest = kinetic + weight + stored - supplied + rates[at.DISSIPATION]
         assert abs(rest) < 1e-10 * np.abs(terms).max() + 1e-9
@@ -303,7 +371,11 @@ def test_power_balance_closes_at_every_instant(topology, effects):
     [
         pytest.param(*case, marks=[] if k % 3 == 2 else pytest.mark.full)
         for k, case in enumerate(
-            [*(one for one in MOTIONS if "lugre" not in one[1]), ("none", FULL)]
+            [
+                *(one for one in MOTIONS if "lugre" not in one[1]),
+                ("none", FULL),
+                ("two", {"fixed", "coulomb", "offset", "clockwise"}),
+            ]
         )
     ],
     ids=lambda x: x if isinstance(x, str) else "",
@@ -332,7 +404,7 @@ def test_constraint_violation_is_the_largest_constraint():
         q = random_state(mech, rng, par)[0] + 1e-6 * rng.normal(size=9)
         rows = np.delete(mech.constraints(q, q[PHI] / SPEED), 4)
         rows[3] *= ROD["length"]
-        got = bg.constraint_violation(
-            "crank_rod" in names, "rod_slider" in names, par, q[KERNEL_ORDER][:, None]
-        )
+        linkage = linkage_of(scene_of(frozenset(names | {"baumgarte"})))
+        q, still = q[KERNEL_ORDER][:, None], np.zeros((9, 1))
+        got = violation(linkage, q, still, np.array([q[-1, 0] / SPEED]))
         np.testing.assert_allclose(got, [np.abs(rows).max()], rtol=1e-9)

@@ -116,7 +116,11 @@ IN_DIRECTORIES = (raw, run, accuracy)
 
 def contents(place: Path) -> dict[str, bytes]:
     found = {str(path.relative_to(place)): path for path in sorted(place.rglob("*.nc"))}
-    return {name: path.read_bytes() for name, path in found.items() if path.name != "timing.nc"}
+    return {
+        name: path.read_bytes()
+        for name, path in found.items()
+        if not path.name.endswith("timing.nc")
+    }
 
 
 def planted(path: Path, **attributes: str) -> Path:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numba import njit
+from running import scene_with
 from some_laws import effects_with
 
 from hpcclear.base.jit import lane_function, scalar_function, written_kind
@@ -15,7 +16,7 @@ from hpcclear.base.one_text import one_text, text_of
 from hpcclear.base.text.alike import written_once
 from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.rhs import written_by
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.stepping.stops import impact_fraction
 
 
@@ -113,21 +114,20 @@ def test_two_branches_that_return_keep_their_order():
 
 
 def test_a_motion_holds_its_effects_alone():
-    known = {"effects": effects_with({"crank_rod", "rod_slider"}), "W": 16}
-    text = text_of(written_by(known["effects"]).motion, "motion", known)
-    clearance, gravity = (
-        rf"par\w*\[{row * 16} \+ i\w*\]" for row in (at.JOINT_12 + at.CLEARANCE, at.GRAVITY)
-    )
-    assert re.search(clearance, text)
-    assert not re.search(gravity, text)
-    known["effects"] = known["effects"]._replace(gravity=1)
-    text = text_of(written_by(known["effects"]).motion, "motion", known)
-    assert re.search(gravity, text)
+    linkage = linkage_of(scene_with({"effects.friction": {"law": "none"}}))
+    known = {"effects": effects_with((), joints=2), "W": 16}
+    text = text_of(linkage.module(known["effects"]).motion, "motion", known)
+    friction = rf"work\w*\[{(at.RATE_NOW + at.FRICTIONS) * 16} \+ i\w*\]"
+    assert re.search(rf"par\w*\[{(at.JOINTS[0].block + at.CLEARANCE) * 16} \+ i\w*\]", text)
+    assert not re.search(friction, text)
+    known["effects"] = known["effects"]._replace(series=1)
+    text = text_of(linkage.module(known["effects"]).motion, "motion", known)
+    assert re.search(friction, text)
 
 
 def test_a_text_is_a_file_and_written_once():
-    effects = effects_with({"rod_slider"})
-    motion = written_by(effects).motion
+    effects = effects_with((), joints=2)
+    motion = linkage_of(scene_with()).module(effects).motion
     text = one_text(motion, "kept", effects=effects, W=3)
     path = Path(text.__code__.co_filename)
     assert path.stem == text.__name__

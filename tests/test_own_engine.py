@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from own_engine import engine
 
 import hpcclear
-from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.base.objectives import OURS
 from hpcclear.cli import cli
 from hpcclear.cli.printing import describe_samples, describe_statistics, quantity
 from hpcclear.cli.response import describe_response
@@ -101,7 +101,7 @@ def test_the_objective_asked_for_is_what_sample_evaluate_and_simulate_call_objec
     evaluated = hpcclear.evaluate(scene, {"play": [30e-6]})
     for found in (made.content, dataset.read(tmp_path / "samples.nc"), evaluated):
         assert found["objective"].attrs["units"] == UNITS[name]
-        assert found["objective"].attrs["long_name"] == f"objective f, {OBJECTIVES[name].words}"
+        assert found["objective"].attrs["long_name"] == f"objective f, {OURS[name].words}"
         one = found.isel(sample=-1)
         assert float(one["objective"]) == pytest.approx(of_response(one, name), rel=1e-12)
         if name != "mean-gap":  # how f scatters says nothing of it
@@ -132,8 +132,8 @@ def test_report_and_summary_call_the_objective_by_its_name(tmp_path, monkeypatch
     printed = " ".join(capsys.readouterr().out.split())
     words = sections.summary(read(tmp_path))["words"]
     unit = UNITS[name].split("/")[0]
-    assert OBJECTIVES[name].words in printed
-    assert any(OBJECTIVES[name].words in one and unit in one for one in words)
+    assert OURS[name].words in printed
+    assert any(OURS[name].words in one and unit in one for one in words)
     if name != "mean-gap":
         assert "clearance circle" not in " ".join([printed, *words])
         assert " mm" not in printed
@@ -153,10 +153,10 @@ def test_long_names_say_what_a_variable_drives():
         ("drive.speed=5000", ["drive.speed = 5000 rad/s is 47746 rpm", '"5000 rpm"']),
         ("joints.crank_rod.bearing.youngs_modulus=0.5", ["= 0.5 Pa is softer than rubber", "GPa"]),
         ("joints.rod_slider.journal.youngs_modulus=210e12", ["stiffer than diamond", "GPa"]),
-        ("joints.rod_slider.clearance=0.003", ["27% of the bearing's radius", "radial play"]),
+        ("joints.rod_slider.clearance=0.003", ["27% of the bearing's radius", "radial clearance"]),
         ("mechanism.slider.mass=400", ["mechanism.slider.mass = 400 kg", '"400 g"']),
         ("mechanism.rod.length=140", ["mechanism.rod.length = 140 m", '"140 mm"']),
-        ("mechanism.rod.inertia=1100", ["mechanism.rod.inertia = 1100 kg m2", "mind the unit"]),
+        ("mechanism.rod.inertia=1100", ["mechanism.rod.inertia = 1100 kg m2", "check the unit"]),
         ("effects.gravity=9810", ["effects.gravity = 9810", "9.81"]),
     ],
 )

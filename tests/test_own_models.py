@@ -223,13 +223,13 @@ def test_moments_are_averages_of_predictions_or_its_own():
     draws = {"x2": np.linspace(0.0, 1e-4, 64)}
     linear = fitted(lambda: Constant(lambda X: X[:, 0] + X[:, 1]))
     own = fitted(lambda: Own(lambda X: X[:, 0]))
-    from hpcclear.statistics.random.distributions import Uniform
+    from hpcclear.base.quantiles import Uniform
     from hpcclear.statistics.random.inputs import RandomVariable
 
     found = []
     for leaf in (linear, own):
         model = Piecewise((leaf,), np.ones(1), np.zeros(1), np.ones(1, bool))
-        random = [RandomVariable("x2", Uniform(0.0, 1e-4))]
+        random = [RandomVariable("x2", Uniform(5e-5, 5e-5))]
         found.append(RobustObjective(model, ("x1",), random, draws=draws)(np.array([[1.0]]))[0])
     mean, scale = linear.values.mean(), linear.values.std()
     unit = np.linspace(0.0, 1.0, 64)

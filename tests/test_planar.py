@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from running import scene_with
-from some_laws import STIFFNESS
+from some_laws import row
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -15,8 +15,11 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.tables import planar_mechanism, slider_crank_mechanism
+from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.start import start_states
+from hpcclear.scene.planar import Planar
+from hpcclear.scene.points import Points
+from hpcclear.scene.validation import validated
 
 TEXT = """
 kind = "planar"
@@ -103,7 +106,7 @@ def changed(path, value):
 
 
 def test_tables_are_read_into_data_and_assembled():
-    mechanism = planar_mechanism(TABLES)
+    mechanism = mechanism_of(validated(Planar, TABLES))
     assert [body.name for body in mechanism.bodies] == ["crank", "coupler", "rocker"]
     crank, coupler, rocker = mechanism.bodies
     assert (crank.mass, crank.center) == (0.2, (0.02, 0.0))
@@ -139,8 +142,8 @@ def test_tables_are_read_into_data_and_assembled():
         ("joints.o2.clearance", "30 mm", "joints.o2.clearance", "bearing radius"),
         ("joints.o2.journal", "crank.c", "joints.o2.journal", "no point"),
         ("drives", {}, "drives", "nothing drives"),
-        ("drives.motor.body", "piston", "drives.motor.body", "no such body"),
-        ("drives.motor.speed", 0, "drives.motor.speed", "nothing would turn"),
+        ("drives.motor.body", "piston", "drives.motor.body", "no such moving body"),
+        ("drives.motor.speed", 0, "drives.motor.speed", "there would be no motion"),
         ("loads.weight.place", "coupler", "loads.weight.place", "no point"),
         ("loads.band.kind", "rubber", "loads.band.kind", "spring"),
         ("bodies.extra", {"mass": 1.0}, "bodies.extra.inertia", "inertia"),
@@ -148,8 +151,8 @@ def test_tables_are_read_into_data_and_assembled():
 )
 def test_wrong_tables_are_refused_by_name(path, value, key, said):
     with pytest.raises(InputError) as caught:
-        planar_mechanism(changed(path, value))
-    assert caught.value.key == key
+        mechanism_of(validated(Planar, changed(path, value)))
+    assert caught.value.key.removeprefix("mechanism.") == key
     assert said in str(caught.value)
 
 
@@ -160,7 +163,7 @@ TORQUE = {"drive": {"kind": "torque", "torque": 5.0, "initial_speed": 300.0}}
 @pytest.mark.parametrize("changes", [{}, TILTED, TORQUE], ids=["paper", "eccentric", "torque"])
 def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     scene = scene_with(changes, 1)
-    mechanism = slider_crank_mechanism(scene)
+    mechanism = mechanism_of(scene.linkage)
     par = parameters(scene)
     assembly = assemble(mechanism)
     start = start_states(scene, par)
@@ -171,15 +174,40 @@ def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     np.testing.assert_allclose(assembly.q[order], start.coordinates(4)[0], atol=1e-14)
     np.testing.assert_allclose(assembly.v[order], start.velocities(4)[0], rtol=1e-9, atol=1e-9)
     stiffness = [joint.stiffness for joint in mechanism.clearances]
-    found = [par[0, first + STIFFNESS] for first in (at.JOINT_12, at.JOINT_23)]
+    first = row("contact", scene.effects.contact.law, "stiffness")
+    found = [par[0, one.block + first] for one in at.JOINTS[:2]]
     np.testing.assert_allclose(stiffness, found, rtol=1e-15)
+
+
+def test_parameters_of_samples_are_those_of_their_scenes():
+    """Of a template: each entry stands for that of the linkage, lengths and the offset among them."""
+    scene = scene_with(
+        {"mechanism.offset": 0.01, "effects.slider_load": -50.0, "effects.gravity": 9.81}
+    )
+    paths = [
+        f"mechanism.{entry}"
+        for entry in ("offset", "crank.length", "crank.mass_center", "slider.mass")
+    ]
+    paths += [
+        "joints.rod_slider.clearance",
+        "effects.slider_load",
+        "drive.speed",
+        "effects.gravity",
+    ]
+    values = np.array([
+        [0.01, 0.05, 0.025, 0.14, 3e-4, -50.0, 500.0, 9.81],
+        [-0.02, 0.03, 0.01, 0.2, 5e-4, 70.0, 300.0, 1.0],
+    ])  # fmt: skip
+    points = Points(tuple(paths), values, tuple((path,) for path in paths))
+    of_scenes = [parameters(scene.with_(dict(zip(paths, row, strict=True))))[0] for row in values]
+    np.testing.assert_allclose(parameters(scene, points), of_scenes, rtol=1e-12)
 
 
 def test_guide_friction_and_load_are_written_out_too():
     scene = scene_with(
         {"effects.guide_friction": {"coefficient": 0.1}, "effects.slider_load": -50.0}, 1
     )
-    mechanism = slider_crank_mechanism(scene)
+    mechanism = mechanism_of(scene.linkage)
     guide = next(joint for joint in mechanism.joints if isinstance(joint, Slide))
     assert guide.friction is not None
     assert guide.friction.coefficient == 0.1

@@ -54,7 +54,7 @@ def carrying(source: str = SOURCE) -> dict:
 
 
 def test_every_kind_has_a_group_of_its_own():
-    assert len({one.group for one in KINDS}) == len(KINDS) == 5
+    assert len({one.group for one in KINDS}) == len(KINDS) == 6
 
 
 def test_a_name_is_one_of_ours_a_package_s_or_a_file_s(shapes, tmp_path, monkeypatch):

@@ -1,6 +1,5 @@
 """What is printed and drawn is what it is called: launchers, early stops, indices, peaks, contact, fronts, fits."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +21,6 @@ from hpcclear.report.answer import answer
 from hpcclear.report.figures import fits, labels, motion
 from hpcclear.report.html import gallery, picture
 from hpcclear.report.html.content import Content
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "analysis"))
-import plot_bifurcation
-import plot_map
 
 ROOT = Path(__file__).parent.parent
 SLIDER_CRANK = ROOT / "jobs" / "slider_crank.toml"
@@ -186,7 +181,7 @@ def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
     assert (shown["x"], shown["y"]) == ("95th percentile of f (mm)", "m2 + m3")
     assert [label.partition(" (")[0] for label in shown["axes"][2:]] == [
         "mean of f",
-        "deviation of f",
+        "standard deviation of f",
     ]
     solutions = [p for p in shown["points"] if p["kind"] == "solution"]
     masses = (front["m2"] + front["m3"]).to_numpy()
@@ -202,7 +197,7 @@ def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
 def test_a_plain_front_shows_mean_and_deviation():
     shown = picture.front(content({"front": data.front(), "verification": data.verification()}))
     assert shown["x"].startswith("mean of f")
-    assert shown["y"].startswith("deviation of f")
+    assert shown["y"].startswith("standard deviation of f")
     assert "axes" not in shown
 
 
@@ -310,58 +305,3 @@ def test_responses_that_differ_in_two_entries_make_no_bifurcation():
     )
     with pytest.raises(InputError, match="differ in several entries"):
         report.bifurcation_figure(several)
-
-
-# -- programs that draw ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "more",
-    [(), ("--path", "mechanism.drives.motor.speed", "--first", "60 rpm", "--last", "90 rpm")],
-)
-def test_the_bifurcation_program_takes_a_four_bar(more, monkeypatch, tmp_path):
-    asked = []
-
-    def simulated(scene):
-        asked.append(scene)
-        response = data.response(4)
-        response.attrs["scene"] = scene.text
-        return response
-
-    monkeypatch.setattr(plot_bifurcation, "simulate", simulated)
-    place = tmp_path / "a.png"
-    words = [str(FOUR_BAR), "--count", "3", "--revolutions", "2", "-o", str(place), *more]
-    monkeypatch.setattr(sys, "argv", ["plot_bifurcation.py", *words])
-    plot_bifurcation.main()
-    assert place.stat().st_size > 1000
-    path = more[1] if more else "mechanism.joints.o3.clearance"
-    ends = np.array([60.0, 75.0, 90.0]) * np.pi / 30 if more else [5e-5, 5.25e-4, 1e-3]
-    assert [scene.number(path) for scene in asked] == pytest.approx(ends)
-
-
-@pytest.mark.parametrize(
-    ("file", "path", "values"),
-    [
-        (SLIDER_CRANK, "drive.speed", [100.0, 200.0]),
-        (FOUR_BAR, "mechanism.bodies.coupler.mass", [0.3, 0.4]),
-    ],
-)
-def test_the_map_program_draws_over_any_dotted_path(file, path, values, monkeypatch, tmp_path):
-    monkeypatch.setattr(plot_map, "TRANSIENT", 1)
-    monkeypatch.setattr(plot_map, "SHOWN", 2)
-    scene = load_scene(file)
-    names = ("kick_growth", "kick_growth_limit", "objective", "objective_limit")
-    attributes = {"scene_path": path, "units": "rad/s" if "speed" in path else "kg"}
-    name = path.replace(".", "_")
-    cells = xr.Dataset(
-        {one: (name, [0.1, 0.2]) for one in names},
-        {name: (name, values, attributes)},
-        {"scene": scene.text},
-    )
-    figure = plot_map.line(cells, name)
-    assert path in figure.axes[2].get_xlabel()
-    assert np.isfinite(figure.axes[2].lines[0].get_ydata()).all()
-    across = xr.concat([cells.expand_dims(C=[c]) for c in (1e-4, 2e-4)], "C")
-    across["period"] = across["objective"]
-    figure = plot_map.plane(across, [name, "C"])
-    assert path.rpartition(".")[2] in figure.axes[0].get_xlabel()

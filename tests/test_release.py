@@ -14,16 +14,26 @@ from patience import crowded
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
-DATA = {
-    "hpcclear/cli/four_stroke.toml",
-    "hpcclear/cli/starter.toml",
-    "hpcclear/py.typed",
-    "hpcclear/report/html/page.css",
-    "hpcclear/report/html/page.js",
-} | {
-    f"hpcclear/report/html/templates/{path.name}"
-    for path in (ROOT / "hpcclear" / "report" / "html" / "templates").glob("*.html")
+JOBS = {
+    f"hpcclear/cli/jobs/{path.relative_to(ROOT / 'jobs')}"
+    for kind in ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+    for path in (ROOT / "jobs").glob(kind)
 }
+"""Scenes and scripts that `hpcclear init --jobs` writes."""
+DATA = (
+    JOBS
+    | {
+        "hpcclear/cli/four_stroke.toml",
+        "hpcclear/cli/starter.toml",
+        "hpcclear/py.typed",
+        "hpcclear/report/html/page.css",
+        "hpcclear/report/html/page.js",
+    }
+    | {
+        f"hpcclear/report/html/templates/{path.name}"
+        for path in (ROOT / "hpcclear" / "report" / "html" / "templates").glob("*.html")
+    }
+)
 
 
 def run(*words: object, place: Path, patience: float = 600.0) -> str:
@@ -89,8 +99,9 @@ def test_wheel_and_source_hold_every_module_and_the_data(built):
 
 
 def test_a_job_runs_from_the_wheel_alone(installed, tmp_path):
-    for name in ("quickstart", "slider_crank"):
-        shutil.copy(ROOT / "jobs" / f"{name}.toml", tmp_path)
+    run(installed / "hpcclear", "init", "jobs", "--jobs", place=tmp_path)
+    written = {f"hpcclear/cli/{path.relative_to(tmp_path)}" for path in tmp_path.rglob("*.*")}
+    assert written == JOBS
     home = run(
         installed / "python", "-c", "import hpcclear; print(hpcclear.__file__)", place=tmp_path
     )
@@ -98,7 +109,7 @@ def test_a_job_runs_from_the_wheel_alone(installed, tmp_path):
     results = tmp_path / "results"
     sample = (
         "sample",
-        "quickstart.toml",
+        "jobs/quickstart.toml",
         "-o",
         results / "samples.nc",
         "--set",

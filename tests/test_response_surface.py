@@ -109,18 +109,9 @@ def test_constant_test_values_have_no_r2_but_can_be_met() -> None:
     assert not off.meets(-np.inf, np.inf)
 
 
-@pytest.mark.parametrize(
-    ("values", "predictions"),
-    [
-        ([1.0, 2.0], [1.0]),
-        ([1.0, 2.0], [1.0, np.nan]),
-        ([1.0, np.nan], [1.0, 2.0]),
-        ([[1.0]], [[1.0]]),
-    ],
-)
-def test_accuracy_refuses(values: list, predictions: list) -> None:
+def test_accuracy_needs_two_values() -> None:
     with pytest.raises(InputError):
-        accuracy(values, predictions)
+        accuracy([1.0, np.nan], [1.0, 2.0])
 
 
 # the fit ------------------------------------------------------------------------------------------
@@ -271,27 +262,15 @@ def test_refuses_points_that_do_not_determine_the_terms() -> None:
     fit_response_surface(x, cubic(x), MASSES, 2)
 
 
-@pytest.mark.parametrize(
-    "bounds", [[[1.0, 0.0]], [[0.0, 0.0]], [[0.0, np.nan]], [[0.0, np.inf]], [], [0.0, 1.0]]
-)
-def test_refuses_bounds(bounds: list) -> None:
-    with pytest.raises(InputError, match="bounds"):
-        fit_response_surface(np.zeros((9, 1)), np.zeros(9), bounds, 1)
-
-
-def test_refuses_points_outside_and_shapes_that_do_not_fit() -> None:
+def test_refuses_points_outside() -> None:
     surface = noisy_fit(0)
     edge = MASSES[:, 1]
     surface.predict(edge[np.newaxis])
-    for point in (edge * 1.001, [np.nan, 0.1], [0.2], [0.2, 0.1, 0.1]):
+    for point in (edge * 1.001, [np.nan, 0.1]):
         with pytest.raises(InputError, match="points"):
             surface.predict([point])
         with pytest.raises(InputError, match="points"):
             surface.gradient(point)
-    with pytest.raises(InputError, match="values"):
-        fit_response_surface(sample(20, MASSES, 0), np.zeros(19), MASSES, 3)
-    with pytest.raises(InputError, match="order"):
-        fit_response_surface(sample(20, MASSES, 0), np.zeros(20), MASSES, -1)
 
 
 def test_latin_hypercube_fills_every_stratum() -> None:
@@ -382,14 +361,6 @@ def test_search_refuses_what_cannot_work() -> None:
     assert len(f.asked[1:]) == 1  # nothing was spent on training
     with pytest.raises(InputError, match=r"no surface could be fitted.*10 terms"):
         search_for(lambda x: x[:, 0], BOX, rng, orders=(3,), n_points=5, max_points=9)
-    for wrong in (
-        {"orders": ()},
-        {"n_test": 1},
-        {"n_points": 0},
-        {"n_points": 50, "max_points": 49},
-    ):
-        with pytest.raises(InputError, match=next(iter(wrong))):
-            search_for(lambda x: x[:, 0], BOX, rng, **wrong)
 
 
 def test_search_repeats_bit_for_bit() -> None:

@@ -107,6 +107,22 @@ def test_a_set_up_that_fails_is_one_line_and_nothing_runs(words, tmp_path):
     assert "== " not in output
 
 
+def test_skips_and_their_reasons_end_the_report_and_nightly_leaves_out_nothing(tmp_path):
+    (tmp_path / "tests").mkdir()
+    skipping = 'import pytest\n\n\ndef test_two():\n    pytest.skip("no browser here")\n'
+    (tmp_path / "tests" / "test_two.py").write_text(skipping)
+    (tmp_path / "tests" / "test_docs.py").write_text("def test_three():\n    assert True\n")
+    code, output, _ = run(tmp_path)
+    assert code == 0, output
+    assert "1 passed, 1 skipped" in output
+    assert re.search(r"^ +docs fuzz", output, re.MULTILINE), output
+    assert "no browser here" in output.rstrip().splitlines()[-1]
+    shutil.rmtree(tmp_path / "jobs")
+    code, output, _ = run(tmp_path, "--nightly")
+    assert "2 passed, 1 skipped" in output
+    assert "left out" not in output
+
+
 def test_further_words_go_to_pytest(tmp_path):
     code, output, _ = run(tmp_path, "--junitxml=found.xml", "tests/test_one.py")
     assert code == 0, output
@@ -120,7 +136,10 @@ def test_quick_says_what_it_leaves_out_and_leaves_out_what_exists(tmp_path):
     code, output, _ = run(tmp_path, "--quick")
     assert code == 0, output
     assert "2 passed" in output
-    (left_out,) = re.findall(r"^long=\(([^)]*)\)$", (HERE / "run.sh").read_text(), re.MULTILINE)
-    for name in left_out.split():
+    lists = re.findall(
+        r"^(?:long|nightly)=\(([^)]*)\)$", (HERE / "run.sh").read_text(), re.MULTILINE
+    )
+    assert len(lists) == 2
+    for name in " ".join(lists).split():
         assert (HERE / f"test_{name}.py").exists()
         assert re.search(rf"^ .*\b{name}\b", output, re.MULTILINE)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from running import integrate
 
 import hpcclear
 from hpcclear.cli import cli
@@ -13,7 +14,7 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import coordinate_count, problem_of
-from hpcclear.dynamics.response import integrate, simulate
+from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
@@ -136,14 +137,16 @@ def test_a_regular_response_is_printed_without_a_warning(tmp_path: Path):
 def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Path, capsys):
     from hpcclear.cli.printing import describe_samples
 
-    for on, words in ((False, "not checked"), (True, "median")):
+    for error, words in ((None, "not checked"), (0.3, "median")):
         scene = load_scene(JOBS / "quickstart.toml").with_(
-            SHORT | {"study.samples": 50, "numerics.uncertainty": on}
+            SHORT | {"study.samples": 20, "numerics.target_error": error}
         )
-        found = run_sample(scene, tmp_path / f"{on}.nc", alone(), options=Options(style="quiet"))
+        found = run_sample(scene, tmp_path / f"{error}.nc", alone(), options=Options(style="quiet"))
         assert found.content.attrs["objective_half_width"].startswith(
-            "objective_uncertainty" if on else "not checked"
+            "objective_limit" if error else "not checked"
         )
+        same = found.content["objective_uncertainty"].to_numpy()
+        np.testing.assert_array_equal(same, found.content.get("objective_limit", np.nan * same))
         describe_samples(found)
         line = next(x for x in capsys.readouterr().out.splitlines() if "half-width of f" in x)
         assert words in line

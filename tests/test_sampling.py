@@ -259,8 +259,8 @@ def test_table_needs_no_study_and_drives_the_clearances_there_are(tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "key", "fragment"),
     [
-        ("", "table of points", "holds no points"),
-        ("m2\n", "table of points", "holds no points"),
+        ("", "table of points", "contains no points"),
+        ("m2\n", "table of points", "contains no points"),
         ("m2,C [kg]\n1,2", "{}", "quantity in m"),
         ("m2 [furlongz]\n1", "{}", "not a known unit"),
         ("m2,masss\n1,2", "{}", "neither a variable nor a number"),

@@ -2,7 +2,7 @@
 
 import dis
 from dataclasses import replace
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from numba import njit
 from running import scene_with
 from some_laws import effects_with
 
-import hpcclear.dynamics
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import unrolled, written_out
@@ -22,6 +21,7 @@ from hpcclear.dynamics.implicit.columns import leave
 from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.rows import Rows
 from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 
@@ -115,18 +115,24 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
 
 
 def test_what_is_measured_goes_by_the_effects():
-    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(joints=at.MAX_JOINTS)
+    every, whole = (SimpleNamespace(whole=flag, largest=None) for flag in (None, 1))
+    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(
+        joints=at.MAX_JOINTS, first=0, objective=every
+    )
     assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
-    responses = at.Effects(crank_rod=1, rod_slider=1, responses=1)
+    responses = at.Effects(joints=2, responses=1)
     followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
-    assert list(at.measures_of(responses)) == [at.FORCE_12, at.FORCE_23, *followed]
-    assert list(at.measures_of(responses._replace(crank_rod=None))) == [at.FORCE_23, *followed]
+    assert list(at.measures_of(responses)) == [at.FORCE, at.FORCE + 1, *followed]
+    assert list(at.measures_of(responses._replace(joints=1, first=1))) == [at.FORCE + 1, *followed]
     assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
         at.FORCE + k for k in range(3)
     ]
-    assert len(at.measures_of(effects_with({"crank_rod", "latched"}))) == 0
-    worn = at.Effects(rod_slider=1, wear=1)
+    assert len(at.measures_of(effects_with({"latched"}, joints=1))) == 0
+    worn = at.Effects(joints=1, first=1, wear=1)
     assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
+    judged = at.Effects(joints=1, first=1, objective=every)
+    assert list(at.measures_of(judged)) == [at.JOINTS[1].objective_rate]
+    assert list(at.measures_of(judged._replace(objective=whole))) == [at.OBJECTIVE_RATES]
     for mask, largest in (
         (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
         (at.JOINT_MASK, at.MAX_JOINTS - 1),
@@ -138,12 +144,27 @@ def test_what_is_measured_goes_by_the_effects():
     )  # what the compiler then knows of the distance between two rows
 
 
+def test_rows_stand_one_behind_the_other_and_have_names():
+    """Nobody counts them: a row that is declared moves all behind it."""
+    values = {value for value in vars(at).values() if type(value) is int}
+    buffers = [one for one in vars(at).values() if isinstance(one, Rows)]
+    assert len(buffers) == 7
+    for rows in buffers:
+        firsts = [row.first for row in rows.declared]
+        assert firsts == [0, *np.cumsum([row.size for row in rows.declared])[:-1]]
+        assert rows.end == rows.declared[-1].first + rows.declared[-1].size
+        assert set(firsts) <= values
+        assert all(row.words for row in rows.declared)
+    asked = {row.asked_by for row in at.WRITTEN.declared if row.asked_by}
+    assert asked <= set(at.Effects._fields)
+
+
 def test_rules_are_numbers_of_one_kind():
     """So that one compiled stepper serves all effects."""
     for effects, on in (
         (at.Effects(), set()),
         (effects_with({"latched", "torque"}), {"latched", "free", "turning"}),
-        (effects_with({"baumgarte", "coulomb", "gravity"}), {"turning"}),
+        (effects_with({"baumgarte", "coulomb", "wear"}), {"turning"}),
     ):
         rules = at.rules_of(effects)
         assert {name for name in rules._fields[:-2] if getattr(rules, name)} == on
@@ -152,8 +173,8 @@ def test_rules_are_numbers_of_one_kind():
 
 def test_rules_say_which_joints_are_open():
     for effects, places in (
-        (at.Effects(crank_rod=1, rod_slider=1), (0, 2)),
-        (at.Effects(rod_slider=1), (1, 2)),
+        (at.Effects(joints=2), (0, 2)),
+        (at.Effects(joints=1, first=1), (1, 2)),
         (at.Effects(joints=5), (0, 5)),
         (at.Effects(torque=1), (0, 0)),
     ):
@@ -178,23 +199,6 @@ def test_lanes_begin_where_a_line_of_the_cache_does():
         lanes = Lanes(problem_of(scene_with()), width)
         assert lanes._block.work.ctypes.data % 64 == 0
         assert (lanes._block.work == 0.0).all()
-
-
-def test_no_stepper_names_a_rate_of_its_own():
-    """A rate is one entry of `layout.INTEGRATED` and its formula in the motion."""
-    names = {name for name, row in vars(at).items() if name.isupper() and isinstance(row, int)}
-    rows = {one.rate for one in at.MEASURES}
-    powers = {name for name in names if name.endswith("_POWER") or name == "DISSIPATION"}
-    followed = {"FOLLOWED_ACCELERATION", "FOLLOWED_SQUARE", "FOLLOWED_ACROSS"}
-    own = powers | followed | {"FORCE_12", "FORCE_23"}
-    of_joints = {row for joint in at.JOINTS for row in (joint.force, joint.sliding_power)}
-    assert {getattr(at, name) for name in own} | of_joints == rows
-    own |= {"SLIDING_POWERS", "sliding_power"}
-    room = Path(hpcclear.dynamics.__file__).parent
-    for folder in ("explicit", "implicit"):
-        for path in (room / folder).glob("*.py"):
-            text = path.read_text()
-            assert not [name for name in own if f"at.{name}" in text], path.name
 
 
 # ---- loops that are written out --------------------------------------------------------------------

@@ -89,9 +89,8 @@ def test_a_part_on_two_ranks_is_that_of_one(tmp_path, scene, whole):
     [
         ["study.method=monte-carlo", "study.samples=37"],
         ["study.samples=21", "numerics.target_error=0.05", "numerics.max_steps=200000"],
-        ["study.samples=23", "numerics.uncertainty=true"],
     ],
-    ids=["monte-carlo", "target error", "uncertainty"],
+    ids=["monte-carlo", "target error"],
 )
 def test_parts_of_any_kind_of_sampling_are_the_bytes_of_one_run(tmp_path, settings):
     scene = load_scene(SCENE, [*CHEAP, *settings])

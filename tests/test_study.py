@@ -32,12 +32,14 @@ from hpcclear.study import (
     chaos,
     extent,
     optimisation,
-    paper,
     responses,
     run_study,
     sensitivities,
 )
 from hpcclear.study.paper import claims
+from hpcclear.study.paper.printed import printed_designs
+from hpcclear.study.paper.recognition import is_the_papers, own_names
+from hpcclear.study.stages import STAGES, files_of
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -100,7 +102,9 @@ def truth(design: dict[str, float], robust: bool) -> tuple[float, float]:
 
 def test_writes_every_result_and_leaves_no_rubbish(results):
     names = {path.name for path in results.iterdir()}
-    kinds = "samples sensitivity kriging front verification chaos claims readings timing"
+    kinds = (
+        "samples sensitivity kriging front verification contributions chaos claims readings timing"
+    )
     assert names == {f"{kind}.nc" for kind in kinds.split()} | {"responses"}
     for kind in kinds.split():
         found = dataset.read(results / f"{kind}.nc", kind)
@@ -495,7 +499,7 @@ def test_fresh_starts_beside(results, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (["study.cases={}"], "nothing to optimise"),
+        (["study.cases={}"], "no case to optimise"),
         (["joints.rod_slider.clearance=0.4 mm"], "a model leaves it out"),
     ],
 )
@@ -553,11 +557,11 @@ def test_names_decide_nothing():
     ):
         assert [tuple(OWN_NAMES[name] for name in group) for group in theirs] == list(ours)
     assert own.study.sensitivity.parameter == "play"
-    assert paper.is_the_papers(own)
-    assert paper.own_names(own) == OWN_NAMES
-    names = [choice.name for choice in paper.printed_designs(own)]
-    assert names == [choice.name for choice in paper.printed_designs(plain)]
-    assert paper.printed_designs(own)[0].design["rod_inertia"] == 1.2432e-4
+    assert is_the_papers(own)
+    assert own_names(own) == OWN_NAMES
+    names = [choice.name for choice in printed_designs(own)]
+    assert names == [choice.name for choice in printed_designs(plain)]
+    assert printed_designs(own)[0].design["rod_inertia"] == 1.2432e-4
 
 
 @pytest.mark.parametrize(
@@ -575,9 +579,9 @@ def test_names_decide_nothing():
 def test_the_papers_scene_is_recognised_by_what_it_holds(entry, cites, compares):
     scene = scene_of(entry)
     assert bool(scene.references) == cites
-    assert paper.is_the_papers(scene) == compares
-    assert bool(paper.files(scene)) == compares
-    assert bool(paper.printed_designs(scene)) == compares
+    assert is_the_papers(scene) == compares
+    assert ("claims.nc" in files_of(scene)) == compares
+    assert bool(printed_designs(scene)) == compares
 
 
 OF_THE_PAPER = re.compile(
@@ -590,8 +594,8 @@ def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
     scene, place = own_scene("mechanism.rod.length=0.13"), tmp_path / "out"
     run_study(scene, place, alone(), progress_style="quiet")
     written = {path.name for path in place.glob("*.nc")}
-    kinds = ("samples", "sensitivity", "kriging", "front", "verification", "chaos", "timing")
-    assert written == {f"{kind}.nc" for kind in kinds}
+    kinds = "samples sensitivity kriging front verification contributions chaos timing"
+    assert written == {f"{kind}.nc" for kind in kinds.split()}
     for path in place.rglob("*.nc"):
         found = dataset.read(path)
         assert "references" not in found.attrs
@@ -724,7 +728,7 @@ def test_what_copies_disagree_on_cannot_be_told():
     series[1] *= 1.0 + 0.15 * rng.normal(size=(6, 1, 1, 1))
     verdict, text = claims.ResponseEvidence({"names": names, "statistics": series}).judged(wanted)
     assert verdict == claims.OPEN
-    assert re.search(r"told from 0 beyond \d+\.\d %", text)
+    assert re.search(r"significant above \d+\.\d %", text)
 
 
 def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch):
@@ -754,3 +758,17 @@ def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch)
     texts = " ".join(found["figure"].to_numpy().astype(str))
     assert "first alpha against original: peak of contact force 1 unknown" in texts
     assert not re.search(r"\bnan\b.*against|against[^;]*\bnan\b", texts)
+
+
+def test_every_stage_needs_earlier_ones_alone_and_announces_parts_of_its_own():
+    known, parts = {"scene", "extent"}, list[str]()
+    for stage in STAGES:
+        assert set(stage.needs) <= known
+        known.add(stage.name)
+        parts += stage.words
+    assert len(parts) == len(set(parts))
+
+
+def test_the_files_of_a_finished_study_are_those_of_its_stages(results):
+    made = {path.name for path in results.glob("*.nc")}
+    assert made - {"timing.nc"} == set(files_of(scene_of()))

@@ -45,7 +45,9 @@ class Undisturbed:
 def files(folder: Path) -> dict[str, bytes]:
     """All that lies in a results folder, but for the times, which may differ."""
     found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
-    return {name: path.read_bytes() for name, path in found.items() if name != "timing.nc"}
+    return {
+        name: path.read_bytes() for name, path in found.items() if not name.endswith("timing.nc")
+    }
 
 
 def sample_words(folder: Path) -> list[str]:

@@ -16,8 +16,9 @@ from patience import crowded
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer, beside_original
-from hpcclear.report.html import picture, sections
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
+from hpcclear.report.html import designs, picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
@@ -300,15 +301,15 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
         assert 0.0 <= point["at"][2] <= RIM
     gamma = next(point for point in shown["points"] if point["name"] == "three gamma")
     assert [THIRD, "0"] in gamma["direct"]
-    part = sections.designs(content)
+    part = designs.designs(content)
     assert part is not None
-    assert part["table"].header[-4:] == [
+    assert part["tables"][0].header[-4:] == [
         "objective 1",
         "objective 2",
         "objective 3",
         "constraints",
     ]
-    assert ("gamma", "lowest third objective of the case") in part["names"]
+    assert any(row[0] == "lowest objective 3 (gamma)" for row in part["tables"][0].rows)
 
 
 _CHOOSE = """
@@ -330,7 +331,7 @@ def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
         count = browser.run("return document.querySelectorAll('#front .point').length;")
         before = browser.run("return document.getElementById('front').textContent;")
         _, across, up = browser.run(_CHOOSE)
-        assert across == up == ["mean of f (mm)", "deviation of f (mm)", THIRD]
+        assert across == up == ["mean of f (mm)", "standard deviation of f (mm)", THIRD]
         assert browser.run("return document.querySelectorAll('#front .point').length;") == count
         after = browser.run("return document.getElementById('front').textContent;")
         assert THIRD not in before
@@ -415,7 +416,7 @@ def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) 
 
 MANY = '["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]'
 REFUSED = {  # what is asked for: the key within the case, and why
-    '["mean"]': ("objectives", "two things or more"),
+    '["mean"]': ("objectives", "two objectives or more"),
     '["mean", "deviation", "mean"]': ("objectives.2", "already"),
     '[{formula="m2+m3"}, "mean", {formula=" m2 + m3"}]': ("objectives.2", "already"),
     '["quantile", {statistic="quantile", level=0.95}]': ("objectives.1", "already"),

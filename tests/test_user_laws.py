@@ -91,7 +91,7 @@ CASES = {
         POWER, NO_FRICTION, lambda d, v, v0, k: 300 * (d / 1e-5) ** 1.2 * (1 + 0.3 * v), None,
     ),
     "exponential": (
-        EXPONENTIAL, NO_FRICTION, lambda d, v, v0, k: 500 * math.expm1(d / 5e-5) * (1 + 0.3 * v), None,
+        EXPONENTIAL, NO_FRICTION, lambda d, v, v0, k: 500 * math.expm1(min(d / 5e-5, 99.0)) * (1 + 0.3 * v), None,
     ),
     "a Stribeck curve": (
         FORMULA, STRIBECK, lambda d, v, v0, k: k * d**1.5 * (1 + 0.5 * v), stribeck,
@@ -101,20 +101,21 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_user_s_law_gives_what_an_independent_solver_gives(case, tmp_path):
-    """A revolution from rest in the clearance to rtol 1e-8; the energy balance closes with the law's own stored energy."""
+    """A revolution from rest in the clearance, to 1e-8 in f and 1e-12 m at its end; scipy's order 8 at its tightest."""
     contact, friction, force, ratio = CASES[case]
-    scene = load_scene(file_with(tmp_path, contact, friction))
-    _, expected = oracle_of(scene, force, ratio).run(0, 1, rtol=1e-10)
+    scene = load_scene(file_with(tmp_path, contact, friction, rtol=1e-12))
+    state, expected = oracle_of(scene, force, ratio).run(0, 1, method="DOP853", rtol=1e-13)
     result = run(scene)
     assert result.out.status == 0
-    assert float(result.out.objective) == pytest.approx(expected, rel=2e-6)
+    assert float(result.out.objective) == pytest.approx(expected, rel=1e-8)
+    np.testing.assert_allclose(result.q[-1], state[:4], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_user_s_law_is_vectorised(case, tmp_path):
     contact, friction, *_ = CASES[case]
-    effects = problem_of(load_scene(file_with(tmp_path, contact, friction))).effects
-    found = executed_arithmetic(force_evaluation(effects, 16))
+    problem = problem_of(load_scene(file_with(tmp_path, contact, friction)))
+    found = executed_arithmetic(force_evaluation(problem, 16))
     assert found.packed.total() >= 100
     assert found.packed_share >= 0.9
 
@@ -140,7 +141,7 @@ def force(depth, rate, stiffness, b):
     return stiffness * depth**1.5 * (1 - b * rate)
 Bad = ContactLaw(words="", parameters=(Parameter("b", "s/m", default=0.5),), force=force)
 """,
-        "it pulls",
+        "the contact force pulls",
     ),
     "not finite": (
         """
@@ -156,7 +157,7 @@ def energy(depth, stiffness):
     return 0.5 * stiffness * depth**2.5
 Bad = ContactLaw(words="", force=hertz, energy=energy)
 """,
-        "its energy does not match",
+        "the energy does not match",
     ),
     "a force where nothing touches": (
         """
@@ -164,7 +165,7 @@ def force(depth, rate, stiffness, b):
     return stiffness * depth**1.5 + b * rate
 Bad = ContactLaw(words="", parameters=(Parameter("b", "N*s/m", default=50.0),), force=force)
 """,
-        "where nothing touches",
+        "without contact",
     ),
     "a loop": (
         """
@@ -174,7 +175,7 @@ def force(depth, stiffness):
     return stiffness * depth**1.5
 Bad = ContactLaw(words="", force=force)
 """,
-        "more in it than arithmetic",
+        "more than arithmetic",
     ),
     "a word that lanes have not": (
         """
@@ -182,7 +183,7 @@ def force(depth, stiffness):
     return stiffness * depth**1.5 * math.erf(1.0)
 Bad = ContactLaw(words="", force=force)
 """,
-        "which the lanes do not have",
+        "which the kernel does not provide",
     ),
     "what nobody gives": (
         """
@@ -190,7 +191,7 @@ def force(depth, stiffnes):
     return stiffnes * depth**1.5
 Bad = ContactLaw(words="", force=force)
 """,
-        "asks for 'stiffnes', which nobody gives",
+        "uses 'stiffnes', which is not defined",
     ),
     "stored energy by the impact speed": (
         """
@@ -198,7 +199,7 @@ def force(depth, impact_speed, stiffness, b):
     return stiffness * depth**1.5 * (1 + b * impact_speed)
 Bad = ContactLaw(words="", parameters=(Parameter("b", "s/m", default=0.5),), force=force)
 """,
-        "goes by the impact speed",
+        "depends on the impact speed",
     ),
     "a law of another kind": (
         """
@@ -279,9 +280,9 @@ def test_friction_that_drives_sliding_on_is_refused(tmp_path):
     ("force", "said"),
     [
         ("K * d**1.5 * (1 + b * v", "cannot be read as a formula"),
-        ("K * d**1.5 * (1 + x * v)", "'x', which is no parameter"),
+        ("K * d**1.5 * (1 + x * v)", "'x', which is not a parameter"),
         ("K * d**1.5 * open('x')", "calls 'open'"),
-        ("K * d.real**1.5", "more in it than arithmetic"),
+        ("K * d.real**1.5", "more than arithmetic"),
         ("K * d**1.5 * (1 + b)", "does not fit its units"),
     ],
 )

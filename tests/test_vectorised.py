@@ -24,8 +24,8 @@ from scenes import LAWS, scene, single  # noqa: E402
 
 def arithmetic(law: str, width: int) -> Arithmetic:
     """Of the force evaluation, as the compiler emits it for this processor."""
-    effects = single(scene(law, 1e-6, 1, 1)).problem.effects
-    return executed_arithmetic(force_evaluation(effects, width))
+    problem = single(scene(law, 1e-6, 1, 1)).problem
+    return executed_arithmetic(force_evaluation(problem, width))
 
 
 @pytest.mark.parametrize("law", LAWS)

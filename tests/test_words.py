@@ -1,16 +1,21 @@
-"""What users read is in plain words: the field's terms, and short sentences.
+"""What users read is in plain words, the field's terms, in short sentences: pages, help, messages, docstrings, attributes.
 
 Code, inline code, text in quotation marks and quoted answers of a study are left out: they stay as the program prints them.
 """
 
+import ast
+import functools
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from doc_pages import ROOT, tokens
 
+from hpcclear.base.objectives import ORDINALS
 from hpcclear.cli import cli
+from hpcclear.results.names import KINDS
 
 FILES = (
     "README.md",
@@ -18,12 +23,15 @@ FILES = (
     "CONTRIBUTING.md",
     "docs/adding-an-effect.md",
     "docs/architecture.md",
+    "docs/citing.md",
     "docs/extending.md",
     "docs/glossary.md",
     "docs/index.md",
     "docs/performance.md",
     "docs/questions.md",
     "docs/reading-the-accuracy-figure.md",
+    "docs/checks.md",
+    "docs/theory.md",
     "docs/tutorial.md",
     "docs/validation.md",
     "docs/how-to/accuracy.md",
@@ -32,6 +40,7 @@ FILES = (
     "docs/how-to/chaos.md",
     "docs/how-to/cluster.md",
     "docs/how-to/contact-law.md",
+    "docs/how-to/decisions.md",
     "docs/how-to/designs.md",
     "docs/how-to/distribution.md",
     "docs/how-to/editor-and-shell.md",
@@ -46,6 +55,7 @@ FILES = (
     "docs/how-to/speeds.md",
     "docs/how-to/stick-slip.md",
     "docs/how-to/surrogates.md",
+    "docs/how-to/take-results-away.md",
     "docs/how-to/wear.md",
     "docs/how-to/xarray.md",
 )
@@ -55,7 +65,7 @@ INSTEAD = {
     r"tells?|told|telling": "report, state, print; statistically indistinguishable",
     r"plays?": "clearance",
     r"limits": "confidence interval, bounds, threshold",
-    r"(?<!standard )(?<!std\. )deviations?": "standard deviation, difference",
+    r"(?<!standard )(?<!std\. )(?<!limit )(?<!fundamental )deviations?(?! A to H)": "standard deviation, difference",
     r"kick(s|ed|ing)?|a hair": "perturbation, perturbed run",
     r"true (mean|dynamics|deviation|values?)|directly simulated": "simulated, by simulation",
     r"scramblings?": "randomised-QMC replicate",
@@ -84,6 +94,8 @@ INSTEAD = {
 
 ALLOWED = (
     "room within the allowed values",  # space
+    "limits of size",  # of a fit
+    "The play of a joint",  # for those who search for it
 )
 """Phrases in which such a word has its everyday meaning."""
 
@@ -125,13 +137,16 @@ def _plain(token) -> str:
 def without_quotations(text: str) -> str:
     """Text without what stands in quotation marks and without allowed phrases."""
     for phrase in ALLOWED:
-        text = text.replace(phrase, "")
+        text = re.sub(re.escape(phrase), "", text, flags=re.I)
     return re.sub(r'"[^"]*"', '""', text)
+
+
+ANY = re.compile("|".join(f"(?:{words})" for words in INSTEAD), re.I)
 
 
 def private_words(text: str) -> Iterator[tuple[str, str]]:
     """Words of a text that are not the field's, with what to write instead."""
-    for words, instead in INSTEAD.items():
+    for words, instead in INSTEAD.items() if ANY.search(text) else ():
         for match in re.finditer(
             rf"(?<![\w-])(?:{words})(?![\w-])", without_quotations(text), re.I
         ):
@@ -180,6 +195,144 @@ def test_help_of_commands_has_the_fields_words_and_short_sentences():
     for name, text in help_passages():
         found += [f"{name}: {word!r}; write: {instead}" for word, instead in private_words(text)]
         found += [f"{name}: {one}" for one in sentences(text) if len(one.split()) >= LONGEST]
+    assert not found, "\n".join(found)
+
+
+PACKAGE = ROOT / "hpcclear"
+
+STORED = (
+    "cannot be told", "deviation of f", "mean, deviation", "mean deviation", "deviation half_width", "deviation = ",
+    "mean and deviation", "crank moment", "{} original",
+)  # fmt: skip
+"""Words of files, of parameters and of the paper, which stand in the source as they are."""
+
+METHODS = (
+    "let ask() return",
+    "ask() and tell",
+    "failed in ask",
+    "failed in tell",
+    "as ask() returned",
+)
+"""The methods of a search as a plug-in."""
+
+NO_PROSE = ("base/width.py", "dynamics/linkage/compiled.py")
+"""Modules whose long strings are source text."""
+
+DOCSTRINGS = ("cli", "plugins", "report", "results", "scene")
+"""Packages whose docstrings have been rewritten. Add a package here once it has been."""
+
+
+@functools.cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def _docstrings(path: Path) -> list[ast.Constant]:
+    """Strings that stand alone: docstrings of modules, classes, functions and attributes."""
+    return [
+        node.value
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    ]
+
+
+def messages() -> Iterator[tuple[str, str]]:
+    """Every text with a space in the package that is no docstring, with its place: errors, warnings, output, attributes.
+
+    A value that is put into a text stands as ``{}``.
+    """
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path.relative_to(PACKAGE).as_posix() in NO_PROSE:
+            continue
+        skipped = {id(one) for one in _docstrings(path)}
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.JoinedStr):
+                skipped |= {id(inner) for inner in ast.walk(node) if inner is not node}
+        for node in ast.walk(tree(path)):
+            if id(node) not in skipped and " " in (text := _text(node)).strip():
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", text
+
+
+def _text(node: ast.AST) -> str:
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        parts = (one.value if isinstance(one, ast.Constant) else "{}" for one in node.values)
+        return "".join(parts)
+    return ""
+
+
+def test_messages_have_the_fields_words_and_short_sentences():
+    found, count = [], 0
+    for place, text in messages():
+        count += 1
+        text = re.sub("`[^`]*`", "x", text)
+        for known in (*STORED, *METHODS):
+            text = re.sub(re.escape(known), "x", text, flags=re.IGNORECASE)
+        found += [f"{place}: {word!r} in {text!r}" for word, _ in private_words(text)]
+        if "\n" not in text:  # a source or a file
+            long = [one for one in sentences(text) if len(one.split()) >= LONGEST]
+            found += [f"{place}: long: {one}" for one in long]
+    assert count > 2000
+    assert not found, "\n".join(found)
+
+
+def prose(docstring: str) -> Iterator[str]:
+    """Paragraphs of a docstring without code, rulers of sections, and names of parameters with their types."""
+    for paragraph in re.split(r"\n\s*\n", docstring):
+        lines = [
+            line for line in paragraph.splitlines() if not re.match(r"\s*([\w, *]+ : |-+$)", line)
+        ]
+        text = " ".join(" ".join(lines).split())
+        yield re.sub(r"``[^`]*``|`[^`]*`", "x", text)
+
+
+@pytest.mark.parametrize("package", DOCSTRINGS)
+def test_docstrings_have_the_fields_words(package):
+    found, count = [], 0
+    for path in sorted((PACKAGE / package).rglob("*.py")):
+        for one in _docstrings(path):
+            for text in prose(one.value):
+                count += 1
+                found += [
+                    f"{path.relative_to(ROOT)}:{one.lineno}: {word!r} in {text!r}"
+                    for word, _ in private_words(text)
+                ]
+    assert count > 10
+    assert not found, "\n".join(found)
+
+
+def test_attributes_of_file_variables_have_the_fields_words_and_axes_their_units():
+    found = []
+    for kind, table in KINDS.items():
+        for name, row in {**table.coords, **table.data}.items():
+            text = re.sub("cannot be told", "x", row.long_name)
+            found += [f"{kind}.{name}: {word!r}" for word, _ in private_words(text)]
+            if row.dtype == "f8":
+                assert (
+                    row.units or name.split("_")[0] in ORDINALS or name.startswith("searched_")
+                ), name
+    assert not found, "\n".join(found)
+
+
+def test_every_axis_of_a_figure_has_a_unit():
+    """A label in the source of the figures ends with a unit in brackets, "(–)" for none, unless it is put together."""
+    found = []
+    for path in sorted((PACKAGE / "report" / "figures").glob("*.py")):
+        for node in ast.walk(tree(path)):
+            name = (
+                node.func.attr
+                if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+                else ""
+            )
+            if name in ("set_xlabel", "set_ylabel", "supylabel") and isinstance(
+                node.args[0], ast.Constant
+            ):
+                label = node.args[0].value
+                if label and not re.search(r"\([^()]+\)$", label):
+                    found.append(f"{path.name}:{node.lineno}: {label!r}")
     assert not found, "\n".join(found)
 
 

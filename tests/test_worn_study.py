@@ -12,12 +12,13 @@ from scipy import stats
 import hpcclear
 from hpcclear.accuracy.plan import ladder
 from hpcclear.base.errors import InputError
+from hpcclear.base.quantiles import Samples
 from hpcclear.ensemble.samples import design
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.statistics.random.distributions import Samples, piece_rule
+from hpcclear.statistics.random import rules
 from hpcclear.statistics.random.inputs import RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -42,24 +43,24 @@ def values():
 
 
 def test_a_gauss_rule_of_samples_is_exact_for_polynomials(values):
-    nodes, weights = values.rule(6)
+    nodes, weights = rules.rule(values, 6)
     known = np.array(values.values)
     for power in range(12):
         assert weights @ nodes**power == pytest.approx((known**power).mean(), rel=1e-11)
     assert abs(weights @ nodes**12 / (known**12).mean() - 1.0) > 1e-9  # and for no higher one
-    nodes, weights = values.rule(70)  # more than there are values
+    nodes, weights = rules.rule(values, 70)  # more than there are values
     assert (weights > 0.0).sum() == 60
     assert weights @ nodes**40 == pytest.approx((known**40).mean(), rel=1e-12)
 
 
 def test_pieces_hold_each_value_once(values):
     cuts = np.array([-1.0, values.values[20], 0.9, values.values[-1]])
-    nodes, weights = piece_rule(values, 8, cuts[:-1], cuts[1:])
+    nodes, weights = rules.pieces(values, 8, cuts[:-1], cuts[1:])
     assert weights.sum() == pytest.approx(1.0, abs=1e-14)
     assert weights[0].sum() == pytest.approx(20 / 60)
     known = np.array(values.values)
     assert (weights * nodes**5).sum() == pytest.approx((known**5).mean(), rel=1e-12)
-    assert piece_rule(values, 3, np.array([5.0]), np.array([6.0]))[1].sum() == 0.0
+    assert rules.pieces(values, 3, np.array([5.0]), np.array([6.0]))[1].sum() == 0.0
 
 
 def test_moments_over_samples_are_those_of_each_value(values):
@@ -259,7 +260,7 @@ def test_a_range_that_does_not_hold_the_lives_says_what_would(tmp_path):
     code, output = run(words(tmp_path / "narrow", "study.variables.C23.range=[0.28e-3,0.35e-3]"), 0)
     assert code == 2
     assert "study.variables.C23.range" in output
-    assert "lives have clearances from" in output
+    assert "service lives have clearances from" in output
 
 
 def test_ages_that_lives_do_not_reach_are_told(tmp_path):

@@ -10,6 +10,17 @@ from collections.abc import Callable
 
 import exudyn as exu
 import exudyn.itemInterface as items
+from plain_loop import (
+    CRANK,
+    FAR,
+    FIRST,
+    NEAR,
+    ROD_INERTIA,
+    ROD_MASS,
+    SECOND,
+    SLIDER_MASS,
+    STIFFNESS,
+)
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
@@ -54,7 +65,7 @@ def _contact(mbs, p, joint: int, floor: float, journal, bearing) -> None:
             isHollowSphere1=True,
             dynamicFriction=p[joint + at.FRICTION_NUMBERS],
             frictionProportionalZone=1.0 / p[joint + at.INVERSE_RAMP],
-            contactStiffness=p[joint + at.CONTACT_NUMBERS],
+            contactStiffness=p[joint + STIFFNESS],
             contactStiffnessExponent=1.5,
             restitutionCoefficient=restitution,
             minimumImpactVelocity=floor,
@@ -70,10 +81,10 @@ def _model(setup: Setup, sample: int):
     system = exu.SystemContainer()
     mbs = system.AddSystem()
     _, crank = _body(mbs, 1.0, _HUGE, [0, 0, 0], [0, 0, p[at.SPEED]], (0, 1))
-    rod = _body(mbs, p[at.ROD_MASS], p[at.ROD_INERTIA], list(state[:3]), list(velocity[:3]), ())[1]
-    node, slider = _body(mbs, p[at.SLIDER_MASS], 1.0, [state[3], 0, 0], [velocity[3], 0, 0], (1, 2))
-    _contact(mbs, p, at.JOINT_12, floor, (crank, p[at.CRANK_LENGTH]), (rod, -p[at.ROD_NEAR]))
-    _contact(mbs, p, at.JOINT_23, floor, (slider, 0.0), (rod, p[at.ROD_FAR]))
+    rod = _body(mbs, p[ROD_MASS], p[ROD_INERTIA], list(state[:3]), list(velocity[:3]), ())[1]
+    node, slider = _body(mbs, p[SLIDER_MASS], 1.0, [state[3], 0, 0], [velocity[3], 0, 0], (1, 2))
+    _contact(mbs, p, FIRST, floor, (crank, p[CRANK]), (rod, -p[NEAR]))
+    _contact(mbs, p, SECOND, floor, (slider, 0.0), (rod, p[FAR]))
     mbs.Assemble()
     return mbs, node
 

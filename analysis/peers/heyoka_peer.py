@@ -9,6 +9,7 @@ from functools import cache
 
 import heyoka as hy
 import numpy as np
+from plain_loop import CRANK, FAR, FIRST, NEAR, ROD_INERTIA, ROD_MASS, SECOND, SLIDER_MASS
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
@@ -18,13 +19,13 @@ _NAMES = ("x2", "y2", "theta", "x3", "vx2", "vy2", "spin", "v3")
 # what the equations read, in the order of heyoka's run-time parameters
 _USED = (
     at.SPEED,
-    at.CRANK_LENGTH,
-    at.ROD_NEAR,
-    at.ROD_FAR,
-    at.INV_ROD_MASS,
-    at.INV_ROD_INERTIA,
-    at.INV_SLIDER_MASS,
-    *(base + k for base in (at.JOINT_12, at.JOINT_23) for k in range(3)),
+    CRANK,
+    NEAR,
+    FAR,
+    ROD_MASS,
+    ROD_INERTIA,
+    SLIDER_MASS,
+    *(base + k for base in (FIRST, SECOND) for k in range(3)),
 )
 
 
@@ -49,7 +50,7 @@ def _joint(ex, ey, vx, vy, clearance, stiffness, damping):
 def _equations():
     """Equations of motion, and what passes zero where a contact has begun."""
     x2, y2, theta, x3, vx2, vy2, spin, v3 = hy.make_vars(*_NAMES)
-    speed, crank, near, far, inv_m2, inv_i2, inv_m3 = (hy.par[k] for k in range(7))
+    speed, crank, near, far, m2, i2, m3 = (hy.par[k] for k in range(7))
     sphi, cphi = hy.sin(speed * hy.time), hy.cos(speed * hy.time)
     st, ct = hy.sin(theta), hy.cos(theta)
     entered1, fx1, fy1 = _joint(
@@ -65,8 +66,8 @@ def _equations():
     moment = near * (st * fx1 - ct * fy1) + far * (ct * fy2 - st * fx2)
     system = [
         (x2, vx2), (y2, vy2), (theta, spin), (x3, v3),
-        (vx2, (fx1 + fx2) * inv_m2), (vy2, (fy1 + fy2) * inv_m2),
-        (spin, moment * inv_i2), (v3, -fx2 * inv_m3),
+        (vx2, (fx1 + fx2) / m2), (vy2, (fy1 + fy2) / m2),
+        (spin, moment / i2), (v3, -fx2 / m3),
     ]  # fmt: skip
     return system, (entered1, entered2)
 

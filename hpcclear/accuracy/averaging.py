@@ -1,8 +1,8 @@
-"""Error of the objective against the revolutions waited for and averaged, and the floor that chaos sets.
+"""Error of the objective against transient and averaged revolutions, and its lower bound by chaos.
 
-Copies of the scene that differ by tiny kicks run for a long time, half of them with ten times stricter tolerances.
+Copies of the scene that differ by tiny perturbations run for a long time, half of them with ten times stricter tolerances.
 Where
-motion is periodic they come to agree; where it is chaotic they part, and each sees another stretch of the same
+motion is periodic they come to agree; where it is chaotic they part, and each sees another interval of the same
 attractor; where the damping keeps an old impact speed they can settle on different orbits for good. The last is an
 error
 that no average removes: the scatter of the copies' long averages.
@@ -26,7 +26,7 @@ from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
 
 KICK = 1e-10
-"""Relative size of the kicks at the start."""
+"""Relative size of the perturbations at the start."""
 
 STRICTER = 10.0
 """How many times stricter the tolerances of every other copy are."""

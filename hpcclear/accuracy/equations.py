@@ -96,7 +96,8 @@ class Equations:
         self.named = Parameters(par)
         self.latched = problem.effects.latched is not None
         self.free = problem.effects.torque is not None
-        self.size = problem.effects.joints or 2  # joints whose gaps are integrated
+        effects = problem.effects
+        self.size = effects.first + effects.joints  # places of joints whose gaps are integrated
         self.start = np.concatenate([start.state(n), np.zeros(self.size)])
         self.contacts = start.contacts.copy()
         self._origin = start

@@ -25,7 +25,7 @@ REFERENCE_RTOL = 1e-13
 MARGIN = 100.0
 """The reference must be this many times better than what is measured against it."""
 LOST = 10.0
-"""Error of the position, in lengths of the crank, from which a method has lost the motion: no error of its is told."""
+"""Error of the position, in lengths of the crank, above which a method has lost the motion: its errors are not reported."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Integration:
-    """The panel; arrays (methods, rungs), errors (methods, rungs, 4), orders (methods, 4)."""
+    """The panel; arrays (methods, levels), errors (methods, levels, 4), orders (methods, 4)."""
 
     methods: tuple[str, ...]
     setting: Array
@@ -62,8 +62,8 @@ def reference_of(scene: Scene, designs: int) -> Reference:
     second = method.prepare(REFERENCE_RTOL)[0]().values
     second[:, 2] = [solve_turn(scene, one, "LSODA", 10 * REFERENCE_RTOL)[0][2] for one in made]
     scale = np.abs(values)
-    scale[:, 0] = [one.named.crank_length for one in made]
-    scale[:, 1] = [one.named.crank_length * one.named.speed for one in made]
+    scale[:, 0] = [one.named.driven_length for one in made]
+    scale[:, 1] = [one.named.driven_length * one.named.speed for one in made]
     scale = np.where(scale > 0.0, scale, np.nan)
     return Reference(values, scale, rms((second - values) / scale))
 
@@ -114,10 +114,10 @@ def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> In
 
 
 def observed_order(evaluations: Array, errors: Array, floor: float) -> float:
-    """Slope of error against force evaluations (shape (rungs,) each), both logarithmic: the median over all
-    pairs of rungs (Theil and Sen).
+    """Slope of error against force evaluations (shape (levels,) each), both logarithmic: the median over all pairs of
+    tolerance levels (Theil and Sen).
 
-    Rungs count whose error lies above `floor` and below a tenth, and that are at least twice as dear as one another.
+    Levels count whose error lies above `floor` and below a tenth, and that are at least a factor of two apart in cost.
 
     Returns NaN where fewer than two count.
     """

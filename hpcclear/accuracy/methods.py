@@ -50,7 +50,7 @@ class Method:
     compiled: bool = True
     """Whether it runs without Python inside, so that repeating it is cheap."""
     setting: Callable[[float], float] = lambda rtol: rtol
-    """From the rung's tolerance to what the method is really given: the same, or a step over the period."""
+    """Convert a tolerance level into the setting of the method: the same, or a step over the period."""
 
 
 def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
@@ -60,7 +60,6 @@ def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
         "averaged_revolutions": 1,
         "target_error": None,
         "atol": None,
-        "uncertainty": False,
         "energy": False,
         **numerics,
     }

@@ -132,9 +132,7 @@ class Panels:
         """What kind of motion it is, as an attribute."""
 
         def work() -> Values:
-            scene = self.scene.with_(
-                {"numerics.target_error": GLANCE, "numerics.uncertainty": False}
-            )
+            scene = self.scene.with_({"numerics.target_error": GLANCE})
             with self.ranks.stage("motion"):
                 record = evaluate_records(scene, Points((), np.empty((1, 0)), ()))[0]
             status = Status(int(record["status"]))

@@ -1,4 +1,4 @@
-"""Speed-up and efficiency on the ranks at hand, and where time is lost."""
+"""Speed-up and efficiency on the available ranks, and lost time by cause."""
 
 import os
 import time
@@ -9,6 +9,7 @@ import numpy as np
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.surrogate import region_of
 from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.host import process_fields
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks, Task
@@ -84,9 +85,8 @@ def process_age_at_start() -> float:
 
     That is the interpreter, the package's imports and MPI's start.
     """
-    try:
-        with open("/proc/self/stat", encoding="utf-8") as file:
-            ticks = int(file.read().rpartition(")")[2].split()[19])
-    except OSError:
+    fields = process_fields(os.getpid())
+    if len(fields) <= 19 or not hasattr(os, "sysconf"):
         return float("nan")
+    ticks = int(fields[19])
     return float(_IMPORTED - ticks / os.sysconf("SC_CLK_TCK"))

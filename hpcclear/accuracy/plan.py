@@ -1,16 +1,15 @@
 """Error against core-hours, measured on some of the samples: what the `plan` command knows."""
 
 import multiprocessing
-import os
-import resource
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
+from hpcclear.base import host, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
@@ -18,7 +17,8 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.steady import telling
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
-from hpcclear.ranks.progress import Progress, Style
+from hpcclear.ranks.boundary import alone
+from hpcclear.ranks.progress import Progress, Style, duration
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
@@ -35,10 +35,13 @@ STEADY_PROBE = 8
 """Likewise where each is a steady mean: its copies fill the lanes."""
 
 FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
-"""How long the settings of the file, and each rung of the ladder, are measured on every rank."""
+"""How long the settings of the file, and each target error, are measured on every rank."""
 
 LARGEST_DESIGN = 4096
 """Points of the design that are drawn for measuring: the cost of a sample depends on where it lies."""
+
+USUAL_STARTUP, USUAL_MEMORY = 3.0, 400.0 * 2**20
+"""Seconds and bytes of a rank that are assumed where the system does not say, as outside Linux."""
 
 EFFICIENCY = 0.95
 """Of ranks that share out samples: the rest is waiting at the end."""
@@ -55,10 +58,10 @@ class Row:
     seconds: float
     """Core-seconds of one sample."""
     reached: str
-    """Limits that the samples tried came to; empty where the file names no target error."""
+    """Half-widths that the measured samples reached; empty without a target error in the file."""
 
     def settings(self) -> str:
-        """Tolerance and revolutions in words; of a steady mean its limits and how many designs meet the error."""
+        """Tolerance and revolutions in words; of a steady mean its half-width and the share of designs that meet the error."""
         n = self.scene.numerics
         if self.reached:
             return ", ".join(self.reached.split(", ")[:2])
@@ -83,6 +86,10 @@ class Plan:
     """Study variables."""
     responses: int = 0
     """Single responses of `run`, which rank 0 simulates alone."""
+    workers: int = 1
+    """Ranks planned for."""
+    first: bool = False
+    """Whether this is the first look, from a few samples on a quiet machine."""
 
     @property
     def simulations(self) -> int:
@@ -98,6 +105,23 @@ class Plan:
         return (
             simulations * row.seconds / (ranks * (EFFICIENCY if ranks > 1 else 1.0)) + self.startup
         )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: each error with its settings and cost, on as many ranks as were planned for."""
+        count = self.simulations
+        rows = [
+            (
+                "as in the scene" if row.error is None else f"{row.error:g}",
+                row.settings(),
+                f"{1e3 * row.seconds:.3g}",
+                duration(self.core_seconds(row, count, self.workers)),
+                duration(self.wall_seconds(row, count, self.workers)),
+            )
+            for row in self.rows
+        ]
+        header = ("target error", "settings", "ms per sample", "core time", "wall time")
+        title = f"{count} simulations on {self.workers} rank{'s' if self.workers > 1 else ''}"
+        return markup.table(title, rows, header)
 
     def disk(self, simulations: int) -> float:
         """Bytes of the samples and of the checkpoint that stands beside them meanwhile."""
@@ -128,7 +152,7 @@ def measure(
     tell : callable
         Gets what is measured, line by line, as it begins.
     show : callable
-        Gets the plan as far as it is measured, after each of its rows but the last.
+        Gets a first look at once, and the plan as far as it is measured after each of its rows but the last.
     progress_style : {"auto", "bar", "log", "quiet"}
         How the samples of a measurement are counted on standard error.
 
@@ -146,13 +170,24 @@ def measure(
     wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
     rows: list[Row] = []
     whole = sum(extent.samples_of(scene).values()) if study.cases else None
-    alone = extent.responses_of(scene) if study.cases else 0
+    single = extent.responses_of(scene) if study.cases else 0
 
     def made() -> Plan:
-        peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        startup = process_age_at_start()
-        return Plan(tuple(rows), study.samples, whole, startup, peak, len(study.variables), alone)
+        peak, startup = host.peak_memory(), process_age_at_start()
+        if not np.isfinite([peak, startup]).all():
+            peak, startup = USUAL_MEMORY, USUAL_STARTUP
+        columns = len(study.variables)
+        return Plan(tuple(rows), study.samples, whole, startup, peak, columns, single, workers)
 
+    if not np.isfinite([host.peak_memory(), process_age_at_start()]).all():
+        tell(
+            f"start-up and memory are not measured on this system; {USUAL_STARTUP:g} s and "
+            f"{USUAL_MEMORY / 2**20:g} MB a rank are assumed"
+        )
+    seconds, _ = _busy(scene, points, ranks, _block(scene) * ranks.size, "plan: first look")
+    rows.append(Row(None, scene, seconds, ""))
+    show(replace(made(), first=True))
+    rows.clear()
     with _company(scene, points, workers if ranks.size == 1 else 1, tell):
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
@@ -170,21 +205,31 @@ def cost(
 ) -> tuple[float, Records]:
     """Core-seconds of one sample in a long batch, measured for about `seconds` on every rank; and the samples."""
 
-    def busy(count: int, stage: str) -> tuple[float, Records]:
-        spread = np.linspace(0, len(points), count, endpoint=False).astype(int)
-        rows = spread if count <= len(points) else np.arange(count) % len(points)
-        progress = Progress("plan", style)
-        records = sample_points(scene, points.take(rows), ranks, progress=progress, stage=stage)
-        spent = float(ranks.stage_seconds[stage][:, COLUMNS.index("busy")].sum())
-        return spent / count, records
-
     steady = scene.numerics.target_error is not None
     block = (STEADY_PROBE if steady else DEFAULT_LANES) * ranks.size
-    once, found = busy((STEADY_PROBE if steady else PROBE) * ranks.size, f"plan {label}: probe")
+    first = _block(scene) * ranks.size
+    once, found = _busy(scene, points, ranks, first, f"plan {label}: probe", style)
     if steady and once * block > seconds * ranks.size:
         return once, found
     count = block * int(np.clip(seconds * ranks.size / (once * block), 2, 2000))
-    return busy(count, f"plan {label}")
+    return _busy(scene, points, ranks, count, f"plan {label}", style)
+
+
+def _block(scene: Scene) -> int:
+    """Samples of a first look on each rank."""
+    return PROBE if scene.numerics.target_error is None else STEADY_PROBE
+
+
+def _busy(
+    scene: Scene, points: Points, ranks: Ranks, count: int, stage: str, style: Style = "quiet"
+) -> tuple[float, Records]:
+    """Core-seconds of one sample of so many, spread over the design; and the samples."""
+    spread = np.linspace(0, len(points), count, endpoint=False).astype(int)
+    rows = spread if count <= len(points) else np.arange(count) % len(points)
+    progress = Progress("plan", style)
+    records = sample_points(scene, points.take(rows), ranks, progress=progress, stage=stage)
+    spent = float(ranks.stage_seconds[stage][:, COLUMNS.index("busy")].sum())
+    return spent / count, records
 
 
 @contextmanager
@@ -192,10 +237,7 @@ def _company(
     scene: Scene, points: Points, workers: int, tell: Callable[[str], object] = lambda text: None
 ) -> Iterator[None]:
     """Keep other cores busy with the same work, as the ranks of the job will."""
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
-    others = max(min(workers, cores) - 1, 0)
+    others = max(min(workers, len(host.cores())) - 1, 0)
     context = multiprocessing.get_context("spawn")
     stop, ready = context.Event(), context.Semaphore(0)
     content = {k: v for k, v in scene.resolved().items() if k != "study"}
@@ -234,19 +276,44 @@ def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -
 
 
 def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:
-    """Errors to measure: `TARGETS`, and the one asked for; none where lives are followed, which have copies of their own.
+    """Errors to measure: `TARGETS`, and the requested one; none for service lives, which have replicas of their own.
 
     Raises
     ------
     InputError
-        Lives cannot be followed, or an error was asked for that these have no use for.
+        Service lives cannot be simulated, or an error was requested that they do not use.
     """
     lives.check(scene)
     study = scene.study
     if study is None or not study.worn:
         return TARGETS if error is None else tuple(sorted({*TARGETS, error}, reverse=True))
     if error is not None:
-        reason = "lives of worn joints are followed at the settings of the file"
+        reason = "service lives are simulated at the settings of the file"
         remedy = "Leave it out, and set wear.tolerance and wear.copies"
         raise InputError("--error", error, reason, remedy)
     return ()
+
+
+def plan(scene: Scene, error: float | None = None, ranks: int = 1) -> Plan:
+    """Estimate core-hours and wall time of a study from a few measured samples, in this process.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    error : float, optional
+        Target error of the objective, relative, in addition to those of the ladder.
+    ranks : int
+        Ranks to plan for.
+
+    Returns
+    -------
+    Plan
+        A notebook shows it as a table.
+
+    Raises
+    ------
+    InputError
+        The scene has no study.
+    """
+    return measure(scene, alone(), ladder(scene, error), ranks)

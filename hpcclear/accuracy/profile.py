@@ -21,7 +21,7 @@ class Profile:
     revolutions: int = 1000
     """Of the long runs of the averaging panel."""
     copies: int = 32
-    """Long runs that differ by tiny kicks at their start."""
+    """Long runs that differ by tiny perturbations at their start."""
     stretches: int = 64
     """Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions."""
     training: tuple[int, ...] = (25, 50, 100, 200, 400)

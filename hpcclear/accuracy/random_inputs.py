@@ -1,4 +1,4 @@
-"""Error of mean and deviation against Monte Carlo size: on the surrogate, beside quadrature, and by simulation."""
+"""Error of mean and standard deviation against Monte Carlo size: on the surrogate, beside quadrature, and by simulation."""
 
 import time
 from dataclasses import dataclass
@@ -128,7 +128,7 @@ def measure(
 
 
 def root_mean_square(errors: Array, known: int) -> tuple[Array, Array, Array]:
-    """Root mean square over the first axis of any shape, with 95 % limits for normal errors.
+    """Root mean square over the first axis of any shape, with 95 % confidence intervals for normal errors.
 
     `known` is 1 if the truth the errors are about was taken from the same values, which hides a share of them.
     """

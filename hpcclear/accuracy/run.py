@@ -55,7 +55,7 @@ def measure(
     if scene.objective.joints:
         raise InputError(
             "numerics.objective_joints", scene.numerics.objective_joints,
-            "what accuracy costs is measured for all joints together",
+            "accuracy is measured for all joints together",
             "Leave the joints out for this command",
         )  # fmt: skip
     if not scene.clearance_joints():

@@ -2,7 +2,7 @@
 
 A mean over N revolutions at a tolerance is off by error^2 = bias(rtol)^2 + variance / N: the first buys a tighter tolerance
 off, the second revolutions (Oliver et al. 2014, doi:10.1063/1.4866813). It costs (N + spin-up) revolutions of that
-tolerance, which makes of every error a cheapest pair (Frontin and Darmofal 2022, arXiv:2210.07939). Kicked copies run at
+tolerance, which makes of every error a cheapest pair (Frontin and Darmofal 2022, arXiv:2210.07939). Perturbed replicas run at
 every tolerance of a ladder; their means, cut short, are measured against the mean of all that agree, and the formula
 against that.
 """
@@ -40,7 +40,7 @@ FIRST = 8
 """Stretches of all copies after which there is something to show; they are doubled from there."""
 
 AIMS = (0.1, 0.03, 0.01, 0.003, 0.001)
-"""Relative standard errors whose cheapest price is told."""
+"""Relative standard errors whose cheapest price is reported."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Run:
     """Copies at every tolerance, and what they did so far."""
 
     gaps: Array
-    """Shape (stretches, r, copies, joints)."""
+    """Shape (intervals, r, copies, joints)."""
     seconds: Array
     """Shape (r,): processor time so far."""
     start: Array
@@ -102,7 +102,7 @@ class Run:
 
     @classmethod
     def of(cls, scene: Scene) -> "Run":
-        """Nothing simulated yet: every copy of every tolerance has a kick of its own."""
+        """Nothing simulated yet: every copy of every tolerance has a perturbation of its own."""
         here = one_turn(scene)
         first, scale = start_states(here, parameters(here)), scales(here)
         starts = [
@@ -116,9 +116,9 @@ class Run:
 def measure(
     scene: Scene, run: Run, stretches: int, check: Callable[[], object] = lambda: None
 ) -> Iterator[Run]:
-    """Go on until there are so many stretches of every copy; yields at every doubling.
+    """Go on until there are so many intervals of every copy; yields at every doubling.
 
-    `check` is called between stretches, to raise what ends it. A copy that fails is NaN from there.
+    `check` is called between intervals, to raise what ends it. A copy that fails is NaN from there.
     """
     here = one_turn(scene)
     par = np.repeat(parameters(here), COPIES, axis=0)
@@ -178,7 +178,7 @@ def analyse(run: Run) -> Spending:
 
 
 def _spin_up(gaps: Array) -> int:
-    """Stretches (stretches, copies, joints) to leave out: until copies have parted and their mean has settled, half at most."""
+    """Intervals (intervals, copies, joints) to leave out: until copies have parted and their mean has settled, half at most."""
     if gaps.shape[1] < 3:
         return 0
     y = judging.projected(gaps)
@@ -209,7 +209,7 @@ def _known_bias(bias: Array, error: Array) -> Array:
 
 
 def _error(gaps: Array, stretches: int, truth: float) -> float:
-    """Relative error of means of so many stretches, from gaps (stretches, copies, joints): of one copy or of several."""
+    """Relative error of means of so many intervals, from gaps (intervals, copies, joints): of one copy or of several."""
     length, copies = gaps.shape[:2]
     together = -(-stretches // length)  # copies in a mean
     long = stretches // together

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from hpcclear.accuracy.looked_at import body_of
-from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.accuracy.looked_at import mass_of
 from hpcclear.scene import Scene
 from hpcclear.scene.variables import SHORT_NAMES
 
@@ -47,10 +46,9 @@ def _by_quadrature(scene: Scene) -> Scene:
 
 def _variables(scene: Scene) -> dict[str, Any]:
     """Rod mass, slider mass and the clearances, each about the scene's value; of a linkage, the mass of one body."""
-    if scene.is_planar:
-        mass = f"mechanism.bodies.{body_of(linkage_of(scene).mechanism)}.mass"
+    if scene.template is None:
         plays = [path for path in scene.numeric_paths() if path.endswith(".clearance")]
-        paths = {"mass": [mass], **{f"C{k}": [path] for k, path in enumerate(plays, 1)}}
+        paths = {"mass": [mass_of(scene)], **{f"C{k}": [path] for k, path in enumerate(plays, 1)}}
         return {name: {"paths": one, **_about(scene, one[0])} for name, one in paths.items()}
     known = set(scene.numeric_paths())
     clearances = {scene.number(path) for path in SHORT_NAMES["C"] if path in known}

@@ -66,7 +66,7 @@ def measure(
 ) -> Surrogates:
     """Fit the surrogates to samples of each size and compare them with fresh simulations.
 
-    They are two, and what the study asks for, where that is another than Kriging with the squared exponential.
+    They are two, and what the study requests, where that is another than Kriging with the squared exponential.
     `values`, shape (n,), and `sample_seconds` are those of `simulate`.
     """
     region, rng = region_of(scene, case), _generator(scene)
@@ -103,7 +103,7 @@ def measure(
 
 
 def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
-    """Simulate one design on the ranks at hand: every rank compiles the kernel, or loads it."""
+    """Simulate one design on the available ranks: every rank compiles the kernel, or loads it."""
     region = region_of(scene, case)
     simulated(scene, region, 0.5 * (region.lower + region.upper)[None], ranks)
 

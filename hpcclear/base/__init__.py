@@ -1,1 +1,1 @@
-"""What every room stands on: errors, outcome codes, how code is compiled."""
+"""Foundation of every package: errors, outcome codes, compilation."""

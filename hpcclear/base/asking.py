@@ -1,4 +1,4 @@
-"""Procedures that ask: generators that yield what they want to know, are sent the answer, and return what they found."""
+"""Procedures that request simulations: generators that yield requests, receive the results, and return their findings."""
 
 from collections.abc import Callable, Generator
 from typing import TypeVar
@@ -9,7 +9,7 @@ Found = TypeVar("Found")
 
 
 def answered(asking: Generator[Asked, Answer, Found], answer: Callable[[Asked], Answer]) -> Found:
-    """What a procedure finds when all it asks for is answered; raises what `answer` does."""
+    """What a procedure finds when all it requests is answered; raises what `answer` does."""
     asked = next(asking)
     while True:
         told = answer(asked)

@@ -1,4 +1,4 @@
-"""What is vectorised though no operator says it: limits without a branch; from the bits of a double a cheap base-2 logarithm
+"""What is vectorised though no operator says it: bounds without a branch; from the bits of a double a cheap base-2 logarithm
 and exponential, enough for a step-size factor, and a falling exponential that is good to the last digits."""
 
 from llvmlite import ir

@@ -9,7 +9,7 @@ USUAL = 32 * 1024
 
 
 def first_level_cache(caches: Path = _CACHES) -> int:
-    """Bytes of a core's first-level cache of data, as Linux tells it of the first core; `USUAL` where it does not."""
+    """Bytes of a core's first-level cache of data, as Linux states it of the first core; `USUAL` where it does not."""
     for index in sorted(caches.glob("index*")):
         try:
             level, kind, size = (

@@ -1,6 +1,6 @@
 """How many cores this process may use by itself."""
 
-import os
+from hpcclear.base import host
 
 _state = {"alone": True}
 
@@ -14,6 +14,4 @@ def own_cores() -> int:
     """Cores that this process may use: one where it is a rank among others."""
     if not _state["alone"]:
         return 1
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(host.cores())

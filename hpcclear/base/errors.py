@@ -2,12 +2,14 @@
 
 import difflib
 import errno
+import importlib.util
 import os
+import platform
 import re
-import resource
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from hpcclear.base import host
 from hpcclear.base.plain import plain
 
 MOST_LISTED = 20
@@ -103,10 +105,13 @@ class LimitError(RuntimeError):
     """The machine, or a limit that was set for the process, is too small for the work. Exit code 1."""
 
 
-LEAST_ADDRESS_SPACE = 700
+_PYARROW = 200 if importlib.util.find_spec("pyarrow") else 0
+"""MB more where pyarrow is installed (the extra ``tables``): pandas, which xarray needs, then loads it."""
+
+LEAST_ADDRESS_SPACE = 700 + _PYARROW
 """MB of it that one process takes to load the program and a compiled kernel."""
 
-LEAST_BESIDE_OTHERS = 900
+LEAST_BESIDE_OTHERS = 900 + _PYARROW
 """MB that each takes under an MPI launcher: the library maps buffers that it shares with the ranks of its node."""
 
 
@@ -116,9 +121,9 @@ def check_address_space(others: bool = False) -> None:
     `others`: other ranks run beside it. To be called before anything is loaded: out of memory amid an import Python 3.11
     may raise the error for ever.
     """
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    limit = host.address_space_limit()
     least = LEAST_BESIDE_OTHERS if others else LEAST_ADDRESS_SPACE
-    if limit != resource.RLIM_INFINITY and limit < least * 2**20:
+    if limit is not None and limit < least * 2**20:
         known = f"the limit of address space is {limit // 2**20} MB, it takes {least}"
         raise _out_of_memory(known)
 
@@ -143,10 +148,13 @@ def mendable(error: BaseException) -> InputError | LimitError | None:
             return InputError(
                 "file", name, os.strerror(number or 0), "Choose another name or place"
             )
+        if isinstance(one, ModuleNotFoundError) and one.name in host.UNIX_MODULES:
+            reason = f"this command needs the module {one.name}, which only Unix has"
+            return InputError("system", platform.system(), reason, host.WSL)
         if isinstance(one, MemoryError) or number == errno.ENOMEM:
             return _out_of_memory(str(one))
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY and any(
+    limit = host.address_space_limit()
+    if limit is not None and any(
         isinstance(one, ImportError | SystemError | OSError) for one in chain
     ):
         return _out_of_memory(f"the limit of address space is {limit // 2**20} MB")

@@ -21,6 +21,7 @@ import numpy as np
 from numba import config, njit, types
 from numba.core.extending import intrinsic
 
+from hpcclear.base.cached import cached
 from hpcclear.base.private import private_folder, unwritable
 from hpcclear.base.remarks import remark
 from hpcclear.base.width import asked_width, features
@@ -39,7 +40,8 @@ def emitted(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
-    parts = {root / "dynamics" / "layout.py", *(root / "dynamics").glob("*/*.py")}
+    parts = {root / "dynamics" / name for name in ("layout.py", "rows.py")}
+    parts |= set((root / "dynamics").glob("*/*.py"))
     # of laws the texts are, each named by its content
     parts -= set((root / "dynamics" / "laws").glob("*.py"))
     parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
@@ -103,14 +105,14 @@ def doubles_in_a_vector() -> int:
 
 
 def doubles_in_use() -> int:
-    """Numbers in the vectors that the compiler uses: half of what there is room for where it prefers 256 bits."""
+    """Numbers in the vectors that the compiler uses: half of the available ones where it prefers 256 bits."""
     half = "+prefer-256-bit" in (config.CPU_FEATURES or "")
     return min(doubles_in_a_vector(), 4 if half else 8)
 
 
 @contextmanager
 def interleaved(lanes: int) -> Iterator[None]:
-    """Have loops over so many lanes that are compiled inside taken all at once, vector by vector side by side.
+    """Have loops over so many lanes that are compiled inside taken all at once, vector by vector in one batch.
 
     The work on one vector waits for its own roots and quotients, and the processor looks too few instructions ahead to begin
     with the next: a force evaluation took one and a half times as long. LLVM would interleave only what needs no more
@@ -126,7 +128,7 @@ def interleaved(lanes: int) -> Iterator[None]:
 
 @emitted
 def narrow_vectors(typingctx):
-    """Have the function that calls this use vectors of 256 bits at most, whatever the processor is told.
+    """Have the function that calls this use vectors of 256 bits at most, whatever the processor.
 
     For loops over coordinates, of which there are four as a rule: with 512 bits they do not fill one vector, and a single
     response by the pair took 1.4 times as long.
@@ -179,6 +181,6 @@ def apart(compiled: Any) -> Any:
 
 def scalar_function(function: Callable[..., Any]) -> Any:
     """Compile what runs for one lane or one point at a time."""
-    compiled = njit(error_model="numpy", cache=True)(function)
+    compiled = cached(function)
     _written[compiled] = "scalar"
     return compiled

@@ -10,24 +10,22 @@ clipped."""
 
 
 def truncated_quantile(chance: Array, low: float, high: float) -> Array:
-    """Quantiles of the standard normal cut off at two limits, by inversion.
+    """Quantiles of the standard normal truncated at two bounds, by inversion.
 
     Parameters
     ----------
     chance : array of any shape
         Probabilities, between 0 and 1.
     low, high : float
-        The limits, in standard deviations, low < high.
+        The bounds, in standard deviations, low < 0 < high.
 
     Returns
     -------
     array of that shape
-        In standard deviations, within the limits.
+        In standard deviations, within the bounds.
     """
     from scipy.special import ndtr, ndtri  # a quarter of a second that a Latin hypercube saves
 
-    if low >= 0:  # an upper tail is inverted as a lower one, to keep its digits
-        return -truncated_quantile(1 - chance, -high, -low)
     below = ndtr(low)
-    share = 1 - (below + ndtr(-high)) if high > 0 else ndtr(high) - below
+    share = 1 - (below + ndtr(-high))
     return np.clip(ndtri(below + share * chance), low, high)

@@ -1,62 +1,212 @@
 """What a study may make small: each objective's name, unit and words, and what it is of a sample's record.
 
-The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` puts the objective that was asked for in its
-place, on the rank that simulated it, and everybody after that reads ``objective``.
-"""
+Ours and a user's are declared alike. The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` replaces
+it by the requested objective, on the rank that simulated it, and everybody after that reads ``objective``."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from inspect import signature
+from typing import Any, Literal
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Records
-from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import OUTCOME, RESPONSES
+
+Function = Callable[..., Any]
+
+RECORDED = {
+    "objective": "m",
+    "mean_gap": "m",
+    "peak_contact_force": "N",
+    "mean_contact_force": "N",
+    "peak_crank_moment": "N m",
+    "slider_acceleration_deviation": "m/s^2",
+    "point_acceleration_deviation": "m/s^2",
+    "peak_point_acceleration": "m/s^2",
+}
+"""Fields of a sample's record that `Objective.value` may ask for, with units; ``objective`` is f of eq. 13."""
+
+OF_JOINTS = {
+    "gap": "m",
+    "depth": "m",
+    "gap_rate": "m/s",
+    "normal_force": "N",
+    "friction_force": "N",
+    "sliding_speed": "m/s",
+    "direction_x": "",
+    "direction_y": "",
+    "clearance": "m",
+    "bearing_radius": "m",
+    "journal_radius": "m",
+}
+"""What `Objective.rate` may ask for of each joint with clearance, with units: distance from the clearance circle, positive in
+contact, and its rate; the same cut at 0; the forces of contact; the sliding speed; the normal from bearing to journal."""
+
+OF_ALL = {
+    "drive_cosine": "",
+    "drive_sine": "",
+    "drive_speed": "rad/s",
+    "drive_torque": "N m",
+    "acceleration_x": "m/s^2",
+    "acceleration_y": "m/s^2",
+}
+"""What it may ask for of the mechanism: the angle from the x axis, speed and torque of the body that the drive turns, and the
+acceleration of the followed body or point. Nothing of it jumps at the end of a revolution."""
+
+MADE = ("mean", "revolution", "rms", "peak")
+"""What may be made of a rate."""
+
+RATE = "rate_of_objective"
+"""Field of a record with what was made of the rate."""
 
 
-class Objective(NamedTuple):
-    """One objective: `name` in a scene file, SI `unit`, `words` for people, and its value `of` records (n,).
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What a study makes small: made of a sample's record, of a rate that the simulation integrates, or of both.
 
-    `joints`: places of those that count, which the field `by_joint` of a record goes by; none for all.
+    Functions name what they need by their arguments, and get it in SI units.
     """
 
-    name: str
-    unit: str
     words: str
-    of: Callable[[Records], Array]
-    by_joint: str | None = None
+    """What it is, for people: "mean contact force"."""
+    unit: str = ""
+    """SI, "" of a plain number: "N m"."""
+    value: Function | None = None
+    """Its value, of arguments in `RECORDED`, and ``rate``: what was made of `rate`. What joints have comes as an array over the
+    joints with clearance. By default the rate, of the joint where it is largest."""
+    rate: Function | None = None
+    """Plain arithmetic of arguments in `OF_JOINTS` and `OF_ALL`, compiled into the simulation as laws are. One that asks for
+    nothing of joints is of the mechanism as a whole."""
+    made: Literal["mean", "revolution", "rms", "peak"] = "mean"
+    """What is made of the rate over the averaged revolutions: its mean in time, its integral over a revolution, its root mean
+    square, or its largest value at the ends of the steps."""
+    rate_unit: str | None = None
+    """Unit of what is made of the rate; by default that of the objective."""
+    source: str = ""
+    """Where it was published."""
+    name: str = ""
     joints: tuple[int, ...] = ()
+    """Places in records of chosen joints; none for all that there are."""
+    places: tuple[int, ...] = ()
+    """Those of all joints with clearance."""
+
+    @property
+    def asks(self) -> frozenset[str]:
+        """All that its functions ask for."""
+        return frozenset(name for one in (self.value, self.rate) if one for name in arguments(one))
+
+    @property
+    def whole(self) -> bool:
+        """Whether the rate is of the mechanism as a whole."""
+        return self.rate is not None and not OF_JOINTS.keys() & set(arguments(self.rate))
+
+    @property
+    def rate_of(self) -> str:
+        """What the rate is of: "joints", or "whole" of the mechanism; "" without one."""
+        return "" if self.rate is None else "whole" if self.whole else "joints"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether it is made of what joints have."""
+        recorded = () if self.value is None else arguments(self.value)
+        rubs = self.rate is not None and not self.whole
+        return (
+            rubs
+            or self.name == "mean-gap"
+            or any(OUTCOME[n].shape for n in recorded if n in RECORDED)
+        )
+
+    @property
+    def unit_of_rate(self) -> str:
+        """Unit of what is made of the rate."""
+        return self.unit if self.rate_unit is None else self.rate_unit
+
+    @property
+    def needs_responses(self) -> bool:
+        """Whether samples have to record more than gaps and peak forces for it."""
+        return not self.asks.isdisjoint(RESPONSES)
+
+    def made_of(self, mean: Array, peak: Array, period: Array) -> Array:
+        """What is made of the rate, (m, joints): of its mean in time, of its square where that is what is made, its peak
+        and the length of a revolution, (m, 1)."""
+        if self.made == "revolution":
+            return mean * period
+        return {"mean": mean, "rms": np.sqrt(np.maximum(mean, 0.0)), "peak": peak}[self.made]
+
+    def of(self, records: Records) -> Array:
+        """Its value of records (n,), NaN where something that it is made of is.
+
+        Raises
+        ------
+        InputError
+            `value` raised something, or gives no number.
+        """
+        names = ("rate",) if self.value is None else arguments(self.value)
+        columns = [self._column(name, records) for name in names]
+        found = np.full(len(records), np.nan)
+        for k, row in enumerate(zip(*columns, strict=True)):
+            if not any(np.isnan(one).any() for one in row):
+                found[k] = self._value_of(row)
+        return found
+
+    def _column(self, name: str, records: Records) -> Array:
+        """What `value` gets by a name, (n,) or (n, joints)."""
+        if name == "rate" and self.whole:
+            return np.asarray(records[RATE][:, 0])
+        found: Array = records[RATE if name == "rate" else name]
+        places = self.joints or self.places
+        return found[:, list(places)] if found.ndim > 1 and places else found
+
+    def _value_of(self, row: tuple[Any, ...]) -> float:
+        try:
+            return float(np.max(row[0]) if self.value is None else self.value(*row))
+        except Exception as error:
+            raise InputError(
+                "objective",
+                self.name,
+                f"its value raised {type(error).__name__}: {error}",
+                "Mend it",
+            ) from error
 
 
-def _largest(name: str, unit: str, words: str) -> Objective:
-    """The largest over joints of what a record has of each under the same name."""
-    field = _field_of(name)
-    return Objective(name, unit, words, lambda records: records[field].max(axis=1), field)
+def arguments(function: Function) -> tuple[str, ...]:
+    """Names of what a function asks for."""
+    return tuple(signature(function).parameters)
 
 
-def _plain(name: str, unit: str, words: str) -> Objective:
-    """What a record has under the same name."""
-    field = _field_of(name)
-    return Objective(name, unit, words, lambda records: records[field])
-
-
-def _field_of(name: str) -> str:
-    return name.replace("-", "_")
-
-
-# fmt: off
-_ALL = (
-    Objective("mean-gap", "m", "mean distance from the clearance circle", lambda records: records["objective"], "mean_gap"),
-    _largest("mean-contact-force", "N", "mean contact force, of the joint where it is larger"),
-    _largest("peak-contact-force", "N", "peak contact force, of the joint where it is larger"),
-    _plain("peak-crank-moment", "N m", "peak moment of the drive on the crank"),
-    _plain("slider-acceleration-deviation", "m/s^2", "standard deviation in time of the slider acceleration"),
-    _plain("point-acceleration-deviation", "m/s^2",
-        "root mean square about its mean of the acceleration of the followed point"),
-    _plain("peak-point-acceleration", "m/s^2", "largest acceleration of the followed point"),
-)
-# fmt: on
-OBJECTIVES = {one.name: one for one in _ALL}
-"""Every objective by its name."""
+OURS = {
+    "mean-gap": Objective(
+        "mean distance from the clearance circle", "m", lambda objective: objective
+    ),
+    "mean-contact-force": Objective(
+        "mean contact force, of the joint where it is larger", "N",
+        lambda mean_contact_force: mean_contact_force.max(),
+    ),
+    "peak-contact-force": Objective(
+        "peak contact force, of the joint where it is larger", "N",
+        lambda peak_contact_force: peak_contact_force.max(),
+    ),
+    "peak-crank-moment": Objective(
+        "peak torque of the drive on the crank", "N m", lambda peak_crank_moment: peak_crank_moment
+    ),
+    "slider-acceleration-deviation": Objective(
+        "standard deviation in time of the slider acceleration", "m/s^2",
+        lambda slider_acceleration_deviation: slider_acceleration_deviation,
+    ),
+    "point-acceleration-deviation": Objective(
+        "root mean square about its mean of the acceleration of the followed point", "m/s^2",
+        lambda point_acceleration_deviation: point_acceleration_deviation,
+    ),
+    "peak-point-acceleration": Objective(
+        "largest acceleration of the followed point", "m/s^2",
+        lambda peak_point_acceleration: peak_point_acceleration,
+    ),
+}  # fmt: skip
+OURS = {name: replace(one, name=name) for name, one in OURS.items()}
+"""Ours by their names."""
 
 ENDS = ("alpha", "beta", "gamma", "delta", "epsilon")
 """What the designs are called that have the least of the first, the second ... that a case makes small. There are as many as a
@@ -65,30 +215,33 @@ case may name: hypervolumes are exact so far, and the designs that a study can a
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 """The same places, as variables of files are called by them."""
 
-MEAN_GAP = OBJECTIVES["mean-gap"]
-"""f of eq. 13, what a scene without a study, and a study that names nothing else, asks for."""
+MEAN_GAP = OURS["mean-gap"]
+"""f of eq. 13, of a scene without a study, and of a study that names no other."""
 
 
-def of_joints(objective: Objective, places: Sequence[int], labels: Sequence[str]) -> Objective:
-    """The same of chosen joints only, by their places in a record and by their labels."""
-    field = objective.by_joint
-    words = f"{objective.words.partition(', of the joint')[0]}, of {' and '.join(labels)}"
-    if len(places) > 1 and objective.name != MEAN_GAP.name:
-        words += ", the larger"
-
-    def largest(records: Records) -> Array:
-        found: Array = np.asarray(records[field], float)[:, list(places)]
-        return np.asarray(found.max(axis=1))
-
-    of = objective.of if objective.name == MEAN_GAP.name else largest
-    return objective._replace(words=words, of=of, joints=tuple(places))
+@cache
+def bound(
+    objective: Objective,
+    name: str,
+    places: tuple[int, ...],
+    joints: tuple[int, ...],
+    labels: tuple[str, ...],
+) -> Objective:
+    """An objective as a scene names it: of its joints with clearance, by their places in a record, or of chosen ones, by
+    their places and labels."""
+    words = objective.words
+    if joints:
+        words = words.partition(", of the joint")[0]
+        larger = ", the larger" if len(joints) > 1 and words != objective.words else ""
+        words += f", of {' and '.join(labels)}{larger}"
+    return replace(objective, name=name, words=words, places=places, joints=joints)
 
 
 _OF_THE_GAP = tuple(name for name in OUTCOME.names or () if name.startswith("objective_"))
 
 
 def asked(records: Records, objective: Objective) -> Records:
-    """Records (n,) as the kernel leaves them, with the objective that was asked for as ``objective``.
+    """Records (n,) as the kernel leaves them, with the requested objective as ``objective``.
 
     How far f scatters between revolutions and copies says nothing of another objective, so that is NaN then.
     """

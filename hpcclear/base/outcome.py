@@ -11,10 +11,10 @@ JOINTS = ("crank_rod", "rod_slider")
 """Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
 
 MAX_JOINTS = 8
-"""Joints that a record has room for; datasets hold those that the scene has."""
+"""Largest number of joints of a record; datasets contain those of the scene."""
 
 WAVE_ROWS = 32
-"""Numbers that profiles around the surfaces of all joints have room for."""
+"""Largest number of profile coefficients of all joints."""
 
 
 class Status(IntEnum):
@@ -53,7 +53,7 @@ _TEXT = {
     Status.STEP_CAP: (
         "numerics.max_steps was reached before the last revolution ended",
         "see with hpcclear check that nothing locks, and check masses, stiffness and clearance; "
-        "if all of them are meant, raise numerics.max_steps",
+        "if all are correct, raise numerics.max_steps",
     ),
     Status.STEP_TOO_SMALL: (
         "the step size fell below the resolution of the time",
@@ -64,33 +64,33 @@ _TEXT = {
         "check masses, stiffness and clearance of this sample",
     ),
     Status.STALLED: (
-        "the crank stopped before it had turned the revolutions asked for",
+        "the crank stopped before the requested revolutions were complete",
         "raise the drive torque, the initial speed or the flywheel inertia",
     ),
     Status.AVERAGE_CAP: (
-        "the standard error of the objective was still above its target at the last revolution allowed",
-        "raise numerics.max_averaged_revolutions or numerics.objective_tolerance; see objective_spread",
+        "an automatic average of an earlier version was still above its target at the last revolution allowed",
+        "set numerics.target_error; see objective_spread",
     ),
     Status.NEAR_SINGULAR: (
-        "the constraints of joints without clearance depend on one another at a change point (the rod is hardly longer than "
-        "the crank, a parallelogram in line), so that forces grow without bound or the motion is not determined",
+        "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "
+        "or the motion is not determined",
         'change a length (lengthen the rod), or give a joint of that loop kind = "clearance"',
     ),
     Status.WORN_THROUGH: (
-        "a clearance has grown to a quarter of its bearing's radius, beyond which no bearing is left to speak of",
-        "give wear.limit what ends a life before, or check wear coefficients and lengths of bearings",
+        "a clearance has grown to a quarter of its bearing's radius, so the bearing is worn through",
+        "give wear.limit a threshold that ends a service life earlier, or check wear coefficients and lengths of bearings",
     ),
     Status.JUMP_TOO_SHORT: (
-        "no jump of as many revolutions as are averaged meets wear.tolerance",
+        "no extrapolation jump over the averaged revolutions meets wear.tolerance",
         "loosen wear.tolerance, lower numerics.averaged_revolutions, or check the wear coefficients",
     ),
     Status.CANNOT_TURN: (
-        "the linkage cannot turn: without clearance it locks before its drives have gone round, or does not close at all",
-        "change lengths, points or angles so that it turns; hpcclear check of this design says where it locks",
+        "the linkage cannot turn: without clearance it locks within a turn of its drives, or cannot be assembled",
+        "change lengths, points or angles so that it turns; hpcclear check of this design shows where it locks",
     ),
     Status.TORN_THROUGH: (
-        "a journal penetrated its bearing by more than a quarter of the bearing's radius, which no contact bears",
-        "check masses, speed and loads, the stiffness of the contact and whether the mechanism can move",
+        "a journal penetrated its bearing by more than a quarter of the bearing's radius",
+        "check masses, speed, loads and contact stiffness, and whether the mechanism can move",
     ),
 }
 
@@ -122,11 +122,11 @@ class Regime(IntEnum):
 
 _REGIMES = {
     Regime.UNJUDGED: "not judged",
-    Regime.REGULAR: "regular: it repeats itself",
-    Regime.SETTLING: "still settling: the average moves on",
-    Regime.UNSTEADY: "unsteady: it drifts, there is no steady mean",
-    Regime.CHAOTIC: "chaotic: the smallest kick becomes as large as the motion",
-    Regime.SEVERAL: "several orbits: which one it settles on depends on the smallest kick",
+    Regime.REGULAR: "regular: the motion repeats itself",
+    Regime.SETTLING: "still settling: the average has not converged",
+    Regime.UNSTEADY: "unsteady: the average drifts, there is no steady mean",
+    Regime.CHAOTIC: "chaotic: the smallest perturbation grows to the size of the motion",
+    Regime.SEVERAL: "several orbits: the smallest perturbation decides which one is reached",
 }
 
 
@@ -137,10 +137,10 @@ RESPONSES = (
     "point_acceleration_deviation",
     "peak_point_acceleration",
 )
-"""Fields of `OUTCOME` that a study of one of them asks for."""
+"""Fields of `OUTCOME` that a study of one of them records."""
 
-ON_REQUEST = (*RESPONSES, "sliding_work", "sliding_waves", "energy_error")
-"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene asks for them."""
+ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
+"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
 """Fields of `OUTCOME` that a target error fills in, and that datasets hold where a `regime` was judged."""
@@ -159,7 +159,7 @@ OUTCOME = np.dtype(
         (
             "objective_uncertainty",
             np.float64,
-        ),  # m, scatter over kicked copies; NaN unless asked for
+        ),  # m, its half-width: over kicked copies, or of the steady mean; NaN where nothing checked it
         ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
         (
             "peak_contact_force",
@@ -175,6 +175,11 @@ OUTCOME = np.dtype(
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
         ("peak_point_acceleration", np.float64),  # m/s^2, likewise
+        (
+            "rate_of_objective",
+            np.float64,
+            MAX_JOINTS,
+        ),  # what is made of the objective's own rate; NaN without one
         ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
         (
             "sliding_waves",

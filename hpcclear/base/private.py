@@ -3,7 +3,6 @@
 import atexit
 import contextlib
 import getpass
-import grp
 import os
 import shutil
 import stat
@@ -11,6 +10,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from hpcclear.base import host
 from hpcclear.base.errors import InputError
 from hpcclear.base.remarks import remark
 
@@ -21,8 +21,8 @@ def user_name() -> str:
     """Return the name of the user, or the number where the system knows no name."""
     try:
         return getpass.getuser()
-    except (KeyError, OSError):
-        return str(os.getuid())
+    except (ImportError, KeyError, OSError):
+        return str(host.user_number() or 0)
 
 
 def private_folder(variable: str) -> Path:
@@ -49,7 +49,7 @@ def private_folder(variable: str) -> Path:
         last = Path(tempfile.mkdtemp(prefix="hpcclear-"))
     except OSError:
         reason = f"there is no place for compiled code ({'; '.join(refusals)})"
-        remedy = "Set it to a directory of your own on a disk with room"
+        remedy = "Set it to a directory of your own with free space"
         raise InputError(variable, os.environ.get(variable), reason, remedy) from None
     atexit.register(shutil.rmtree, last, ignore_errors=True)
     remark(
@@ -75,8 +75,12 @@ def _refusal(folder: Path) -> str:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         about = folder.lstat()
-        if not stat.S_ISDIR(about.st_mode) or about.st_uid != os.getuid():
+        user = host.user_number()
+        if not stat.S_ISDIR(about.st_mode) or user not in (None, about.st_uid):
             return "is not a directory of yours"
+        if user is None:  # native Windows: the directory of temporary files is the user's own
+            why = unwritable(folder)
+            return f"cannot be written to ({why})" if why else ""
         if about.st_mode & 0o077:
             return "is open to others (chmod 700 mends that)"
         for parent in folder.resolve().parents:
@@ -99,7 +103,7 @@ def _exchangeable(about: os.stat_result) -> bool:
 
 def _trusted_users() -> set[int]:
     """Numbers of the user and of root, who in a container without a root of its own shows up as the overflow user."""
-    trusted = {0, os.getuid()}
+    trusted = {0, host.user_number() or 0}
     try:
         maps = [line.split() for line in Path("/proc/self/uid_map").read_text().splitlines()]
         if not any(int(inside) == 0 for inside, _, _ in maps):
@@ -113,11 +117,8 @@ def _own_group(about: os.stat_result) -> bool:
     """Whether a directory's group is root's, or the user's alone: the one that many systems make for each user."""
     if about.st_gid == 0:
         return True
-    try:
-        group = grp.getgrgid(about.st_gid)
-    except (KeyError, OSError):
-        return False
-    return group.gr_name == user_name() and set(group.gr_mem) <= {user_name()}
+    name, members = host.group_members(about.st_gid)
+    return name == user_name() and members <= {user_name()}
 
 
 def unwritable(folder: Path) -> str:

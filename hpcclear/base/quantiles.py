@@ -26,6 +26,8 @@ class Quantiles(Protocol):
         """Least and largest value that counts."""
         ...
 
+    def __hash__(self) -> int: ...
+
     def __call__(self, chance: Array) -> Array:
         """Values below which a share `chance` lies, of any shape, strictly between 0 and 1."""
         ...
@@ -90,7 +92,7 @@ class Samples:
 
 
 class Cut:
-    """A distribution in scipy's shape, cut off at two limits."""
+    """A distribution in scipy's shape, truncated at two bounds."""
 
     lower: float
     upper: float
@@ -120,7 +122,7 @@ class Cut:
         return np.clip(self.whole.ppf(below + chance * (above - below)), *self.span)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # what a plug-in made need not be comparable
 class Foreign(Cut):
     """One that a plug-in made."""
 

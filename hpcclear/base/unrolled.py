@@ -1,7 +1,7 @@
 """Short loops written out before they are compiled: ``for k in written_out(ITEMS)`` becomes one copy of its body for each item.
 
 The compiler vectorises neither a loop over coordinates inside a loop over lanes nor a short one of its own (104 ns against
-62 ns for a bank of eight states), and a loop over rates must ask for each whether its effect is on, which is pruned only
+62 ns for a bank of eight states), and a loop over rates must test of each whether its effect is on, which is pruned only
 where it is written out. A decorated function is ordinary Python that does the same, unhurried, without the decorator.
 """
 

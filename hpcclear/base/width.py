@@ -87,14 +87,14 @@ def asked_width() -> int | None:
     asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
     if asked not in ("", *map(str, WIDTHS)):
         raise InputError(
-            "HPCCLEAR_VECTOR_BITS", asked, "is not a width of vectors",
-            "Set it to 256 or 512, or not at all: then the faster one is found",
+            "HPCCLEAR_VECTOR_BITS", asked, "is not a vector width",
+            "Set it to 256 or 512, or leave it unset: the faster one is then measured and used",
         )  # fmt: skip
     return int(asked) if asked else None
 
 
 def features(folder: Path) -> str | None:
-    """The processor's features as Numba is to be told them; None where there is nothing to choose.
+    """The processor's features as they are passed to Numba; None where there is nothing to choose.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import ensembles, laws, scenes, studies
+from hpcclear.cli import cite, ensembles, laws, results, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
@@ -34,8 +34,10 @@ _ROOT_ALONE = (
     scenes.report,
     scenes.reproduce,
     scenes.crate,
+    cite.cite,
     scenes.schema,
     laws.laws,
+    *results.COMMANDS,
 )
 """Commands for which no rank goes into MPI: the others have left when root begins."""
 
@@ -43,6 +45,7 @@ _ON_RANKS = (
     scenes.check,
     ensembles.sample,
     ensembles.map_command,
+    ensembles.bifurcation,
     ensembles.wear,
     ensembles.effects,
     studies.run,
@@ -71,7 +74,7 @@ def _check_words(words: Sequence[str]) -> None:
     """Raise UsageError where a word is no text: it would have to stand in result files, which hold text only."""
     for word in words:
         if not word.isascii() and word != word.encode("utf-8", "replace").decode():
-            raise click.UsageError(f"{word!r} is no text in UTF-8. Choose another name")
+            raise click.UsageError(f"{word!r} is not UTF-8 text. Choose another name")
 
 
 def _refused(error: click.ClickException) -> int:

@@ -1,4 +1,4 @@
-"""The tables of the `accuracy` command, and the advice that follows from them."""
+"""The output of `accuracy`: recommended settings, then a table for each source of error."""
 
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from rich.table import Table
 from hpcclear.accuracy import spending
 from hpcclear.accuracy.integration import MARGIN
 from hpcclear.cli.printing import console, table
+from hpcclear.report import targets
 from hpcclear.report.figures.accuracy import AIM
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
@@ -18,10 +19,15 @@ TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     """Print every panel as a table, the cheapest settings, and where the files are."""
     out = console()
+    for text in targets.sentences(found):
+        out.print(text)
+    out.print()
     out.print(_spending(found))
-    out.print(table("Cheapest way to a standard error of f, steady mean", _cheapest(found)))
+    out.print(
+        table("Cheapest settings for a standard error of f as a steady mean", _cheapest(found))
+    )
     out.print(_integration(found))
-    out.print(table("Cheapest way to an error of f, one revolution", advice(found)))
+    out.print(table("Cheapest integrator for an error of f over one revolution", advice(found)))
     out.print(table("Averaging", _averaging(found)))
     out.print(_surrogates(found))
     out.print(table("Random inputs, at the middle of the design space", _random(found)))
@@ -53,7 +59,7 @@ def _integration(found: xr.Dataset) -> Table:
 
 def _spending(found: xr.Dataset) -> Table:
     """A row a tolerance."""
-    made = _grid("A steady mean: what a tolerance is off by, and its price")
+    made = _grid("Steady mean: bias and run time of each tolerance")
     for name in ("rtol", "bias", "+-", "variance", "ms", "error/formula"):
         made.add_column(name, no_wrap=True, justify="right")
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -62,8 +68,8 @@ def _spending(found: xr.Dataset) -> Table:
         known = holds[k][np.isfinite(holds[k])]
         made.add_row(
             f"{rtol:.0e}",
-            f"{float(found['tolerance_bias'][k]):+.1e}",
-            f"{2.0 * float(found['tolerance_bias_error'][k]):.0e}",
+            _known(found["tolerance_bias"][k], "+.1e"),
+            _known(2.0 * found["tolerance_bias_error"][k], ".0e"),
             f"{float(found['turn_variance'][k]):.1e}",
             f"{1e3 * float(found['tolerance_seconds'][k]):.3g}",
             f"{known.min():.2f} to {known.max():.2f}" if known.size else "",
@@ -71,10 +77,15 @@ def _spending(found: xr.Dataset) -> Table:
     return made
 
 
+def _known(value: xr.DataArray, digits: str) -> str:
+    """A number, a dash where there is none: at the reference."""
+    return format(float(value), digits) if np.isfinite(float(value)) else "–"
+
+
 def _cheapest(found: xr.Dataset) -> list[tuple[str, str]]:
-    wait = f"{spending.COPIES} copies that wait {float(found['spin_up']):.0f} revolutions each"
+    wait = f"the {float(found['spin_up']):.0f} transient revolutions of {spending.COPIES} replicas"
     rows = [(f"{aim:.1%}", cheapest(found, float(aim))) for aim in found["aim"].to_numpy()]
-    return [*rows, ("price", f"of the revolutions averaged, and of {wait}")]
+    return [*rows, ("time", f"averaged revolutions and {wait}")]
 
 
 def cheapest(found: xr.Dataset, aim: float) -> str:
@@ -82,14 +93,14 @@ def cheapest(found: xr.Dataset, aim: float) -> str:
     here = found.sel(aim=aim, method="nearest")
     seconds = float(here["cheapest_seconds"])
     if not np.isfinite(seconds):
-        return "not resolved by so many revolutions"
+        return "not resolved by the measured revolutions"
     spent = int(here["cheapest_revolutions"])
     return f"rtol {float(here['cheapest_tolerance']):.0e}, {spent} revolutions, {seconds:.2g} s"
 
 
 def result(found: xr.Dataset) -> str:
-    """What it comes to, in one line."""
-    return f"f to a standard error of {AIM:.0%} at the least cost: {cheapest(found, AIM)} of a core"
+    """The cheapest settings for one error, in one line."""
+    return f"cheapest settings for a standard error of f of {AIM:.0%}: {cheapest(found, AIM)} of one core"
 
 
 def _grid(title: str) -> Table:
@@ -108,13 +119,13 @@ def advice(found: xr.Dataset) -> list[tuple[str, str]]:
             setting = float(here["setting"][m, r])
             text = f"{here['integrator'].to_numpy()[m]}, {setting:.0e}: {1e3 * price[m, r]:.3g} ms"
         else:
-            text = "not reached on this ladder"
+            text = "not reached by the measured tolerances"
         rows.append((f"{target:.0e}", text))
     return [*rows, ("reference", resolution(found))]
 
 
 def resolution(found: xr.Dataset, quantity: str = "objective") -> str:
-    """What the reference of one quantity can tell apart, in words."""
+    """What the reference of one quantity can distinguish, in words."""
     own = float(found["reference_error"].sel(quantity=quantity))
     least = float(found["error"].sel(quantity=quantity).min())
     if own * MARGIN <= least:
@@ -130,8 +141,8 @@ def _averaging(found: xr.Dataset) -> list[tuple[str, str]]:
             if transient in error["transient"] and averaged in error["averaged"]:
                 value = float(error.sel(transient=transient, averaged=averaged))
                 rows.append((f"{transient} + {averaged} revolutions", f"error of f {value:.1e}"))
-    text = f"{floor:.1e}: scatter of long averages between copies, which no average removes"
-    return [*rows, ("floor", text)]
+    text = f"{floor:.1e}: scatter of long averages between replicas, which no average removes"
+    return [*rows, ("lower bound", text)]
 
 
 def _surrogates(found: xr.Dataset) -> Table:
@@ -159,7 +170,12 @@ def _random(found: xr.Dataset) -> list[tuple[str, str]]:
             rows.append((what, f"mean {mean:.1e}, std. deviation {deviation:.1e}, {seconds:.2g} s"))
     for moment in found["moment"].to_numpy():
         bias, own = (float(found[n].sel(moment=moment)) for n in ("moment_bias", "bias_error"))
-        rows.append((f"bias of the {moment}", f"{bias:+.1e} +- {own:.1e}, surrogate to simulation"))
+        rows.append(
+            (
+                f"bias, {'std. ' * (moment == 'deviation')}{moment}",
+                f"{bias:+.1e} +- {own:.1e}, surrogate against simulation",
+            )
+        )
     text = f"{1e3 * float(found['quadrature_seconds']):.2g} ms, no sampling error"
     return [*rows, ("quadrature", text)]
 

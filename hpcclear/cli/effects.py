@@ -1,4 +1,4 @@
-"""What `effects` prints: by how much each effect changes what is asked, and the cheapest scene within the tolerance."""
+"""The output of `effects`: the change by each effect, and the cheapest scene within the tolerance."""
 
 import json
 from pathlib import Path
@@ -57,14 +57,17 @@ def describe(found: "Finished", scene: Scene, file: Path) -> int:
     for text in statements(content, seconds):
         out.print(fitting(text))
     for name, reason in json.loads(content.attrs["kept"]).items():
-        out.print(f"{name} stays on: {reason}")
+        out.print(f"{name} is kept: {reason}")
     what, _ = objective_of(content)
     rows = [
         ("f", what),
-        ("limits", f"{float(content.attrs['confidence']):.0%}, of averages over the same points"),
+        (
+            "confidence",
+            f"{float(content.attrs['confidence']):.0%} intervals, from averages over the same points",
+        ),
         ("samples", f"{int(content['samples'].sum())}, {_failed(content)} failed"),
     ]
-    out.print(table("Certificate", rows + _load(found)))
+    out.print(table("Effect screening", rows + _load(found)))
     out.print(f"effects  {found.output}")
     out.file.write("\n" + plain(recommendation(content, scene, file, tolerance, seconds)))
     return Exit.DONE
@@ -83,8 +86,8 @@ def _failed(content: xr.Dataset) -> str:
 
 
 def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> Table:
-    """A row a variant: what is off, changes with limits, time, verdict."""
-    what = f"Changes in %, each effect off against all on; tolerance {tolerance}"
+    """A row a variant: what is off, changes with confidence intervals, time, verdict."""
+    what = f"Changes in % with effects disabled, against all enabled; tolerance {tolerance}"
     made = Table(title=what, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     made.add_column("off", overflow="fold")
     kept = [k for k in range(content.sizes["response"]) if _is_told(content, k)]
@@ -115,7 +118,7 @@ def recommendation(
     """The tables of the scene that change, as TOML to paste, with what they save."""
     chosen = int(np.argmax(content["recommended"].to_numpy()))
     if chosen == 0:
-        return f"# Nothing can be left out of {file} within {tolerance}.\n"
+        return f"# No effect of {file} can be neglected within {tolerance}.\n"
     reduced = parse(content.attrs["reduced_scene"], "reduced scene")
     whole = scene.resolved()
     changed = {key: value for key, value in reduced.items() if whole.get(key) != value}

@@ -27,17 +27,21 @@ if TYPE_CHECKING:
 
 
 def _check_kind(
-    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool
-) -> None:
+    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool,
+    thresholds: tuple[str, ...],
+) -> None:  # fmt: skip
     """Raise InputError where options name two kinds of sampling at once."""
     if part is not None and (statistics or fresh):
-        reason = "parts of samples are merged, under the names they were given"
+        reason = "a part of a job array writes its samples for a later merge"
         raise InputError("--part", part, reason, "Drop --statistics and --fresh")
     if statistics and points is not None:
-        reason = "--statistics makes the study's Monte Carlo points on demand"
+        reason = "--statistics generates the study's Monte Carlo points itself"
         raise InputError("--points", str(points), reason, "Drop one of the two")
+    if thresholds and statistics:
+        reason = "--statistics keeps a histogram and no samples"
+        raise InputError("--beyond", ", ".join(thresholds), reason, "Drop one of the two")
     if raw is not None and not statistics:
-        reason = "without --statistics the samples are what is written"
+        reason = "without --statistics the samples are written anyway"
         raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
 
 
@@ -59,11 +63,19 @@ def _check_kind(
     metavar="K/N",
     help="Simulate part K of N, for a job array. Each part has its own file; merge joins them.",
 )
+@click.option(
+    "--beyond",
+    "thresholds",
+    multiple=True,
+    metavar="[RESULT=]VALUE",
+    help='Print the share of samples above this value of f, or of a result: "peak_contact_force=3 kN". Repeatable.',
+)
 @with_how
 def sample(
     written: Written,
     output: Path,
     points: Path | None,
+    thresholds: tuple[str, ...],
     statistics: bool,
     raw: Path | None,
     part: str | None,
@@ -75,14 +87,16 @@ def sample(
     """
 
     def program(ranks: "Ranks") -> None:
-        _check_kind(points, statistics, raw, part, how.fresh)
+        _check_kind(points, statistics, raw, part, how.fresh, thresholds)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
+        from hpcclear.report.spread import beyond, units_of
 
         chosen = None if part is None else Part.parse(part)
         scene, place = written.scene(), place_of(output)
+        limits = [beyond(units_of(scene.objective), words) for words in thresholds]
         if statistics:
             kept = None if raw is None else place_of(raw)
             describe_statistics(
@@ -92,7 +106,7 @@ def sample(
             found = run_sample(
                 scene, place, ranks, table=points, part=chosen, options=how.options()
             )
-            describe_samples(found)
+            describe_samples(found, limits)
 
     return on_ranks(program, how.time_limit)
 
@@ -146,6 +160,77 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
 
         axes = (x,) if y is None else (x, y)
         describe_map(run_map(written.scene(), axes, place_of(output), ranks, how.options()))
+
+    return on_ranks(program, how.time_limit)
+
+
+@click.command(short_help="Observe each revolution over a range of one parameter.")
+@with_scene
+@output_option("NetCDF file to write.")
+@click.option(
+    "--x",
+    "x",
+    required=True,
+    metavar="PATH=LO:HI:N",
+    help="Parameter: scene entry, bounds, number of values.",
+)
+@click.option(
+    "--observe",
+    "name",
+    default="objective",
+    show_default=True,
+    metavar="SERIES",
+    help='Series of a response, such as "contact_force o2", at the section; with max, min or mean before it, of a revolution.',
+)
+@click.option(
+    "--section",
+    default="0 deg",
+    show_default=True,
+    metavar="ANGLE",
+    help="Crank angle at which the series is taken, in rad or with a unit.",
+)
+@click.option(
+    "--transient",
+    type=click.IntRange(min=0),
+    default=60,
+    show_default=True,
+    help="Revolutions before the first one that is observed.",
+)
+@click.option(
+    "--revolutions",
+    type=click.IntRange(min=1),
+    default=60,
+    show_default=True,
+    help="Revolutions that are observed.",
+)
+@with_how
+def bifurcation(
+    written: Written,
+    output: Path,
+    x: str,
+    name: str,
+    section: str,
+    transient: int,
+    revolutions: int,
+    how: How,
+) -> int:
+    """Observe one value of each revolution over a range of an entry of the scene, for a bifurcation figure.
+
+    Where the motion repeats every n revolutions, a value has n dots. Draw it with hpcclear plot.
+
+    Example: mpiexec -n 2 hpcclear bifurcation jobs/hunt_crossley.toml --x drive.speed="500 rpm:6000 rpm:12" -o results/b.nc
+    """
+
+    def program(ranks: "Ranks") -> None:
+        from hpcclear.cli.printing import describe_bifurcation
+        from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
+        from hpcclear.ensemble.maps import number_of
+
+        angle = number_of("--section", section, "rad")
+        seen = Observation(name, angle, transient, revolutions)
+        describe_bifurcation(
+            run_bifurcation(written.scene(), x, place_of(output), ranks, seen, how.options())
+        )
 
     return on_ranks(program, how.time_limit)
 

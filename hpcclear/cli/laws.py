@@ -1,4 +1,4 @@
-"""The command `laws`: what laws of contact and friction there are, with their parameters and sources."""
+"""The command `laws`: what laws, objectives and other plug-ins there are, with their parameters and sources."""
 
 from typing import Any
 
@@ -7,30 +7,72 @@ import click
 from hpcclear.cli.options import of_one_process, show
 from hpcclear.ranks.stopping import Exit
 
-_TITLES = {"contact": "normal force", "friction": "friction"}
+_TITLES = {
+    "contact": "effects.contact.law (normal force)",
+    "geometry": "effects.contact.geometry (shapes that touch; left out, spheres)",
+    "friction": "effects.friction.law (friction)",
+}
 
 
-@click.command(short_help="List laws of contact and friction, with their sources.")
+@click.command(short_help="List laws, objectives and other plug-ins, with their sources.")
 @of_one_process
 def laws() -> int:
-    """List the laws that a scene may name in effects.contact.law and effects.friction.law.
+    """List what a scene may name: laws of contact and friction, geometries, objectives, distributions, surrogates and searches.
 
-    Each with its formula, parameters, units, bounds, range and source. A law of your own: docs/extending.md.
+    Laws with formula, parameters, units, bounds, range and source. Those of installed packages are among them.
+    One of your own: docs/extending.md.
 
     Example: hpcclear laws
     """
+    from hpcclear import plugins
     from hpcclear.cli.printing import console, table
     from hpcclear.scene.laws import known_laws
 
+    registries = {"contact": plugins.CONTACT_LAWS, "friction": plugins.FRICTION_LAWS}
     for kind, title in _TITLES.items():
-        show(f"effects.{kind}.law ({title})")
+        show(title)
+        offered = () if kind == "geometry" else registries[kind].names()
         for name, law in known_laws(kind).items():
-            console().print(table(name, list(_rows(law))))
+            origin = registries[kind].origin(name) if name in offered else ""
+            console().print(table(name, list(_rows(law, origin))))
+    for place, others in _OTHERS.items():
+        _list(place, getattr(plugins, others))
     return Exit.DONE
 
 
-def _rows(law: Any) -> list[tuple[str, str]]:
+_OTHERS = {
+    "study.objective": "OBJECTIVES",
+    "study.random.*.distribution": "DISTRIBUTIONS",
+    "study.surrogate.model": "SURROGATES",
+    "study.swarm.algorithm": "SEARCHES",
+}
+"""Registries by the entries that name what is in them."""
+
+
+def _list(place: str, registry: Any) -> None:
+    """Print the names of a registry; of objectives and of what packages offer, what they are."""
+    from hpcclear.cli.printing import console, table
+
+    names, ours = registry.names(), registry.ours()
+    show(f"{place} ({registry.kind}): {', '.join(names)}")
+    told = names if place == "study.objective" else names[len(ours) :]
+    rows = [(name, "; ".join(filter(None, _told(registry, name)))) for name in told]
+    if rows:
+        console().print(table(f"{registry.kind}s", rows))
+
+
+def _told(registry: Any, name: str) -> tuple[str, ...]:
+    """What a plug-in is, and the package that it comes from."""
+    one = registry.get(name)
+    origin = registry.origin(name)
+    if hasattr(one, "words"):
+        return one.words, one.unit, one.source, origin
+    return (*(one.__doc__ or "").strip().splitlines()[:1], origin)
+
+
+def _rows(law: Any, origin: str) -> list[tuple[str, str]]:
     texts = {"what": law.words, "formula": law.formula, "valid": law.valid, "source": law.source}
+    texts["package"] = origin
     rows = [(label, text) for label, text in texts.items() if text]
     for one in law.parameters:
         unit = f" in {one.unit}" if one.unit else ""

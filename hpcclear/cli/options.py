@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -39,9 +40,10 @@ def _netcdf_name(context: click.Context, option: click.Parameter, path: Path | N
     """Raise BadParameter where a name promises another format than the one that is written."""
     if path is not None and path.suffix.lower() not in ENDINGS:
         other = path.with_suffix(".nc")
+        table = path if path.suffix in (".csv", ".xlsx", ".mat", ".parquet") else "TABLE.csv"
         raise click.BadParameter(
-            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Name it {str(other)!r}; "
-            f"in Python xarray.open_dataset({str(other)!r}).to_dataframe() makes a table of it"
+            f"{str(path)!r}: results are written as NetCDF, not as {path.suffix}. Write {str(other)!r}. "
+            f"For a table, then: hpcclear export {other} -o {table}"
         )
     return path
 
@@ -76,6 +78,7 @@ class Amount(click.FloatRange):
         return number
 
 
+TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
 FRESH = flag("--fresh", "Start a new run beside earlier results; nothing is overwritten.")
 LIMIT = click.option(
     "--time-limit",
@@ -173,7 +176,7 @@ def place_of(output: Path) -> Path:
 def check_free(path: Path) -> None:
     """Raise InputError if something is there: what a user wrote is not written over."""
     if path.exists():
-        raise InputError("file", str(path), "is there already", "Choose another name")
+        raise InputError("file", str(path), "exists already", "Choose another name")
 
 
 def is_root() -> bool:
@@ -217,6 +220,20 @@ def on_ranks(
             return program(ranks)
 
     return run_on_ranks(noted, stop, ahead, resumes=resumes)
+
+
+def without_pint() -> None:
+    """Have xarray take no value for one of pint's, in this process: it imports pint to find out, a fifth of a start.
+
+    Values of result files are plain numbers. Where a version of xarray has other names, pint is loaded.
+    """
+    from xarray.namedarray import pycompat
+
+    known = getattr(pycompat, "_cached_duck_array_modules", {})
+    kind = getattr(pycompat, "DuckArrayModule", None)
+    if kind is not None and "pint" not in sys.modules:
+        absent = known["pint"] = object.__new__(kind)
+        absent.module, absent.version, absent.type, absent.available = None, None, (), False
 
 
 def show(text: str) -> None:

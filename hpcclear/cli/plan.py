@@ -1,4 +1,4 @@
-"""What the `plan` command prints: the ladder of errors, and the job to ask for."""
+"""The output of `plan`: cost of several errors, and the job to request."""
 
 import math
 
@@ -6,11 +6,11 @@ from rich import box
 from rich.table import Table
 
 from hpcclear.accuracy.plan import Plan, Row
-from hpcclear.cli.printing import console, table
+from hpcclear.cli.printing import console, counted, table
 from hpcclear.ranks.progress import duration
 
 RESERVE = 1.5
-"""Wall time asked for over wall time expected."""
+"""Requested wall time over expected wall time."""
 
 
 def preview(plan: Plan, ranks: int) -> str:
@@ -18,24 +18,30 @@ def preview(plan: Plan, ranks: int) -> str:
     row = plan.rows[-1]
     simulations = plan.simulations
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
+    name = f"first look, {name}" if plan.first else name
     return (
-        f"{name}: {1e3 * row.seconds:.3g} ms a sample, {simulations} simulations take "
-        f"{duration(plan.wall_seconds(row, simulations, ranks))} on {ranks} ranks"
+        f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take "
+        f"{duration(plan.wall_seconds(row, simulations, ranks))} on {counted(ranks)}"
     )
 
 
 def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
-    """Print the ladder, what the row asked for needs, and the Slurm lines to paste."""
+    """Print the costs of several errors, the resources of the requested one, and the Slurm lines to paste."""
     out = console()
     row = next((row for row in plan.rows if row.error == error), plan.rows[0])
     simulations = plan.simulations
     command = "sample" if plan.study is None else "run"
     made = Table(
-        title=f"{command}: {simulations} simulations on {ranks} ranks", title_justify="left",
+        title=f"{command}: {simulations} simulations on {counted(ranks)}", title_justify="left",
         box=box.SIMPLE_HEAD, pad_edge=False,
     )  # fmt: skip
     for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
-        made.add_column(name, no_wrap=True, justify="right" if name != "settings" else "left")
+        made.add_column(
+            name,
+            no_wrap=name != "settings",
+            overflow="fold",
+            justify="right" if name != "settings" else "left",
+        )
     for one in plan.rows:
         total = plan.core_seconds(one, simulations, ranks)
         made.add_row(
@@ -61,10 +67,10 @@ def _needs(
     rows = [
         ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.4g}"),
         ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
-        ("start-up", f"{plan.startup:.1f} s a rank, and once a node up to a minute to compile"),
+        ("start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"),
         (
             "memory",
-            f"{plan.memory / 2**20:.0f} MB a rank, {simulations * 1e-6:.2g} GB more on rank 0",
+            f"{plan.memory / 2**20:.0f} MB per rank, {simulations * 1e-6:.2g} GB more on rank 0",
         ),
         ("disk", f"{plan.disk(simulations) / 2**20:.3g} MB"),
     ]
@@ -72,11 +78,11 @@ def _needs(
         rows.append(("reached", row.reached))
     if command == "run":
         text = (
-            f"and {plan.responses} single responses; refused surrogates and tight constraints need more; "
-            "single responses, fits and swarm run on one core"
+            f"and {plan.responses} single responses; rejected surrogates and tight constraints need more. "
+            "Single responses, fits and search run on one core"
         )
         rows.append(("simulations", f"{simulations}, {text}"))
-        rows.append(("sample alone", f"{plan.samples} simulations"))
+        rows.append(("hpcclear sample", f"{plan.samples} simulations"))
     return rows
 
 
@@ -90,5 +96,5 @@ def slurm(plan: Plan, row: Row, simulations: int, ranks: int) -> list[str]:
         "#SBATCH --cpus-per-task=1",
         f"#SBATCH --mem-per-cpu={memory}M",
         f"#SBATCH --time={minutes // 60:02d}:{minutes % 60:02d}:00",
-        "#SBATCH --signal=USR1@60  # saves in time; the same command goes on",
+        "#SBATCH --signal=USR1@60  # saves before the limit; the same command resumes",
     ]

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,9 @@ from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
 from hpcclear.dynamics.steady.telling import in_a_line
 from hpcclear.ranks.progress import duration
-from hpcclear.report.answer import answer, beside_original
+from hpcclear.report import spread
+from hpcclear.report.answer import answer
+from hpcclear.report.beside import beside_original
 from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
@@ -143,20 +146,16 @@ def _speeds(scene: Scene) -> list[tuple[str, str]]:
 
 def _assembly(scene: Scene) -> list[tuple[str, str]]:
     """How a linkage was put together, a row a body; refuses one that does not close."""
-    if not scene.is_planar:
-        return []
-    from hpcclear.dynamics.planar.problem import linkage_of, put_together, tables_of
+    from hpcclear.dynamics.planar.problem import linkage_of, put_together
     from hpcclear.dynamics.planar.tables import mechanism_of
 
     linkage_of(scene)
-    lines = put_together(mechanism_of(tables_of(scene))).report()
+    lines = put_together(mechanism_of(scene.linkage)).report()
     return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
 
 
 def _locked(scene: Scene) -> list[str]:
     """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
-    if not scene.is_planar:
-        return []
     from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
 
     told = refused_of(scene)
@@ -211,6 +210,10 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
             rows.append(
                 (f"{row.name} random", text + ("" if row.absolute else " about the design"))
             )
+    if any(case.kept for case in study.cases):
+        from hpcclear.study import verdicts
+
+        rows += [("constraint", text) for text in verdicts.costs(study, scene.objective.unit)]
     for row in study.worn:
         from hpcclear.study import lives
 
@@ -254,6 +257,11 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     return rows
 
 
+def counted(ranks: int) -> str:
+    """A number of ranks in words."""
+    return f"{ranks} rank{'' if ranks == 1 else 's'}"
+
+
 def _all(count: int, each: float) -> str:
     """Number of samples and their time on one core; `each`: s."""
     return f"{count} samples, {duration(count * each)} of one core"
@@ -287,7 +295,15 @@ def describe_statistics(found: "Finished") -> None:
 
 def describe_study(place: Path) -> None:
     """Print the ends of its fronts beside the baseline, the answer of a finished study, its run time, and its files."""
-    kinds = ("samples", "sensitivity", "kriging", "verification", "chaos", "timing")
+    kinds = (
+        "samples",
+        "sensitivity",
+        "kriging",
+        "verification",
+        "contributions",
+        "chaos",
+        "timing",
+    )
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
@@ -309,13 +325,16 @@ def describe_study(place: Path) -> None:
     spent = np.sum(
         [timing[name].sum("stage") for name in ("busy", "idle", "compile", "write")], axis=0
     )
-    lines.append(("run time", f"{duration(float(spent.max()))} on {timing.sizes['rank']} ranks"))
+    lines.append(("run time", f"{duration(float(spent.max()))} on {counted(timing.sizes['rank'])}"))
     out.print(table("Result", lines))
     out.print(f"designs  {place / 'verification.nc'}", soft_wrap=True)
 
 
-def describe_samples(found: "Finished") -> None:
-    """Print throughput, range of f, failures and load of a batch of samples."""
+def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()) -> None:
+    """Print throughput, range and statistics of f, failures, warnings and load of a batch of samples.
+
+    `thresholds`: values whose exceedance is printed.
+    """
     out, samples = console(), found.content
     f = samples["objective"].to_numpy()
     status = samples["status"].to_numpy()
@@ -328,43 +347,41 @@ def describe_samples(found: "Finished") -> None:
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
         rows += [("f", words), ("", f"{low} to {high}, median {middle}")]
         rows.append(("half-width of f", _half_widths(samples)))
-        spread = samples["objective_spread"].to_numpy()[status == Status.OK] / good
-    if len(good) and np.isfinite(spread).any():
+        in_time = samples["objective_spread"].to_numpy()[status == Status.OK] / good
+    if len(good) and np.isfinite(in_time).any():
         rows.append(
             (
                 "cycle-to-cycle std. dev.",
-                f"median {np.median(spread):.1e}, largest {spread.max():.1e} of f",
+                f"median {np.median(in_time):.1e}, largest {in_time.max():.1e} of f",
             )
         )
     if "target_error_reached" in samples.attrs:
         rows.append(("target error", str(samples.attrs["target_error_reached"])))
-    latched = int((samples["latched"].to_numpy().any(axis=1)).sum())
-    rows.append(
-        (
-            "no lift-off",
-            f"{latched} samples in which a joint stayed in contact for a whole revolution",
-        )
-    )
     busy = found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
-        throughput = f"{len(f) / busy.sum():.0f} samples a second and core"
+        throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
         if evaluations:  # without play there is nothing to integrate
-            throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns a force evaluation"
+            throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns per force evaluation"
         rows.append(("throughput", throughput))
     out.print(table("Samples", rows + _load(found)))
+    if lines := spread.statistics(samples, thresholds):
+        rows = [(line.label, fitting(line.text)) for line in lines]
+        out.print(table("Statistics, with 95 % confidence intervals", rows))
+    for text in spread.remarks(samples):
+        out.print(remark("Warning", text))
     for what, path in (("samples", found.output), ("timing", found.timing)):
         if path.exists():  # what was merged has its times beside the parts
             out.print(f"{what:8} {path}")
 
 
 def _half_widths(samples: xr.Dataset) -> str:
-    """Median and largest half-width of f over f, or that there is none."""
+    """Median and largest half-width of f over f, or "not checked"."""
     name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
     good = (samples["status"] == Status.OK).to_numpy()
     shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
     if not np.isfinite(shares).any():
-        return f"{labels.NOT_CHECKED} (numerics.uncertainty = true gives every sample one)"
+        return f"{labels.NOT_CHECKED} (numerics.target_error gives every sample one)"
     return f"median {np.nanmedian(shares):.1e}, largest {np.nanmax(shares):.1e} of f"
 
 
@@ -378,11 +395,27 @@ def describe_map(found: "Finished") -> None:
         if count and regime is not Regime.UNJUDGED:
             rows.append((regime.name.lower(), f"{count} {regime.meaning.partition(': ')[2]}"))
     periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
-    told = [f"{n} of {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
-    rows.append(("periods", ", ".join(told) or "none found"))
+    told = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
+    rows.append(("period, revolutions", ", ".join(told) or "none found"))
     growth = content["kick_growth"].to_numpy()[good]
     if len(growth):
-        text = f"{growth.min():.3g} to {growth.max():.3g} a revolution"
+        text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"
         rows.append(("largest Lyapunov exponent", text))
     out.print(table("Map", rows + _load(found)))
     out.print(f"map      {found.output}")
+
+
+def describe_bifurcation(found: "Finished") -> None:
+    """Print what was observed, its range, failures and load."""
+    out, seen = console(), found.content["observed"]
+    failed = int(seen.isnull().all("crossing").sum())
+    rows = [
+        ("values", f"{seen.sizes['value'] - failed} of {seen.sizes['value']} without failure"),
+        ("observed", f"{seen.attrs['long_name']}, {seen.sizes['crossing']} revolutions each"),
+    ]
+    if failed < seen.sizes["value"]:
+        unit = str(seen.attrs["units"])
+        low, high = (quantity(float(end), unit) for end in (seen.min(), seen.max()))
+        rows.append(("range", f"{low} to {high}"))
+    out.print(table("Bifurcation", rows + _load(found)))
+    out.print(f"written  {found.output}")

@@ -44,12 +44,12 @@ def _bearing_table(found: list[bearings.Bearing]) -> Table:
         title="Bearings, over the averaged revolutions", title_justify="left", box=box.SIMPLE_HEAD,
         pad_edge=False,
     )  # fmt: skip
-    pressed = any(np.isfinite(one.pressure) for one in found)
+    pressed = bearings.pressures(found)[-1:]  # one: eighty columns hold no more
     made.add_column("joint", overflow="fold")
     for header in ("peak force", "at crank angle", "mean force", "contact", "mean gap"):
         made.add_column(header, justify="right")
-    if pressed:
-        made.add_column("mean pressure", justify="right")
+    for header, _ in pressed:
+        made.add_column(header, justify="right")
     for one in found:
         row = [
             one.joint,
@@ -58,9 +58,9 @@ def _bearing_table(found: list[bearings.Bearing]) -> Table:
             quantity(one.mean, "N"),
             bearings.share(one.contact),
             quantity(one.gap, "m"),
-            quantity(one.pressure, "Pa", 3),
+            *(shown(one) for _, shown in pressed),
         ]
-        made.add_row(*(fitting(cell) for cell in (row if pressed else row[:-1])))
+        made.add_row(*map(fitting, row))
     return made
 
 

@@ -8,6 +8,7 @@ import click
 
 from hpcclear.cli.options import (
     PATH,
+    TRUST,
     Written,
     check_free,
     flag,
@@ -18,6 +19,7 @@ from hpcclear.cli.options import (
     say,
     show,
     with_scene,
+    without_pint,
 )
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
@@ -26,8 +28,6 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
-TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; read it first.")
-
 
 @click.command(short_help="Write a starter scene.")
 @click.argument("file", type=PATH)
@@ -35,11 +35,12 @@ TRUST = flag("--trust", "Run Python source of plug-ins that the results carry; r
     "--four-stroke",
     "A gas force against two turns of the crank, in an engine written as a linkage.",
 )
+@flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @of_one_process
-def init(file: Path, four_stroke: bool) -> int:
+def init(file: Path, four_stroke: bool, jobs: bool) -> int:
     """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
-    An existing file is never overwritten.
+    With --jobs, write the scenes and scripts that the documentation names, as a directory. Nothing is overwritten.
 
     Example: hpcclear init engine.toml --four-stroke
     """
@@ -48,12 +49,33 @@ def init(file: Path, four_stroke: bool) -> int:
     from hpcclear.results import files
 
     check_free(file)
+    if jobs:
+        _copy_jobs(file)
+        return Exit.DONE
     files.probe(place_of(file))
     name = "four_stroke.toml" if four_stroke else "starter.toml"
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
     show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
     return Exit.DONE
+
+
+def _copy_jobs(place: Path) -> None:
+    """Write the example scenes and the scripts that need no clone to a new directory."""
+    from importlib import resources
+
+    from hpcclear.results import files
+
+    with resources.as_file(resources.files(__package__).joinpath("jobs")) as source:
+        kinds = ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+        found = sorted(path for kind in kinds for path in source.glob(kind))
+        for path in found:
+            target = place / path.relative_to(source)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            files.write_bytes(target, path.read_bytes())
+    show(
+        f"written  {len(found)} files in {place}\nnext     hpcclear check {place / 'quickstart.toml'}"
+    )
 
 
 @click.command("import", short_help="Write a linkage from a table of its points.")
@@ -131,13 +153,10 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
 
 def _draw(scene: "Scene", sketch: Path) -> None:
     """Draw the mechanism to a file and print where it is."""
+    from hpcclear.dynamics.planar.problem import poses_at_start
     from hpcclear.report import save, sketch_figure
 
-    poses = None
-    if scene.is_planar:
-        from hpcclear.dynamics.planar.problem import poses_at_start
-
-        poses = poses_at_start(scene)
+    poses = poses_at_start(scene, 0.0 if scene.template is None else scene.template.DRAWN_AT)
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
@@ -160,6 +179,7 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
 
+    without_pint()
     scene = written.scene()
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
@@ -181,11 +201,14 @@ def simulate(written: Written, output: Path) -> int:
 
 
 @click.command(short_help="Write figures and an HTML page.")
-@click.argument("directory", type=PATH)
+@click.argument("places", type=PATH, nargs=-1, required=True, metavar="DIRECTORY | FILE...")
+@click.option(
+    "-o", "--output", type=PATH, help="Page to write. Default: report.html beside the results."
+)
 @TRUST
 @of_one_process
-def report(directory: Path, trust: bool) -> int:
-    """Write figures and a self-contained HTML page from a directory of results.
+def report(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
+    """Write figures and a self-contained HTML page from a directory of results, or from chosen files.
 
     Example: hpcclear report results/quickstart
     """
@@ -193,7 +216,7 @@ def report(directory: Path, trust: bool) -> int:
     from hpcclear.report.html.page import write_report
 
     with trusting(trust):
-        show(f"report  {write_report(directory)}")
+        show(f"report  {write_report(*places, output=output and place_of(output))}")
     return Exit.DONE
 
 

@@ -1,4 +1,4 @@
-"""What `wear` prints: how long lives last, what they come to, and what decides it."""
+"""The output of `wear`: service lives, final clearances, and their main cause."""
 
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from hpcclear.cli.printing import _load, console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
-from hpcclear.statistics.random.survival import quantiles
+from hpcclear.statistics.random.survival import order_limits, quantiles
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -25,24 +25,24 @@ def describe(found: "Finished") -> int:
     out, content = console(), found.content
     codes = content["ending"].to_numpy()
     good = np.isin(codes, [int(status) for status in Status if status.valid])
-    rows = [("lives", f"{int(good.sum())} of {len(good)} without failure")]
+    rows = [("service lives", f"{int(good.sum())} of {len(good)} without failure")]
     for status in Status:
         count = int((codes == status).sum())
         if count and not status.valid:
             rows.append((status.name.lower(), f"{count}: {status.message}. {status.remedy}"))
     rows += [("ended", text) for text in _endings(content)]
-    rows += [("unsure", text) for text in doubts(content)]
+    rows += [("warning", text) for text in doubts(content)]
     rows += [*_ends(content), *_lifetimes(content), *_profiles(content), *_causes(content)]
     out.print(table("Wear", rows + _load(found)))
-    out.print(f"wear     {found.output}")
+    out.print(f"written  {found.output}")
     if good.any() or np.isfinite(content["lifetime"]).any():
         return Exit.DONE
-    say("Error: every life failed")
+    say("Error: every service life failed")
     return Exit.FAILED
 
 
 REASONS = {
-    "cycles": "after wear.cycles, with no limit passed",
+    "cycles": "after wear.cycles, no limit reached",
     "clearance": "at wear.limit.clearance",
     "peak_contact_force": "at wear.limit.peak_contact_force",
     "objective": "at wear.limit.objective",
@@ -64,7 +64,7 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
     for k, name in enumerate(content["joint"].to_numpy()):
         new = float(np.nanmedian(content["clearance"].isel(cycle=0).sel(joint=name)))
         low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
-        text = f"{quantity(new, 'm')} new; at the end {middle}"
+        text = f"initial {quantity(new, 'm')}, final {middle}"
         rows.append(
             (f"clearance {name}", text + (f" (5 to 95 %: {low} to {high})" if low != high else ""))
         )
@@ -72,12 +72,20 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
-    """Median and nine tenths of a quantile over lives."""
-    told = []
-    for level in (0.05, 0.5, 0.95):
-        value = float(content[name].sel(quantile=level))
-        told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {beyond:.4g}")
-    return f"{told[1]} (5 to 95 %: {told[0]} to {told[2]})"
+    """Median and nine tenths of lives, each with its confidence interval; lives that failed may be of any length."""
+    lives = content[name].to_numpy()
+    known = lives[~np.isnan(lives)]
+
+    def one(value: float) -> str:
+        return f"{value:.4g}" if value < np.inf else f"beyond {beyond:.4g}"
+
+    shown = []
+    for level in (0.5, 0.05, 0.95):
+        low, high = order_limits(known, level, len(lives) - len(known))
+        ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
+        value = one(float(content[f"{name}_quantile"].sel(quantile=level)))
+        shown.append(f"{value} (95 % CI {ends[0]} to {ends[1]})")
+    return f"{shown[0]}; 5th percentile {shown[1]}; 95th percentile {shown[2]}"
 
 
 def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
@@ -86,17 +94,25 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
     each = content["revolution_time"].to_numpy() / HOUR
     followed = content["ended"].to_numpy()
     rows = [
-        ("followed", f"{followed.max():.4g} revolutions, {(followed * each).max():.4g} h, at most")
+        ("simulated", f"at most {followed.max():.4g} revolutions, {(followed * each).max():.4g} h")
     ]
     given = [name for name in content.attrs if name.startswith("limit_")]
     if not given:
-        return [*rows, ("life", "no limit was given (wear.limit)")]
+        return [*rows, ("service life", "no limit given (wear.limit)")]
     rows += [
-        ("life, revolutions", _spread(content, "lifetime_quantile", cycles)),
-        ("life, hours", _spread(content, "lifetime_hours_quantile", float((cycles * each).min()))),
+        ("life in revolutions", _spread(content, "lifetime", cycles)),
+        (
+            "life in hours",
+            _spread(content, "lifetime_hours", float((cycles * each).min())),
+        ),
     ]
     limits = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
-    rows.append((f"survive {cycles:.4g}", f"{float(last['survival']):.3g} of the runs ({limits})"))
+    rows.append(
+        (
+            f"survival at {cycles:.4g}",
+            f"{float(last['survival']):.3g} of the service lives ({limits})",
+        )
+    )
     if "exceedance" in content:
         for name in content["joint"].to_numpy():
             one = last.sel(joint=name)
@@ -115,7 +131,7 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
         largest = quantity(float(np.nanmedian(content["end_clearance"][:, k])), "m")
         even = content["even_clearance"].isel(cycle=-1).sel(joint=name).to_numpy()
         beside = (
-            f"; {quantity(float(np.median(even)), 'm')} worn evenly"
+            f"; {quantity(float(np.median(even)), 'm')} with uniform wear"
             if np.isfinite(even).all()
             else ""
         )
@@ -125,7 +141,7 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
         for name in ("lifetime_quantile", "even_lifetime_quantile"):
             value = float(content[name].sel(quantile=0.5))
             told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
-        rows.append(("median life", f"{told[0]}; {told[1]} worn evenly"))
+        rows.append(("median life", f"{told[0]}; {told[1]} with uniform wear"))
     return rows
 
 
@@ -136,7 +152,7 @@ def _causes(content: xr.Dataset) -> list[tuple[str, str]]:
         share = content["rank_correlation"].sel(joint=name).to_numpy() ** 2
         if len(share) and np.isfinite(share).any():
             k = int(np.nanargmax(share))
-            word = "dominates" if share[k] >= DOMINATES else "leads"
-            text = f"{content['random_input'].to_numpy()[k]} {word}: {share[k]:.0%} of the variance of ranks"
+            word = "dominant" if share[k] >= DOMINATES else "largest"
+            text = f"{content['random_input'].to_numpy()[k]} ({word} input): {share[k]:.0%} of the variance of ranks"
             rows.append((f"scatter of {name}", text))
     return rows

@@ -33,6 +33,6 @@ def check_room(scene: Scene, others: int) -> None:
     if scene.bristles and count > at.MAX_COORDINATES:
         raise InputError(
             "effects.friction.law", scene.effects.friction.law,
-            f"takes a coordinate for each joint with clearance: {count} in all, and there is room for {at.MAX_COORDINATES}",
-            'Take law = "coulomb", or make some of the joints ideal',
+            f"needs a coordinate for each joint with clearance: {count} in all, of {at.MAX_COORDINATES} at most",
+            'Write law = "coulomb", or make some of the joints ideal',
         )  # fmt: skip

@@ -1,5 +1,7 @@
 """Points to records, here and now or as a stream: by the evaluator that the scene calls for."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hpcclear.base.arrays import Records
@@ -11,18 +13,21 @@ from hpcclear.scene.points import Points
 
 
 def evaluator_of(
-    scene: Scene, columns: Points, lanes: int = DEFAULT_LANES
+    scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, kicks: Sequence[int] = ()
 ) -> Evaluator | SteadyEvaluator:
     """The steady mean to a named error, or the stretch of revolutions that the scene names; arguments and errors are those of
     either.
     """
-    steady = scene.numerics.target_error is not None and scene.clearance_joints()
-    return (SteadyEvaluator if steady else Evaluator)(scene, columns, lanes)
+    if scene.numerics.target_error is not None and scene.clearance_joints():
+        return SteadyEvaluator(scene, columns, lanes)
+    return Evaluator(scene, columns, lanes, kicks)
 
 
-def evaluate_records(scene: Scene, points: Points, lanes: int = DEFAULT_LANES) -> Records:
-    """Simulate all points here and now; records in the points' order (n,)."""
-    evaluator = evaluator_of(scene, points, lanes)
+def evaluate_records(
+    scene: Scene, points: Points, lanes: int = DEFAULT_LANES, kicks: Sequence[int] = ()
+) -> Records:
+    """Simulate all points here and now, by replicas beside them (`Evaluator`) if asked; records in the points' order (n,)."""
+    evaluator = evaluator_of(scene, points, lanes, kicks)
     evaluator.submit(np.arange(len(points)), points.values)
     done = []
     while evaluator.pending:

@@ -9,13 +9,13 @@ from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
-from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.closed_form import ClosedForm
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -63,7 +63,7 @@ KICK = 1e-10
 """Relative size of the kicks to the start of a sample's copies."""
 
 KICKS = (0, 1, -1)
-"""Signs of the kicks to a sample's copies, which run beside it when its uncertainty is asked for."""
+"""Signs of the kicks to copies of a response at a tight tolerance."""
 
 KICKS_ALONE = (*KICKS, 10, -10, 100, -100, 1000, -1000)
 """Perturbations of the replicas of a single response, which take lanes that would stay empty. With the larger ones chaotic
@@ -107,7 +107,7 @@ class Evaluator:
         Samples in lockstep.
     kicks : sequence of int, optional
         Perturbations, in units of `KICK`, of replicas of tighter tolerance that run beside each sample and give its objective a
-        half-width; by default `KICKS` with ``numerics.uncertainty``, else none.
+        half-width, as `alone` gives those of a single response; none by default.
     objective : Objective
         Of which that half-width is.
     recorder : Lanes, optional
@@ -124,23 +124,23 @@ class Evaluator:
         scene: Scene,
         columns: Points,
         lanes: int = DEFAULT_LANES,
-        kicks: Sequence[int] | None = None,
+        kicks: Sequence[int] = (),
         objective: Objective = MEAN_GAP,
         recorder: Lanes | None = None,
     ) -> None:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
-        if kicks is None:
-            kicks = KICKS if scene.numerics.uncertainty else ()
         self._kicks = tuple(kicks)
         self._copies = 1 + len(self._kicks)
         self._objective = objective
         problem = problem_of(scene)
         if recorder is not None:
-            self._lanes: Lanes | ClosedForm = recorder
+            self._lanes: Lanes | PrescribedSamples = recorder
         else:
-            self._lanes = Lanes(problem, lanes) if problem.coordinates else ClosedForm(problem)
+            self._lanes = (
+                Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
+            )
         self._problem = problem
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._partial: dict[int, Records] = {}
@@ -174,7 +174,9 @@ class Evaluator:
         labels, outcome, par = self._lanes.collect()
         effects = self._problem.effects
         told = responses_told(self._problem)
-        records = outcome_records(labels, outcome, par, told, bool(effects.wear))
+        records = outcome_records(
+            labels, outcome, par, told, bool(effects.wear), self.scene.objective
+        )
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
             off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)
@@ -191,10 +193,7 @@ class Evaluator:
             group[copy] = record
             group["flags"][copy] |= _ARRIVED
             if (group["flags"] & _ARRIVED).all():
-                one = joined(sample, self._partial.pop(sample), self._objective)
-                if not self.scene.numerics.uncertainty:  # checked, but the same record otherwise
-                    one["rhs_evaluations"] = group["rhs_evaluations"][0]
-                done.append(one)
+                done.append(joined(sample, self._partial.pop(sample), self._objective))
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 
@@ -203,7 +202,7 @@ def responses_told(problem: Problem) -> tuple[str, ...]:
     if not problem.effects.responses:
         return ()
     linkage = problem.linkage
-    if linkage is None or (linkage.follow and not linkage.follows_a_point):
+    if linkage.follow and not linkage.follows_a_point:
         return tuple(name for name in RESPONSES if "point" not in name)
     followed = "point" if linkage.follows_a_point else "nothing"
     return tuple(name for name in RESPONSES if followed in name or "acceleration" not in name)
@@ -234,7 +233,6 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     record = group[0].copy()
     record["sample"] = sample
     record["flags"] &= ~_ARRIVED
-    record["rhs_evaluations"] = group["rhs_evaluations"].sum()
     values = objective.of(group)
     # A copy that failed leaves the uncertainty unknown, and NaN says so.
     coverage = COVERAGE if len(group) == 1 + len(KICKS) else COVERAGE_ALONE
@@ -242,13 +240,19 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     return record
 
 
+NO_RATE = -1e299
+"""A place whose largest rate is below this has none."""
+
+
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False
-) -> Records:
+    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False,
+    objective: Objective = MEAN_GAP,
+) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
-    `told` (as of `responses_told`), sliding work unless `worn`, uncertainty and energy error until their makers fill them in.
+    `told` (as of `responses_told`), sliding work unless `worn`,
+    what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
     records["sample"] = labels
@@ -278,6 +282,12 @@ def outcome_records(
         outcome.profile * (outcome.time / outcome.revolutions)[:, None] if worn else np.nan
     )
     records["sliding_waves"][~valid] = np.nan
+    records[RATE] = np.nan
+    if objective.rate is not None:
+        period = (outcome.time / outcome.revolutions)[:, None]
+        largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
+        made = objective.made_of(outcome.mean_rate, largest, period)
+        records[RATE][valid] = made[valid]
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]
     flags = int(Flag.LATCHED) * latched.any(axis=1)

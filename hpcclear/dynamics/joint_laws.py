@@ -8,11 +8,15 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws import numbers
-from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, reduced_compliance
+from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, dundurs, reduced_compliance
 from hpcclear.dynamics.views import Parameters
 from hpcclear.scene import Scene
+from hpcclear.scene.mechanism import length_path
 
 Get = Callable[[str], Array]
+
+WIDEST = {"peak_contact_pressure": "pressure", "contact_half_angle": "half_angle"}
+"""Variables of a response, and what a `laws.declared.Geometry` calls them."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
@@ -22,21 +26,25 @@ the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c
 """
 
 
-def joint_numbers(get: Get, key: str, materials: str) -> dict[str, Array]:
+def joint_numbers(get: Get, joint: Any, key: str, materials: str) -> dict[str, Array]:
     """Numbers of a joint's samples by the names of `declared.JOINT`, (m,), from the tables at these paths."""
     clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
-    h_bearing, h_journal = (
-        reduced_compliance(
-            get(f"{materials}.{part}.youngs_modulus"), get(f"{materials}.{part}.poisson_ratio")
-        )
-        for part in ("bearing", "journal")
+    moduli, ratios = (
+        [get(f"{materials}.{part}.{entry}") for part in ("bearing", "journal")]
+        for entry in ("youngs_modulus", "poisson_ratio")
     )
+    h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
+    alpha, beta = dundurs(moduli, ratios)
+    path = length_path(joint)
     return {
         "stiffness": contact_stiffness(h_bearing, h_journal, bearing, clearance),
         "compliance": h_bearing + h_journal,
         "bearing_radius": bearing,
         "journal_radius": bearing - clearance,
         "clearance": clearance,
+        "length": np.full_like(clearance, np.nan) if path is None else get(f"{key}.{path}"),
+        "dundurs_alpha": alpha,
+        "dundurs_beta": beta,
     }
 
 
@@ -54,7 +62,7 @@ def fill(scene: Scene, get: Get, key: str, materials: str, force: Array, p: Arra
 
     `force`: what inertia comes to, N, (m,): laws whose force is no power of the depth are looked at there.
     """
-    joint = joint_numbers(get, key, materials)
+    joint = joint_numbers(get, scene.clearance_joint(key.rpartition(".")[2]), key, materials)
     p[:, at.CLEARANCE] = joint["clearance"]
     p[:, at.BEARING_RADIUS] = joint["bearing_radius"]
     p[:, at.JOURNAL_RADIUS] = joint["journal_radius"]
@@ -85,6 +93,28 @@ def swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
     """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
     law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
     found: Array = numbers.swing(law, force, _read(law, p, [place], 0))
+    return found
+
+
+def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
+    """Largest pressure, Pa, and half angle of contact, rad, (joints,) each, at normal forces (joints,) of the scene's joints.
+
+    Empty where the geometry of contact has no pressure.
+    """
+    law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
+    if law is None or law.geometry is None or law.geometry.pressure is None:
+        return {}
+    found = {name: np.full(len(forces), np.nan) for name in WIDEST}
+    for k, label in enumerate(scene.joint_labels):
+        if label not in scene.clearance_joints() or not forces[k] > 0.0:
+            continue
+        joint, key = scene.clearance_joint(label), scene.joint_key(label)
+        given = joint_numbers(get, joint, key, scene.materials_key(label))
+        own = numbers.sample_numbers(law, given | _given(get, "contact", scene.effects.contact))
+        force = forces[k : k + 1]
+        state = {**own, "force": force, "depth": numbers.depth_at(law, force, own)}
+        for name, attribute in WIDEST.items():
+            found[name][k] = numbers.evaluate(getattr(law.geometry, attribute), state)[0]
     return found
 
 

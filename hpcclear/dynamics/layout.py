@@ -1,7 +1,7 @@
 """Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
 
-Rows are module constants, so the compiler sees every distance between two rows and can vectorise over
-the lanes without run-time checks. Rows of effects that are off are never touched.
+Rows are numbered as they are declared (`hpcclear.dynamics.rows`). They are module constants, so the compiler sees every
+distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
 """
 
 from typing import Any, NamedTuple
@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
+from hpcclear.dynamics.rows import Rows
 
 TURN = 6.283185307179586  # rad
 
@@ -18,22 +19,15 @@ MAX_COORDINATES = 24
 class Effects(NamedTuple):
     """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
 
-    crank_rod: Any = None  # clearance at O12
-    rod_slider: Any = None  # clearance at O23
-    joints: Any = None  # of a linkage other than the slider-crank: how many have clearance
+    joints: Any = None  # how many have clearance
+    first: Any = 0  # place of the first of them; the others follow
     contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
     friction: Any = None
-    torque: Any = None  # the crank is free, driven by a torque
-    torque_table: Any = None
-    torque_falls: Any = None  # with the speed
-    gravity: Any = None
-    load: Any = None  # constant slider load
-    load_table: Any = None
-    guide: Any = None  # guide friction on the slider
-    baumgarte: Any = None  # nine coordinates with multipliers instead of minimal ones
+    torque: Any = None  # the body that gives the period is free, driven by a torque
+    baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
     ledger: Any = None  # energies
     series: Any = None  # friction forces and crank moment, for time series
-    responses: Any = None  # mean contact forces, crank moment, slider acceleration of each sample
+    responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
@@ -48,7 +42,7 @@ class Effects(NamedTuple):
     short_film: Any = None
     long_film: Any = None
     finite_film: Any = None
-    bending: Any = None  # of a slider-crank's rod: how many modes, each a coordinate
+    objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
     def latched(self) -> Any:
@@ -83,10 +77,8 @@ def bristles_of(effects: Effects) -> int:
 
 
 def open_of(effects: Effects) -> Open:
-    """Those of a set of effects: O12 has the first place and O23 the second; other linkages fill them from the first on."""
-    if effects.joints is not None:
-        return Open(*[1] * effects.joints)
-    return Open(effects.crank_rod, effects.rod_slider)
+    """Those of a set of effects."""
+    return Open(*[None] * effects.first, *[1] * (effects.joints or 0))
 
 
 class Waves(NamedTuple):
@@ -114,107 +106,113 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
-(
-    SPEED,  # rad/s, prescribed crank speed
-    CRANK_LENGTH,
-    ROD_LENGTH,
-    ROD_NEAR,  # u2: from the first pin to the mass centre
-    ROD_FAR,  # L2 - u2
-    ROD_MASS,
-    INV_ROD_MASS,
-    ROD_INERTIA,
-    INV_ROD_INERTIA,
-    SLIDER_MASS,
-    INV_SLIDER_MASS,
-    CRANK_MOMENT,  # m1 u1
-    CRANK_INERTIA,  # about the crank's bearing, flywheel included
-    GRAVITY,
-    LOAD,
-    TORQUE,
-    TORQUE_FALL,  # share of it that a rad/s takes: the inverse of the speed without load
-    GUIDE_COEFFICIENT,
-    GUIDE_INVERSE_RAMP,
-    BAUMGARTE_ALPHA2,  # 2 alpha
-    BAUMGARTE_BETA2,  # beta^2
-    PERIOD,  # s, one revolution at the prescribed speed
-    FIRST_STEP,  # s
-    CRANK_MASS,
-    CRANK_NEAR,  # u1
-    CRANK_OWN_INERTIA,  # about its mass centre, flywheel included
-    SLIDER_INERTIA,
-    STRICTNESS,  # squared: how many times tighter this sample's tolerances are than the run's
-    EDGE,  # one over the relative tolerance that explicit steps need at the edge of stability
-    TURN_END,  # rad, angle of the free body that gives the period at which its revolution ends: its start and all its turns
-) = range(30)
-JOINT_ROWS = 30
+OF_SAMPLE = Rows()
+SPEED = OF_SAMPLE("of the drive: a turn over its share of the period", "rad/s")
+DRIVEN_LENGTH = OF_SAMPLE("largest distance between points of the body that gives the period", "m")
+PERIOD = OF_SAMPLE("one revolution at the prescribed speed", "s")
+FIRST_STEP = OF_SAMPLE("first step to try", "s")
+STRICTNESS = OF_SAMPLE(
+    "squared: how many times tighter this sample's tolerances are than the run's"
+)
+EDGE = OF_SAMPLE(
+    "one over the relative tolerance that explicit steps need at the edge of stability"
+)
+TURN_END = OF_SAMPLE(
+    "angle of the free body that gives the period at which its revolution ends: its start and all its turns",
+    "rad",
+)
+HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest drive torque", "N m")
+HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
+HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
+
 LAW_NUMBERS = 8
 """Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
-JOINT_BLOCKS = 30  # of all joints, one behind the other
-# within a joint's block
-(
-    CLEARANCE,
-    BEARING_RADIUS,
-    JOURNAL_RADIUS,
-    EXPONENT,  # of the depth in the normal force, and the factor of its rate: what peaks between steps are found by
-    DAMPING,
-    DEEPEST_VALID,  # m, from where on a result is flagged
-    INVERSE_RAMP,  # s/m, one over the sliding speed within which friction changes most
-    STEEPNESS,  # s/m, largest slope of friction over normal force
-) = range(8)
-CONTACT_NUMBERS = 8
-FRICTION_NUMBERS = CONTACT_NUMBERS + LAW_NUMBERS
-(
-    FILM_SHORT,  # mu R L^3/c^3, N s/m; 0 where there is no such film
-    FILM_FINITE,  # as of a short one
-    FILM_LONG,  # 12 mu L R^3/c^3, N s/m
-    FILM_SHEAR,  # 2 pi mu L R^3/c, N m s
-    FILM_FLOOR,  # least thickness over the clearance
-    FILM_STEEPNESS,  # s/m, of the film's force over that of inertia; with bristles next to nothing, but not nothing
-) = range(FRICTION_NUMBERS + LAW_NUMBERS, JOINT_ROWS)
-JOINT_12 = JOINT_BLOCKS
-JOINT_23 = JOINT_BLOCKS + JOINT_ROWS
-OWN = JOINT_BLOCKS + MAX_JOINTS * JOINT_ROWS
-"""First row of what a linkage other than the slider-crank has besides; the slider-crank has no more rows than these."""
-BENDING = OWN
-"""First row of what a slider-crank's rod that bends has, in the order of `linkage.bending.entries`."""
-WAVES = OWN + 192
-"""First row of the waves of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each number
-of them another, its slope's."""
-THRESHOLDS = WAVES + 2 * WAVE_ROWS
-"""First row of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1."""
-FINITE = THRESHOLDS + 2 * MAX_JOINTS
-"""First row of what films of finite length have besides, joint by joint, in scenes that have such a film."""
+OF_JOINT = Rows()  # within a joint's block
+CLEARANCE = OF_JOINT("radial clearance", "m")
+BEARING_RADIUS = OF_JOINT("radius of the bearing", "m")
+JOURNAL_RADIUS = OF_JOINT("radius of the journal", "m")
+EXPONENT = OF_JOINT(
+    "of the depth in the normal force; this and the next are what peaks between steps are found by"
+)
+DAMPING = OF_JOINT(
+    "factor of the rate in the normal force, or of the rate over the impact speed",
+    "s/m",
+)
+DEEPEST_VALID = OF_JOINT("depth from where on a result is flagged", "m")
+INVERSE_RAMP = OF_JOINT("one over the sliding speed within which friction changes most", "s/m")
+STEEPNESS = OF_JOINT("largest slope of friction over normal force", "s/m")
+CONTACT_NUMBERS = OF_JOINT("of its law of contact", size=LAW_NUMBERS)
+FRICTION_NUMBERS = OF_JOINT("of its law of friction", size=LAW_NUMBERS)
+FILM_SHORT = OF_JOINT("mu R L^3/c^3 of a short film; 0 where there is none", "N s/m")
+FILM_FINITE = OF_JOINT("the same of a finite one", "N s/m")
+FILM_LONG = OF_JOINT("12 mu L R^3/c^3", "N s/m")
+FILM_SHEAR = OF_JOINT("2 pi mu L R^3/c", "N m s")
+FILM_FLOOR = OF_JOINT("least thickness over the clearance")
+FILM_STEEPNESS = OF_JOINT(
+    "the film's force over that of inertia, by the speed; with bristles next to nothing, but not nothing",
+    "s/m",
+)
+JOINT_ROWS = OF_JOINT.end
+JOINT_BLOCKS = OF_SAMPLE("of all joints, one behind the other", size=MAX_JOINTS * JOINT_ROWS)
+OWN = OF_SAMPLE("what a linkage has of its own", size=192)
+WAVES = OF_SAMPLE(
+    "of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each another, its slope's",
+    size=2 * WAVE_ROWS,
+)
+THRESHOLDS = OF_SAMPLE(
+    "of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1",
+    size=2 * MAX_JOINTS,
+)
 FINITE_ROWS = 180
-PARAMETERS = FINITE + MAX_JOINTS * FINITE_ROWS
+FINITE = OF_SAMPLE(
+    "what films of finite length have besides, joint by joint", size=MAX_JOINTS * FINITE_ROWS
+)
+PARAMETERS = OF_SAMPLE.end
 
 # ---- what the motion writes besides accelerations ---------------------------------------------
-# of each joint: its gap, its normal force and the rate of its gap, rows of all joints side by side like all that joints have:
-# so the compiler knows the distances between one joint's rows, whichever it is
-GAP = 0
-FORCE = GAP + MAX_JOINTS
-GAP_RATE = FORCE + MAX_JOINTS
-(GAP_12, GAP_23), (FORCE_12, FORCE_23), (RATE_12, RATE_23) = (
-    (first, first + 1) for first in (GAP, FORCE, GAP_RATE)
+# What joints have stands side by side, so that the compiler knows the distances between one joint's rows, whichever it is.
+# Rates that are integrated name the effect that requires them.
+WRITTEN = Rows()
+EACH = MAX_JOINTS
+GAP = WRITTEN("distance from the clearance circle, positive in contact", "m", EACH, "joints")
+FORCE = WRITTEN("normal force", "N", EACH, "responses")
+GAP_RATE = WRITTEN("rate of the gap", "m/s", EACH)
+DRIVE_POWER = WRITTEN("of all drives", "W", asked_by="ledger")
+ABS_DRIVE_POWER = WRITTEN("its size", "W", asked_by="ledger")
+DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="ledger")
+LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="ledger")
+FRICTIONS = WRITTEN("tangential force, for time series and objectives", "N", EACH)
+DRIVE_MOMENT = WRITTEN("for time series, responses and objectives", "N m")
+FOLLOWED_ACCELERATION = WRITTEN(
+    "of a guided body, or of a point along x", "m/s^2", asked_by="responses"
 )
-(DRIVE_POWER, ABS_DRIVE_POWER, DISSIPATION, LOAD_POWER) = range(3 * MAX_JOINTS, 3 * MAX_JOINTS + 4)
-FRICTIONS = LOAD_POWER + 1  # of each joint, for time series
-DRIVE_MOMENT = FRICTIONS + MAX_JOINTS  # for time series and for responses
-FOLLOWED_ACCELERATION = DRIVE_MOMENT + 1  # of the slider, or of a point along x; for responses only
-FOLLOWED_SQUARE = FOLLOWED_ACCELERATION + 1
-FOLLOWED_ACROSS = FOLLOWED_SQUARE + 1  # of a point along y
-SLIDING_POWERS = FOLLOWED_ACROSS + 1  # of each joint, F_N |v_t|; for wear only
-FORCE_KINKS = SLIDING_POWERS + MAX_JOINTS
-"""Of each joint, for the implicit method only: functions whose signs change where the normal force is cut at 0, and at both
-sides of friction's ramp."""
-LOW_KINKS = FORCE_KINKS + MAX_JOINTS
-HIGH_KINKS = LOW_KINKS + MAX_JOINTS
-ANGLES = HIGH_KINKS + MAX_JOINTS
-"""Of each joint cosine and sine of the contact's angle in the bearing, then in the journal; these and what follows are for
-profiles of wear only, and stand last, so that others need not pass over them."""
-PROFILES = (
-    ANGLES + 4 * MAX_JOINTS
-)  # sliding powers times waves of these angles, in the order of `waves_of`
-RATES = PROFILES + WAVE_ROWS
+FOLLOWED_SQUARE = WRITTEN("of the followed acceleration", "m^2/s^4", asked_by="responses")
+FOLLOWED_ACROSS = WRITTEN("of a point along y", "m/s^2", asked_by="responses")
+SLIDING_POWERS = WRITTEN("F_N |v_t|", "W", EACH, "wear")
+OBJECTIVE_RATES = WRITTEN(
+    "of the objective: of each joint, or the first of the whole mechanism", "", EACH, "objective"
+)
+SLIDING_SPEEDS = WRITTEN("this and normals for the objective's rate only", "m/s", EACH)
+NORMALS_X = WRITTEN("from the bearing's centre to the journal's", "", EACH)
+NORMALS_Y = WRITTEN("likewise", "", EACH)
+FORCE_KINKS = WRITTEN(
+    "changes its sign where the normal force is cut at 0; these for the implicit method only",
+    "",
+    EACH,
+)
+LOW_KINKS = WRITTEN("changes its sign at the lower side of friction's ramp", "", EACH)
+HIGH_KINKS = WRITTEN("and at the upper side", "", EACH)
+ANGLES = WRITTEN(
+    "cosine and sine of the contact's angle in the bearing, then in the journal", "", 4 * EACH
+)
+"""These and what follows are for profiles of wear only, and stand last, so that others need not pass over them."""
+PROFILES = WRITTEN(
+    "sliding powers times waves of these angles, in the order of `waves_of`",
+    "W",
+    WAVE_ROWS,
+    "profile",
+)
+RATES = WRITTEN.end
 
 
 class Integrated(NamedTuple):
@@ -227,19 +225,15 @@ class Integrated(NamedTuple):
 
 _PLACES = range(MAX_JOINTS)
 GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
-_FORCES = tuple(Integrated(FORCE + k, "responses") for k in _PLACES)
-_SLIDING = tuple(Integrated(SLIDING_POWERS + k, "wear") for k in _PLACES)
-_PROFILES = tuple(Integrated(PROFILES + k, "profile") for k in range(WAVE_ROWS))
-MEASURES = (
-    Integrated(DRIVE_POWER, "ledger"),
-    Integrated(ABS_DRIVE_POWER, "ledger"),
-    Integrated(DISSIPATION, "ledger"),
-    Integrated(LOAD_POWER, "ledger"),
-    *_FORCES,
-    Integrated(FOLLOWED_ACCELERATION, "responses"),
-    Integrated(FOLLOWED_SQUARE, "responses"),
-    Integrated(FOLLOWED_ACROSS, "responses"),
-    *_SLIDING,
+_OTHERS = [row for row in WRITTEN.declared if row.asked_by and row.first != GAP]
+_PROFILES, MEASURES = (
+    tuple(
+        Integrated(row.first + k, row.asked_by)
+        for row in _OTHERS
+        if (row.asked_by == "profile") == of_profiles
+        for k in range(row.size)
+    )
+    for of_profiles in (True, False)
 )
 INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
@@ -260,10 +254,13 @@ MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
+    there = open_of(effects)
+    whole = effects.objective is not None and effects.objective.whole
     closed = {
-        one.rate
-        for of_joints in (_FORCES, _SLIDING)
-        for one, flag in zip(of_joints, open_of(effects), strict=True)
+        row.first + k
+        for row in _OTHERS
+        if row.size == MAX_JOINTS
+        for k, flag in enumerate(Open(1) if whole and row.first == OBJECTIVE_RATES else there)
         if flag is None
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
@@ -278,55 +275,55 @@ def place(rate: int) -> int:
 WORKS = place(DRIVE_POWER)  # the first of four: drive, its absolute value, losses, load
 
 # ---- lane state and scratch ---------------------------------------------------------------------
-Q = 0  # coordinates at the start of the step
-V = Q + MAX_COORDINATES
-QS = V + MAX_COORDINATES  # coordinates of the stage
-VS = QS + MAX_COORDINATES
-ACC = VS + MAX_COORDINATES  # accelerations of the stage
-RATE_NOW = ACC + MAX_COORDINATES  # rates of the stage
-RATE_OLD = RATE_NOW + RATES  # rates at the start of the step
-RATE_SUM = RATE_OLD + RATES  # weighted by the method: h * sum is the integral over the step
-RATE_ERROR = RATE_SUM + RATES  # weighted by the difference of the pair
-INTEGRAL = RATE_ERROR + RATES  # since the start of the revolution (gaps: of their absolute values)
-(
-    TIME,  # s, since the start of this revolution
-    STEP,  # s, the step being tried
-    NEXT_STEP,  # s, what the controller asks for
-    STAGE_TIME,
-    ERROR,  # mean square of the scaled error
-    LOG_ERROR,  # log2 of the last accepted one
-    ACCEPT,  # 1 or 0
-    PEAK_MOMENT,  # of the drive, its size
-    PEAK_FOLLOWED,  # of the square of the followed acceleration
-    AVERAGING,  # 1 once the transient is over
-    ATTEMPTS,  # steps tried, accepted or not
-    EVALUATIONS,
-    RUNNING,  # 1 while the lane holds a sample
-    FRESH,  # 1 while the accelerations at the start of the step are not known
-    REJECTED,  # 1 after a rejection: the next step must not grow
-    SPECIAL,  # 1 when this step needs a look by the scalar code
-    ENDING,  # 1 when this step ends the revolution
-    STIFF,  # 1 while the implicit method runs this lane
-    EDGE_EXCESS,  # positive where the step is at the edge of stability
-    EDGE_SCORE,  # of explicit steps at the edge of stability
-    REJECTION_SCORE,  # of rejected explicit steps
-    STIFF_STEPS_HERE,  # implicit steps tried since it took the lane over
-    STIFF_STEPS,  # implicit steps tried for this sample
-    CALM,  # implicit steps in a row that the explicit method could have taken
-    STRICTER,  # squared: how many times tighter than the run's the tolerances of this lane's explicit steps are
-    STRICTER_WITHIN,  # that within the range of stability
-    STRICTER_AT_EDGE,  # and at the edge of it
-) = range(INTEGRAL + RATES, INTEGRAL + RATES + 27)
+OF_LANE = Rows()
+Q = OF_LANE("coordinates at the start of the step", size=MAX_COORDINATES)
+V = OF_LANE("velocities", size=MAX_COORDINATES)
+QS = OF_LANE("coordinates of the stage", size=MAX_COORDINATES)
+VS = OF_LANE("velocities", size=MAX_COORDINATES)
+ACC = OF_LANE("accelerations of the stage", size=MAX_COORDINATES)
+RATE_NOW = OF_LANE("rates of the stage", size=RATES)
+RATE_OLD = OF_LANE("rates at the start of the step", size=RATES)
+RATE_SUM = OF_LANE("weighted by the method: h * sum is the integral over the step", size=RATES)
+RATE_ERROR = OF_LANE("weighted by the difference of the pair", size=RATES)
+INTEGRAL = OF_LANE("since the start of the revolution (gaps: of their absolute values)", size=RATES)
+TIME = OF_LANE("since the start of this revolution", "s")
+STEP = OF_LANE("the step being tried", "s")
+NEXT_STEP = OF_LANE("step that the controller proposes", "s")
+STAGE_TIME = OF_LANE("of the stage", "s")
+ERROR = OF_LANE("mean square of the scaled error")
+LOG_ERROR = OF_LANE("log2 of the last accepted one")
+ACCEPT = OF_LANE("1 or 0")
+PEAK_MOMENT = OF_LANE("of the drive, its size")
+PEAK_FOLLOWED = OF_LANE("of the square of the followed acceleration")
+AVERAGING = OF_LANE("1 once the transient is over")
+ATTEMPTS = OF_LANE("steps tried, accepted or not")
+EVALUATIONS = OF_LANE("of the motion")
+RUNNING = OF_LANE("1 while the lane holds a sample")
+FRESH = OF_LANE("1 while the accelerations at the start of the step are not known")
+REJECTED = OF_LANE("1 after a rejection: the next step must not grow")
+SPECIAL = OF_LANE("1 when this step needs a look by the scalar code")
+ENDING = OF_LANE("1 when this step ends the revolution")
+STIFF = OF_LANE("1 while the implicit method runs this lane")
+EDGE_EXCESS = OF_LANE("positive where the step is at the edge of stability")
+EDGE_SCORE = OF_LANE("of explicit steps at the edge of stability")
+REJECTION_SCORE = OF_LANE("of rejected explicit steps")
+STIFF_STEPS_HERE = OF_LANE("implicit steps tried since it took the lane over")
+STIFF_STEPS = OF_LANE("implicit steps tried for this sample")
+CALM = OF_LANE("implicit steps in a row that the explicit method could have taken")
+STRICTER = OF_LANE(
+    "squared: how many times tighter than the run's the tolerances of this lane's explicit steps are"
+)
+STRICTER_WITHIN = OF_LANE("that within the range of stability")
+STRICTER_AT_EDGE = OF_LANE("and at the edge of it")
 MAX_CURVES = 8
-CURVES = STRICTER_AT_EDGE + 1  # values of tabulated curves at the stage
-TORQUE_VALUE, LOAD_VALUE = CURVES, CURVES + 1  # of the slider-crank
-# of each joint
-ACTIVE = CURVES + MAX_CURVES  # contact latched (1) or flight (0)
-INVERSE_IMPACT = ACTIVE + MAX_JOINTS  # 1 / d'_0
-PEAK = INVERSE_IMPACT + MAX_JOINTS
-DEEPEST = PEAK + MAX_JOINTS  # largest penetration
-ENDED = DEEPEST + MAX_JOINTS  # contacts ended in this revolution
-WORK = ENDED + MAX_JOINTS
+CURVES = OF_LANE("values of tabulated curves at the stage", size=MAX_CURVES)
+ACTIVE = OF_LANE("contact whose impact speed is kept (1), or flight (0)", "", EACH)
+INVERSE_IMPACT = OF_LANE("1 / d'_0", "s/m", EACH)
+PEAK = OF_LANE("largest contact force", "N", EACH)
+DEEPEST = OF_LANE("largest penetration", "m", EACH)
+ENDED = OF_LANE("contacts ended in this revolution", "", EACH)
+LARGEST_RATE = OF_LANE("of the objective's", "", EACH)
+WORK = OF_LANE.end
 
 BANK = WORK + PARAMETERS
 """Rows of what a motion reads and writes: those of `work`, then the parameters."""
@@ -336,59 +333,55 @@ STAGES = BANK
 
 # ---- tabulated curves, one behind the other -----------------------------------------------------
 CELLS = 2048  # cubic cells over one turn, 4 coefficients each
-TORQUE_TABLE, LOAD_TABLE = 0, 4 * CELLS
 TABLES = 4 * MAX_CURVES * CELLS  # at most
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
-(
-    SAMPLE,  # slot of the sample in the queue
-    REVOLUTION,  # revolutions finished
-    TIME_SUM,  # s, over the averaged revolutions
-    MEAN_F,  # Welford mean of the revolution's objective
-    M2_F,
-    COUNT_F,
-    ELAPSED,  # s, whole revolutions so far
-    LAST_F,  # the objective of the revolution before
-    LAG_F,  # sum of products of neighbouring revolutions' deviations from FIRST_F
-    FIRST_F,
-) = range(10)
-LATCHED = 10  # of each joint
-AVERAGED = (
-    LATCHED + MAX_JOINTS
-)  # integrals over the averaged revolutions, in the order of INTEGRATED
-TOTAL = AVERAGED + len(INTEGRATED)  # integrals over all revolutions, likewise
-BOOK = TOTAL + len(INTEGRATED)
+OF_BOOK = Rows()
+SAMPLE = OF_BOOK("slot of the sample in the queue")
+REVOLUTION = OF_BOOK("revolutions finished")
+TIME_SUM = OF_BOOK("over the averaged revolutions", "s")
+MEAN_F = OF_BOOK("Welford mean of the revolution's objective")
+M2_F = OF_BOOK("sum of squares about it")
+COUNT_F = OF_BOOK("how many")
+ELAPSED = OF_BOOK("whole revolutions so far", "s")
+LATCHED = OF_BOOK("whole revolutions in contact", "", EACH)
+AVERAGED = OF_BOOK(
+    "integrals over the averaged revolutions, in the order of INTEGRATED", size=len(INTEGRATED)
+)
+TOTAL = OF_BOOK("integrals over all revolutions, likewise", size=len(INTEGRATED))
+BOOK = OF_BOOK.end
 
 # ---- one finished sample --------------------------------------------------------------------------
-(
-    OUT_STATUS,
-    OUT_OBJECTIVE,
-    OUT_SPREAD,
-    OUT_EVALUATIONS,
-    OUT_REVOLUTIONS,
-    OUT_TIME,
-    OUT_ATTEMPTS,
-    OUT_STIFF_STEPS,
-    OUT_MOMENT,
-    OUT_ACCELERATION,
-    OUT_FOLLOWED,
-) = range(11)
-# of each joint
-OUT_PEAK = 11
-OUT_LATCHED = OUT_PEAK + MAX_JOINTS
-OUT_DEEPEST = OUT_LATCHED + MAX_JOINTS
-OUT_ACTIVE = OUT_DEEPEST + MAX_JOINTS
-OUT_INVERSE_IMPACT = OUT_ACTIVE + MAX_JOINTS
-OUT_MEAN = (
-    OUT_INVERSE_IMPACT + MAX_JOINTS
-)  # time means over the averaged revolutions, in the order of INTEGRATED
-OUT_TOTAL = OUT_MEAN + len(INTEGRATED)  # integrals over all revolutions, likewise
-OUT_STATE = OUT_TOTAL + len(INTEGRATED)
-OUT = OUT_STATE + 2 * MAX_COORDINATES
+OF_OUTCOME = Rows()
+OUT_STATUS = OF_OUTCOME("how it ended")
+OUT_OBJECTIVE = OF_OUTCOME("f of eq. 13", "m")
+OUT_SPREAD = OF_OUTCOME("standard deviation of f between averaged revolutions", "m")
+OUT_EVALUATIONS = OF_OUTCOME("of the motion")
+OUT_REVOLUTIONS = OF_OUTCOME("all that were simulated")
+OUT_TIME = OF_OUTCOME("of these", "s")
+OUT_ATTEMPTS = OF_OUTCOME("steps tried")
+OUT_STIFF_STEPS = OF_OUTCOME("implicit steps tried")
+OUT_MOMENT = OF_OUTCOME("largest size of the drive's moment", "N m")
+OUT_ACCELERATION = OF_OUTCOME("standard deviation of the followed acceleration", "m/s^2")
+OUT_FOLLOWED = OF_OUTCOME("its largest size", "m/s^2")
+OUT_PEAK = OF_OUTCOME("largest contact force", "N", EACH)
+OUT_LATCHED = OF_OUTCOME("whole revolutions in contact", "", EACH)
+OUT_DEEPEST = OF_OUTCOME("largest penetration", "m", EACH)
+OUT_ACTIVE = OF_OUTCOME("contact whose impact speed is kept, at the end", "", EACH)
+OUT_INVERSE_IMPACT = OF_OUTCOME("1 / d'_0 there", "s/m", EACH)
+OUT_LARGEST_RATE = OF_OUTCOME("of the objective's", "", EACH)
+OUT_MEAN = OF_OUTCOME(
+    "time means over the averaged revolutions, in the order of INTEGRATED", size=len(INTEGRATED)
+)
+OUT_TOTAL = OF_OUTCOME("integrals over all revolutions, likewise", size=len(INTEGRATED))
+OUT_STATE = OF_OUTCOME("coordinates and velocities at the end", size=2 * MAX_COORDINATES)
+OUT = OF_OUTCOME.end
 
 # ---- one sample to come ---------------------------------------------------------------------------
-START_CONTACTS = 2 * MAX_COORDINATES  # after coordinates and velocities: active flags, then 1/d'_0
-START = START_CONTACTS + 2 * MAX_JOINTS
+OF_START = Rows()
+OF_START("coordinates and velocities", size=2 * MAX_COORDINATES)
+START_CONTACTS = OF_START("active flags, then 1/d'_0", size=2 * MAX_JOINTS)
+START = OF_START.end
 
 
 # ---- what the steppers hand on as one -------------------------------------------------------------
@@ -406,6 +399,10 @@ class Joint(NamedTuple):
     low_kink: int
     high_kink: int
     sliding_power: int
+    objective_rate: int
+    sliding_speed: int
+    normal_x: int
+    normal_y: int
     active: int  # rows of `work`
     inverse_impact: int
 
@@ -413,11 +410,12 @@ class Joint(NamedTuple):
 JOINTS = tuple(
     Joint(
         k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
-        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k, ACTIVE + k, INVERSE_IMPACT + k,
+        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
+        OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
+        ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
 )  # fmt: skip
-O12, O23 = JOINTS[:2]
 
 
 class Block(NamedTuple):
@@ -460,6 +458,7 @@ class Rules(NamedTuple):
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
     profile: Any  # where around joints sliding work is done is told
+    largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`
 
@@ -468,7 +467,8 @@ def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
-    flags = (e.latched, e.torque, turning, e.responses, e.profile)
+    largest = None if e.objective is None else e.objective.largest
+    flags = (e.latched, e.torque, turning, e.responses, e.profile, largest)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
     return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 

@@ -4,14 +4,13 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import bending, bristles
+from hpcclear.dynamics import bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.bearing import correction
 from hpcclear.dynamics.joint_laws import fill, swing
-from hpcclear.dynamics.linkage.bending import entries
-from hpcclear.dynamics.planar.problem import linkage_of, parameters_of
+from hpcclear.dynamics.planar.prescribed import held_extremes
+from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, parameters_of
 from hpcclear.scene import Scene
-from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.points import Points
 
 SAME_LENGTH = 0.01
@@ -48,12 +47,6 @@ class Numbers:
         return self(path) if there else np.zeros(self.size)
 
 
-def topology(scene: Scene) -> tuple[bool, bool, bool]:
-    """Whether O12 is open, O23 is open, and the crank is free."""
-    open_joints = scene.clearance_joints()
-    return "crank_rod" in open_joints, "rod_slider" in open_joints, scene.drive.kind == "torque"
-
-
 def parameters(scene: Scene, points: Points | None = None) -> Array:
     """Kernel parameters of each sample, shape (samples, PARAMETERS)."""
     get = Numbers(scene, points)
@@ -65,63 +58,17 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
 
 def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     """But for those of films of finite length."""
-    if scene.is_planar:
-        p = parameters_of(scene, get, points)
-        for k, joint in enumerate(scene.clearance_joints()):
-            key = scene.joint_key(joint)
-            block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
-            fill(scene, get, key, f"{key}.materials", _inertia(scene, get, p), p[:, block:])
-            _film_parameters(scene, get, joint, p, block)
-        return p
-    p = np.ones((get.size, _own_rows(scene)))
-    p[:, at.JOINT_23 + at.JOINT_ROWS :] = 0.0
-    bending.fill(scene, get, p)
-    body = {
-        name: get(f"mechanism.{name}") for name in ("crank.length", "rod.length", "slider.mass")
-    }
-    free = scene.drive.kind == "torque"
-    speed = get(f"drive.{speed_entry(scene.drive)}")
-    p[:, at.SPEED] = speed
-    p[:, at.PERIOD] = at.TURN / speed
-    p[:, at.FIRST_STEP] = 1e-3 * p[:, at.PERIOD]
-    p[:, at.TURN_END] = at.TURN
-    p[:, at.CRANK_LENGTH] = body["crank.length"]
-    p[:, at.ROD_LENGTH] = body["rod.length"]
-    near = get("mechanism.rod.mass_center")
-    p[:, at.ROD_NEAR], p[:, at.ROD_FAR] = near, body["rod.length"] - near
-    mass, inertia = get("mechanism.rod.mass"), get("mechanism.rod.inertia")
-    p[:, at.ROD_MASS], p[:, at.INV_ROD_MASS] = mass, 1.0 / mass
-    p[:, at.ROD_INERTIA], p[:, at.INV_ROD_INERTIA] = inertia, 1.0 / inertia
-    p[:, at.SLIDER_MASS], p[:, at.INV_SLIDER_MASS] = body["slider.mass"], 1.0 / body["slider.mass"]
-    m1, u1 = get("mechanism.crank.mass"), get("mechanism.crank.mass_center")
-    own = get("mechanism.crank.inertia") + (get("drive.flywheel_inertia") if free else 0.0)
-    p[:, at.CRANK_MASS], p[:, at.CRANK_NEAR], p[:, at.CRANK_OWN_INERTIA] = m1, u1, own
-    p[:, at.CRANK_MOMENT] = m1 * u1
-    p[:, at.CRANK_INERTIA] = own + m1 * u1**2
-    p[:, at.GRAVITY] = get("effects.gravity")
-    p[:, at.BAUMGARTE_ALPHA2] = 2.0 * scene.numerics.alpha
-    p[:, at.BAUMGARTE_BETA2] = scene.numerics.beta**2
-    _outside_parameters(scene, get, p)
-    for joint, base in (("crank_rod", at.JOINT_12), ("rod_slider", at.JOINT_23)):
-        p[:, base + at.FILM_SHORT : base + at.JOINT_ROWS] = 0.0
-        if joint in scene.clearance_joints():
-            key = scene.joint_key(joint)
-            fill(scene, get, key, key, _inertia(scene, get, p), p[:, base:])
-            _film_parameters(scene, get, joint, p, base)
+    p = parameters_of(scene, get, points)
+    force = _inertia(scene, get, p)
+    for k, joint in zip(scene.open_places, scene.clearance_joints(), strict=True):
+        key, block = scene.joint_key(joint), at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        fill(scene, get, key, scene.materials_key(joint), force, p[:, block:])
+        _film_parameters(scene, get, joint, p, block)
+    held = scene.responses_asked() and is_prescribed(scene)
+    p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = (
+        held_extremes(scene, points, get.size) if held else np.nan
+    )
     return p
-
-
-def _outside_parameters(scene: Scene, get: Numbers, p: Array) -> None:
-    """Drive torque, slider load and guide friction; tables are multiplied by 1."""
-    if isinstance(scene.effects.slider_load, float):
-        p[:, at.LOAD] = get("effects.slider_load")
-    if isinstance(getattr(scene.drive, "torque", None), float):
-        p[:, at.TORQUE] = get("drive.torque")
-    if getattr(scene.drive, "no_load_speed", None) is not None:
-        p[:, at.TORQUE_FALL] = 1.0 / get("drive.no_load_speed")
-    if scene.effects.guide_friction is not None:
-        p[:, at.GUIDE_COEFFICIENT] = get("effects.guide_friction.coefficient")
-        p[:, at.GUIDE_INVERSE_RAMP] = 1.0 / get("effects.guide_friction.ramp_speed")
 
 
 def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:
@@ -145,7 +92,7 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     own[:, at.FILM_SHEAR] = at.TURN * viscosity * length * radius**3 / clearance
     own[:, at.FILM_FLOOR] = get(f"{key}.film.roughness") / clearance
     masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
-    inertia = sum(get(path) for path in masses) * p[:, at.CRANK_LENGTH] * p[:, at.SPEED] ** 2
+    inertia = sum(get(path) for path in masses) * p[:, at.DRIVEN_LENGTH] * p[:, at.SPEED] ** 2
     own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SHORT : at.FILM_SHEAR].sum(axis=1) / inertia
 
 
@@ -157,11 +104,11 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
     chance. And what swings in a contact under the forces of inertia, at the frequency w of small motions, w^2 = F'(d)/m,
     may add `OF_FORCE` of these.
     """
-    pin = np.abs(p[:, at.SPEED]) * p[:, at.CRANK_LENGTH]
+    pin = np.abs(p[:, at.SPEED]) * p[:, at.DRIVEN_LENGTH]
     mass, force = _mass(scene, get), _inertia(scene, get, p)
     needed = np.ones(len(p))
-    if scene.effects.guide_friction is not None:
-        needed = p[:, at.GUIDE_INVERSE_RAMP] / OF_RAMP
+    for key in scene.guide_friction_keys():
+        needed = np.maximum(needed, 1.0 / (OF_RAMP * get(f"{key}.ramp_speed")))
     for joint in scene.clearance_joints():
         place = _place(scene, joint)
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
@@ -181,22 +128,15 @@ def _mass(scene: Scene, get: Numbers) -> Array:
 def _inertia(scene: Scene, get: Numbers, p: Array) -> Array:
     """What the forces of inertia come to, N, (samples,)."""
     turning = np.abs(p[:, at.SPEED])
-    pin = turning * p[:, at.CRANK_LENGTH]
+    pin = turning * p[:, at.DRIVEN_LENGTH]
     return np.maximum(_mass(scene, get) * pin * turning, 1e-300)
-
-
-def _own_rows(scene: Scene) -> int:
-    """Parameters of a sample but for those of films of finite length."""
-    if scene.is_planar:
-        return linkage_of(scene).parameter_rows
-    if scene.modes:
-        return at.BENDING + len(entries(scene.modes))
-    return at.OWN
 
 
 def parameter_rows(scene: Scene) -> int:
     """Parameters of a sample."""
-    return finite_rows(scene) or (at.FINITE if _has_further(scene) else _own_rows(scene))
+    return finite_rows(scene) or (
+        at.FINITE if _has_further(scene) else linkage_of(scene).parameter_rows
+    )
 
 
 def _has_further(scene: Scene) -> bool:
@@ -243,7 +183,7 @@ def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
     if first + rows > at.WAVE_ROWS:
         raise InputError(
             "wear.harmonics" if scene.wear is not None and scene.wear.waves else f"{scene.joint_key(joint)}.out_of_round",
-            rows // 2, f"all joints together have room for {at.WAVE_ROWS // 2} waves",
+            rows // 2, f"all joints together have more than {at.WAVE_ROWS // 2} waves",
             f"Take {at.WAVE_ROWS // 2 // (_place(scene, joint) + 1) // 2} around each surface at most",
         )  # fmt: skip
     return first, rows
@@ -288,7 +228,7 @@ def _with_finite_films(scene: Scene, get: Numbers, p: Array) -> Array:
         if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():
             raise InputError(
                 f"{key}.film.model", "finite",
-                "the samples differ in length over diameter, and a film is solved for one alone",
+                "the samples differ in length over diameter, but the finite film is solved for one ratio",
                 'Vary neither film.length nor bearing_radius, or take model = "short" or "long"',
             )  # fmt: skip
         own[:] = correction(ratio)

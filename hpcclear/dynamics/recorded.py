@@ -87,7 +87,7 @@ class Recording:
         self.problem = problem_of(scene)
         self._par = parameters(scene)
         self._start = start_states(scene, self._par, walk=False)
-        self._refused = refused_of(scene) if scene.is_planar else None
+        self._refused = refused_of(scene)
         if copy:
             self._start = kicked(self._start, scales(scene), range(copy, copy + 1))
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))

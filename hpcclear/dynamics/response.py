@@ -1,48 +1,35 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
-import os
-
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.bending import bent_motion
-from hpcclear.dynamics.closed_form import ClosedForm, ideal_series
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import KICKS, alone, outcome_records, responses_told
-from hpcclear.dynamics.joint_laws import stored_energy
-from hpcclear.dynamics.layout import TURN
-from hpcclear.dynamics.linkage import baumgarte, geometry, ideal
-from hpcclear.dynamics.linkage.bending import Bent
-from hpcclear.dynamics.parameters import parameters, topology
+from hpcclear.dynamics.evaluator import alone, outcome_records, responses_told
+from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.parameters import Numbers, parameters
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import linkage_of, refused_of, tables_of
-from hpcclear.dynamics.planar.response import Seen, balance_series, mode_series
+from hpcclear.dynamics.planar.problem import linkage_of, refused_of
+from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
+from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
-from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, Steps, pieces
+from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.telling import recorded
-from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
-
-
-def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
-    """Integrate a scene, or a perturbed replica; all its steps, outcome record (1,) and parameters (PARAMETERS,), all in SI."""
-    recording = Recording(scene, copy)
-    steps = Steps.of(np.concatenate(list(recording.chunks())))
-    return steps, recording.record(), recording.par
 
 
 def _between(piece: Piece, cycle: float) -> tuple[Array, Array, Array]:
@@ -121,9 +108,9 @@ def simulate(
     objective = named.objective if objective is None else objective
     still = coordinate_count(scene) == 0
     if still:
-        times, data, record = _closed_form(scene)
+        times, data, record = _prescribed(scene)
     else:
-        kicks = () if copy or steady is not None else _kicks(scene, checked)
+        kicks = alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
         times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
@@ -135,11 +122,15 @@ def simulate(
     names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(
-            scene.effects.slider_load, data["crank_angle"], 1, scene.numerics.interpolation
+            scene.effects.slider_load,
+            data["crank_angle"],
+            _turns(scene),
+            scene.numerics.interpolation,
         )
+    told = {name: dataset.at_joints(record[name], labels)[0] for name in names}
     return dataset.response_dataset(
         times,
-        {**data, **{name: dataset.at_joints(record[name], labels)[0] for name in names}},
+        {**data, **told, **widest_contact(scene, Numbers(scene, None), told["peak_contact_force"])},
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
@@ -151,30 +142,24 @@ def simulate(
     )
 
 
-def _kicks(scene: Scene, checked: bool) -> tuple[int, ...]:
-    """Perturbations of the replicas beside a response."""
-    if scene.numerics.uncertainty:
-        return KICKS  # as for any sample
-    return alone(scene.numerics.rtol) if checked else ()
-
-
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     """Labels along what a linkage's series have besides time and joints."""
-    modes = {"mode": scene.mode_labels} if scene.modes else {}
-    if not scene.is_planar:
-        return modes or None
-    found = planar_labels(linkage_of(scene).mechanism) | modes
-    return found if coordinate_count(scene) else {**found, "pin": pins_of(scene)}
+    found = planar_labels(scene, linkage_of(scene).mechanism)
+    if scene.modes:
+        found["mode"] = scene.mode_labels
+    if scene.template is None and not coordinate_count(scene):
+        found["pin"] = pins_of(scene)
+    return found or None
 
 
 def _turns(scene: Scene) -> int:
     """Turns of a revolution."""
-    return turns_of(tables_of(scene)) if scene.is_planar else 1
+    return turns_of(scene.linkage)
 
 
 def _reason(scene: Scene) -> dict[str, str | int]:
     """Where a linkage that cannot turn locks, as an attribute."""
-    told = refused_of(scene) if scene.is_planar else None
+    told = refused_of(scene)
     return {} if told is None else {"ended": told[1].reason}
 
 
@@ -215,15 +200,14 @@ def _shown(scene: Scene, steady: Records) -> Scene:
     return scene.with_(changes)
 
 
-def _closed_form(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
+def _prescribed(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
     problem = problem_of(scene)
-    lanes = ClosedForm(problem)
+    lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
     record = outcome_records(*lanes.collect(), responses_told(problem), bool(problem.effects.wear))
-    found = prescribed_series(scene) if scene.is_planar else ideal_series(scene)
-    return *found, record
+    return *prescribed_series(scene, problem.transient + problem.averaged), record
 
 
 def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Array], Records]:
@@ -252,14 +236,14 @@ def _bytes_an_instant(part: dict[str, Array]) -> float:
 
 def _refuse_what_does_not_fit(size: float, count: int) -> None:
     """Raise InputError where time series of so many bytes would take more than `MOST` of the machine's memory."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = host.memory()
     if size > MOST * memory:
         raise InputError(
             "output.instants_per_revolution",
             count,
             f"makes time series of {size / 1e9:.3g} GB or more; this machine has {memory / 1e9:.3g} GB of memory",
-            "write fewer instants a revolution (0 writes every accepted step), or simulate fewer revolutions; "
-            "hpcclear sample keeps no time series",
+            "Write fewer instants per revolution (0: every accepted step), or simulate fewer revolutions; "
+            "hpcclear sample stores no time series",
         )
 
 
@@ -273,37 +257,12 @@ def _series_between(scene: Scene, recording: Recording, piece: Piece) -> dict[st
     revolution, contacts = steps.revolution[k], steps.contacts[k]
     turn_time = times - (steps.time - steps.turn_time)[k]
     in_turn = _in_turn(q, revolution, cycle)
-    accelerations, rates = recording.observe(np.hstack([in_turn, v]), contacts, turn_time)
+    rates = recording.observe(np.hstack([in_turn, v]), contacts, turn_time)[1]
     works = _works_between(recording, piece, s)
-    n = problem.coordinates - scene.bristles
-    q, v, in_turn, accelerations = (
-        one[:, scene.bristles :] for one in (q, v, in_turn, accelerations)
+    q, v, in_turn = (one[:, scene.bristles :] for one in (q, v, in_turn))
+    return planar_series(
+        scene, par, Seen(in_turn, v, turn_time, revolution, contacts, rates, works)
     )
-    if scene.is_planar:
-        return planar_series(
-            scene, par, Seen(in_turn, v, turn_time, revolution, contacts, rates, works)
-        )
-    first, second, free = topology(scene)
-    nine = scene.numerics.formulation == "baumgarte"
-    phi, omega = TURN * times / Parameters(par).period, np.full_like(times, Parameters(par).speed)
-    data = {}
-    if nine:
-        data["constraint_violation"] = baumgarte.constraint_violation(first, second, par, q.T)
-    rows = baumgarte.minimal_rows(first, second) if nine else list(range(n - free))
-    if turning:
-        phi, omega = q[:, -1], v[:, -1]
-    if first or second or scene.modes:
-        slider = accelerations[:, rows[-1]]
-    else:
-        rigid = ideal.ideal_response(
-            problem.effects, par, problem.load_table, phi, omega, accelerations[:, n - 1]
-        )
-        slider = rigid[ideal.SLIDER_A]
-    m, bar = bent_motion(scene, par, (phi, omega), q[:, rows].T, v[:, rows].T)
-    data |= _series(scene, m, par, rates, contacts, works, bar)
-    if bar is not None:
-        data |= mode_series(scene.modes, q, v, bar.strain)
-    return data | {"crank_angle": phi, "crank_speed": omega, "slider_acceleration": slider}
 
 
 def _in_turn(q: Array, revolution: Array, cycle: float) -> Array:
@@ -312,35 +271,3 @@ def _in_turn(q: Array, revolution: Array, cycle: float) -> Array:
         q = q.copy()
         q[:, -1] -= cycle * revolution
     return q
-
-
-def _series(
-    scene: Scene, m: geometry.Motion, par: Array, rates: Rates, contacts: Array, works: Array,
-    bar: Bent | None = None,
-) -> dict[str, Array]:  # fmt: skip
-    """Every time series of the response but those of modes."""
-    open_ = np.array([j in scene.clearance_joints() for j in ("crank_rod", "rod_slider")])
-    gaps = np.where(open_, rates.gap[:, :2], 0.0)
-    latched = scene.effects.contact is not None and scene.effects.contact.latched
-    active = contacts[:, :2] if latched else np.ones((len(contacts), 2))
-    elastic = stored_energy(scene, par, gaps[:, open_], active[:, open_], np.flatnonzero(open_))
-    kinetic = geometry.kinetic_energy(m, par)
-    potential = geometry.potential_energy(m, par, scene.effects.gravity)
-    strain: Array | float = 0.0
-    if bar is not None:
-        kinetic, strain = kinetic + bar.kinetic, bar.strain
-        potential = potential + scene.effects.gravity * bar.raised(m.rod_angle)
-    return {
-        "slider_position": m.slider,
-        "slider_velocity": m.slider_speed,
-        "rod_x": m.rod_x,
-        "rod_y": m.rod_y,
-        "rod_angle": m.rod_angle,
-        "eccentricity_x": m.eccentricity_x,
-        "eccentricity_y": m.eccentricity_y,
-        "penetration": np.maximum(gaps, 0.0) * active,
-        "contact_force": rates.force[:, :2],
-        "friction_force": rates.friction[:, :2],
-        "crank_moment": rates.drive_moment,
-        **balance_series((kinetic, elastic, potential, strain), works),
-    }

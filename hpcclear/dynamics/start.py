@@ -1,13 +1,30 @@
-"""Where a scene's samples start: crank and rod outstretched, velocities of the mechanism without clearance."""
+"""Where a scene's samples start: put together, with the velocities of the mechanism without clearance."""
+
+from functools import lru_cache
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.parameters import Numbers, topology
-from hpcclear.dynamics.planar.problem import start_states_of
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble_samples
+from hpcclear.dynamics.linkage.loops import Loops
+from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.poses import coordinates
+from hpcclear.dynamics.linkage.trees import Forest
+from hpcclear.dynamics.planar.problem import (
+    linkage_of,
+    moves_start,
+    put_together,
+    refused_of,
+    rounds_of,
+    sample_of,
+    scene_of,
+)
+from hpcclear.dynamics.planar.tables import mechanism_of
+from hpcclear.dynamics.planar.turning import loops_of, statuses
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
-from hpcclear.scene.driving import speed_entry
 from hpcclear.scene.points import Points
 
 
@@ -16,72 +33,90 @@ def start_states(
 ) -> Start:
     """Start of each sample, of parameters (samples, PARAMETERS) and the points they were made from.
 
-    Journals are centred, or where ``start_eccentricity`` puts them. Linkages that cannot turn fail at the start,
-    unless `walk` is off.
+    Put together with journals centred, or where ``start_eccentricity`` puts them, and velocities of ideal joints. Unless
+    `walk` is off, a sample that does not close or cannot turn fails at the start (`Start.fail`).
 
     Raises
     ------
     InputError
-        If a linkage cannot be put together.
+        If the scene itself does not close.
     """
-    if scene.is_planar:
-        return start_states_of(scene, par, points, walk)
-    p = Parameters(par)
-    first, second, free = topology(scene)
-    count = len(par)
-    speed = p.speed
-    if speed_entry(scene.drive) == "expected_speed":  # which is not what it starts with
-        speed = np.broadcast_to(Numbers(scene, points)("drive.initial_speed"), count)
-    q, v = _minimal(scene, p, speed)
-    baumgarte = scene.numerics.formulation == "baumgarte"
-    if baumgarte:
-        zero = np.zeros(count)
-        q = [p.crank_near, zero, *q, zero, zero]
-        v = [zero, p.crank_near * speed, *v, zero, zero]
-    elif not (first or second or scene.modes):
-        q, v = [], []
-    elif not (first and second):
-        q, v = q[2:], v[2:]  # an ideal joint leaves the rod's angle and the slider
-    if free or baumgarte:
-        q, v = [*q, np.zeros(count)], [*v, speed]
-    start = Start.at_rest(count)
-    undeflected = [np.zeros(count)] * (scene.bristles + scene.modes)
-    q, v = [*undeflected, *q], [*undeflected, *v]
-    n = len(q)
-    if n:
-        start.coordinates(n)[:] = np.transpose(q)
-        start.velocities(n)[:] = np.transpose(v)
-    _start_contacts(scene, p, start)
+    trees = linkage_of(scene).forest
+    first = scene.bristles  # which begin undeflected
+    n = len(trees.coordinates)
+    start = Start.at_rest(len(par))
+    places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
+    if points is None or not _moved(scene, points):
+        places[:], speeds[:] = coordinates(trees, put_together(mechanism_of(scene.linkage)))
+        told = refused_of(scene) if walk else None
+        found = np.full(len(par), int(Status.OK if told is None else told[0]))
+    else:
+        samples = Samples(scene, points)
+        places.T[:], speeds.T[:] = samples.coordinates(trees)
+        found = statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
+    _start_contacts(scene, par, points, start)
+    start.fail(found)
     return start
 
 
-def _minimal(scene: Scene, p: Parameters, omega: Array) -> tuple[list[Array], list[Array]]:
-    """Rod x, rod y, rod angle and slider x, and their velocities."""
-    crank, length = p.crank_length, p.rod_length
-    e12, e23 = (_start_eccentricity(scene, joint) for joint in ("crank_rod", "rod_slider"))
-    angle = np.arcsin((e12[1] - e23[1]) / length)
-    spin = -crank * omega / (length * np.cos(angle))
-    pin_x, pin_y = crank - e12[0], np.full(len(p), -e12[1])  # rod's first bearing centre
-    slider = pin_x + length * np.cos(angle) + e23[0]
-    slider_speed = -length * np.sin(angle) * spin
-    near = p.rod_near
-    q = [pin_x + near * np.cos(angle), pin_y + near * np.sin(angle), angle, slider]
-    along = crank * omega + near * np.cos(angle) * spin
-    return q, [-near * np.sin(angle) * spin, along, spin, slider_speed]
+def _moved(scene: Scene, points: Points) -> bool:
+    return any(moves_start(scene.path_in_linkage(path)) for paths in points.paths for path in paths)
 
 
-def _start_eccentricity(scene: Scene, joint: str) -> tuple[float, float]:
-    return getattr(getattr(scene.joints, joint), "start_eccentricity", (0.0, 0.0))
+class Samples:
+    """Samples of a scene (m), put together: all at once, and one by one those that do not close from the rough angles.
+
+    Attributes
+    ----------
+    numbers : Mechanism
+        With numbers of samples (m,).
+    closed : ndarray, shape (m,)
+        Which of them close.
+    """
+
+    def __init__(self, scene: Scene, points: Points) -> None:
+        self._scene, self._points = _without_study(scene), points
+        structure = linkage_of(scene).mechanism
+        self.numbers = sample_of(scene, points)
+        self._made, self.closed = assemble_samples(structure, self.numbers, len(points))
+        self._single: dict[int, Assembly] = {}
+        for row in np.flatnonzero(~self.closed).tolist():
+            try:
+                self._single[row] = put_together(self.mechanism(row))
+                self.closed[row] = True
+            except InputError:
+                continue
+
+    def mechanism(self, row: int) -> Mechanism:
+        """One sample by itself."""
+        return mechanism_of(scene_of(self._scene, self._points, row).linkage)
+
+    def coordinates(self, forest: Forest) -> tuple[Array, Array]:
+        """Coordinates and velocities (n, m) of a forest; NaN of samples that do not close."""
+        q, v = coordinates(forest, self._made)
+        q[:, ~self.closed] = v[:, ~self.closed] = np.nan
+        for row, made in self._single.items():
+            q[:, row], v[:, row] = coordinates(forest, made)
+        return q, v
 
 
-def _start_contacts(scene: Scene, p: Parameters, start: Start) -> None:
+@lru_cache(maxsize=16)
+def _twins(scene: Scene) -> Loops | None:
+    return loops_of(linkage_of(scene).mechanism)
+
+
+@lru_cache(maxsize=16)
+def _without_study(scene: Scene) -> Scene:
+    """The scene of which those of samples are made in less than half the time."""
+    return scene if scene.study is None else scene.with_({"study": None})
+
+
+def _start_contacts(scene: Scene, par: Array, points: Points | None, start: Start) -> None:
     """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
     law = scene.effects.contact
     if law is None or not law.latched:
         return
-    for k, joint in enumerate(("crank_rod", "rod_slider")):
-        if joint in scene.clearance_joints():
-            distance = np.hypot(*_start_eccentricity(scene, joint))
-            touching = distance >= p.clearance[:, k]
-            start.active[:, k] = touching
-            start.inverse_impact[:, k] = touching / law.minimum_impact_speed
+    for k, joint in zip(scene.open_places, sample_of(scene, points).clearances, strict=True):
+        touching = np.hypot(*joint.start_eccentricity) >= Parameters(par).clearance[:, k]
+        start.active[:, k] = touching
+        start.inverse_impact[:, k] = touching / law.minimum_impact_speed

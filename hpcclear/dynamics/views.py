@@ -140,8 +140,10 @@ class Outcome(View):
     contacts = Column(slice(at.OUT_ACTIVE, at.OUT_INVERSE_IMPACT + at.MAX_JOINTS))  # as of a start
     attempts = Column(at.OUT_ATTEMPTS)
     stiff_steps = Column(at.OUT_STIFF_STEPS)
-    mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE_12))  # N
+    mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE))  # N
     sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
+    mean_rate = _of_joints(at.OUT_MEAN + at.place(at.OBJECTIVE_RATES))  # of the objective
+    largest_rate = _of_joints(at.OUT_LARGEST_RATE)
     profile = Column(
         slice(at.OUT_MEAN + at.place(at.PROFILES), at.OUT_MEAN + len(at.INTEGRATED))
     )  # W, means of F_N |v_t| times waves of the contact's angle, as of `layout.waves_of`; NaN of those that are not there
@@ -181,8 +183,6 @@ class Settings(View):
     impact_floor = Column(settings.IMPACT_FLOOR)  # m/s
     transient = Column(settings.TRANSIENT)  # revolutions
     averaged = Column(settings.AVERAGED)
-    averaged_cap = Column(settings.AVERAGED_CAP)
-    objective_tolerance = Column(settings.OBJECTIVE_TOLERANCE)
     max_steps = Column(settings.MAX_STEPS)
     smallest_step = Column(settings.SMALLEST_STEP)
     exponent = Column(settings.EXPONENT)  # of the step-size control
@@ -200,7 +200,7 @@ class Settings(View):
 
 
 class Parameters(View):
-    """Parameters of samples, SI; those of a linkage other than the slider-crank have rows of its own behind these."""
+    """Parameters of samples, SI; a linkage has rows of its own behind these."""
 
     size = at.OWN
 
@@ -214,19 +214,7 @@ class Parameters(View):
     first_step = Column(at.FIRST_STEP)
     strictness = Column(at.STRICTNESS)  # squared: how many times tighter than the run's tolerances
     turn_end = Column(at.TURN_END)  # rad
-    crank_length = Column(at.CRANK_LENGTH)
-    crank_near = Column(at.CRANK_NEAR)
-    crank_mass = Column(at.CRANK_MASS)
-    crank_moment = Column(at.CRANK_MOMENT)
-    crank_inertia = Column(at.CRANK_INERTIA)
-    crank_own_inertia = Column(at.CRANK_OWN_INERTIA)
-    rod_length = Column(at.ROD_LENGTH)
-    rod_near = Column(at.ROD_NEAR)
-    rod_far = Column(at.ROD_FAR)
-    rod_mass = Column(at.ROD_MASS)
-    rod_inertia = Column(at.ROD_INERTIA)
-    slider_mass = Column(at.SLIDER_MASS)
-    gravity = Column(at.GRAVITY)
+    driven_length = Column(at.DRIVEN_LENGTH)
     # of all joints, shape (..., MAX_JOINTS)
     clearance = _entry(at.CLEARANCE)
     damping = _entry(at.DAMPING)
@@ -244,17 +232,9 @@ class Parameters(View):
     @property
     def contact_numbers(self) -> Array:
         """Numbers of the law of contact, shape (..., MAX_JOINTS, LAW_NUMBERS), in the order of its ``read``."""
-        return self._law_numbers(at.CONTACT_NUMBERS)
-
-    @property
-    def friction_numbers(self) -> Array:
-        """Numbers of the law of friction, likewise."""
-        return self._law_numbers(at.FRICTION_NUMBERS)
-
-    def _law_numbers(self, first: int) -> Array:
         blocks = self.rows[..., at.JOINT_BLOCKS : at.OWN]
         blocks = blocks.reshape(*blocks.shape[:-1], at.MAX_JOINTS, at.JOINT_ROWS)
-        found: Array = blocks[..., first : first + at.LAW_NUMBERS]
+        found: Array = blocks[..., at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + at.LAW_NUMBERS]
         return found
 
 

@@ -30,7 +30,7 @@ def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
         return points
     if not points:
         raise InputError(
-            "points", {}, "there is nothing to vary", "Give at least one name and its values"
+            "points", {}, "no entry is varied", "Give at least one name and its values"
         )
     columns = {
         str(name): np.atleast_1d(np.asarray(values, float)) for name, values in points.items()
@@ -48,7 +48,7 @@ def paths_of(scene: Scene, name: str) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        If it is none of these.
+        If it is not one of these.
     """
     if scene.study is not None and name in scene.study.names:
         return scene.study.variable(name).paths
@@ -77,7 +77,7 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     Raises
     ------
     InputError
-        If a name is unknown, a design makes no mechanism, or the scene asks for what the kernel cannot do.
+        If a name is unknown, a design makes no mechanism, or the scene requests what the kernel cannot do.
     """
     designs = as_points(scene, points)
     records = asked(evaluate_records(scene, designs), scene.objective)

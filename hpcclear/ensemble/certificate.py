@@ -1,14 +1,16 @@
-"""Which effects a scene can do without: what is asked for, and what follows from the answers.
+"""Which effects a scene can do without: what is requested, and what follows from the answers.
 
-A certificate is a generator. It yields the variants it wants simulated, a variant being the effects that are off, over so many
-replicates of the points; it is sent what came of them, and returns what it found. It knows no scene: effects are numbers.
+An effect screening is a generator. It yields the variants it wants simulated, a variant being the effects that are off, over
+so many replicates of the points; it is sent what came of them, and returns what it found. It knows no scene: effects are
+numbers.
 
-Singly at first: replicates double until each effect's change is surely within the tolerance, surely beyond it, or cannot be
-told. What is within it singly is then left out together; where that fails, pairs tell which effects are more together than
-alone. What is recommended has been simulated: the most effects whose own change together is within the tolerance.
+Singly at first: replicates double until each effect's change is significantly within the tolerance, significantly beyond it,
+or undecided. What is within it singly is then left out together; where that fails, pairs tell which effects are more
+together than alone. What is recommended has been simulated: the most effects whose own change together is within the
+tolerance.
 
 What an effect saves depends on the others: a film saves nothing while another one calls for implicit steps. So where leaving
-out all rids the scene of these, what is dearer by itself goes with the others first.
+out all rids the scene of these, what is more expensive by itself goes with the others first.
 """
 
 import itertools
@@ -37,10 +39,11 @@ MOST_PAIRS = 10
 """Pairs that are simulated at most, when all together have failed."""
 
 MORE_WORK = 1.02
-"""Work above which a scene is dearer without an effect, which then stays on: contacts without damping bounce on, say."""
+"""Work above which a scene is more expensive without an effect, which then stays on: contacts without damping bounce on,
+say."""
 
 LEAST_WORK = 1e-3
-"""What work counts as at least: a mechanism without play is known in closed form and takes none."""
+"""What work counts as at least: a mechanism without clearance is known in closed form and takes none."""
 
 MUCH_LESS = 0.9
 """Work of a set over that of another below which it is cheaper: work is not known better. Of sets alike the one with more
@@ -78,7 +81,7 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked of a certificate."""
+    """What is asked of an effect screening."""
 
     effects: int
     tolerance: float
@@ -88,7 +91,7 @@ class Plan:
     most: int
     """Replicates of a variant at most."""
     scattered: bool
-    """Whether replicates have scatter in them, so that the deviation counts."""
+    """Whether replicates have scatter in them, so that the standard deviation counts."""
     forces: bool
     """Whether peak forces count."""
     possible: Callable[[Variant], bool]
@@ -100,7 +103,7 @@ class Plan:
 
 
 class Changes(NamedTuple):
-    """Of one variant: changes of mean and deviation of the objective and of the peak force, and of single points."""
+    """Of one variant: changes of mean and standard deviation of the objective and of the peak force, and of single points."""
 
     mean: Change
     deviation: Change
@@ -167,7 +170,7 @@ class Book:
 
 
 def judged(changes: Sequence[Change], tolerance: float) -> Verdict:
-    """Within the tolerance if all are, beyond it if any is; NaN cannot be told."""
+    """Within the tolerance if all are, beyond it if any is; NaN is undecided."""
     if any(change.beyond(tolerance) for change in changes):
         return Verdict.BEYOND
     return Verdict.WITHIN if all(c.within(tolerance) for c in changes) else Verdict.UNTOLD
@@ -197,7 +200,7 @@ def certificate(plan: Plan) -> Asking:
 
 
 def _told(book: Book, variants: Sequence[Variant], budget: float) -> Part:
-    """Simulate variants, more and more replicates of those that cannot be told, as far as a budget goes."""
+    """Simulate variants, more and more replicates of those that are undecided, as far as a budget goes."""
     count = min(FIRST, book.plan.most)
     pending = [one for one in variants if book.replicates(one) < count]
     while pending:
@@ -287,7 +290,7 @@ def _recommended(book: Book) -> Variant:
 
 
 def interaction(book: Book, off: Variant) -> Array:
-    """By how much the changes (mean, deviation, force) of effects together exceed their sum."""
+    """By how much the changes (mean, standard deviation, force) of effects together exceed their sum."""
     together: Array = _values(book, off) - sum((_values(book, (k,)) for k in off), np.zeros(3))
     return together
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.quantiles import Uniform
 from hpcclear.dynamics.evaluator import Evaluator
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import payload_of
@@ -18,7 +19,6 @@ from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.statistics.random.distributions import Uniform
 from hpcclear.statistics.random.inputs import RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search.mopso import minimise
@@ -66,7 +66,7 @@ def _statistics(payload: Mapping[str, Any]) -> None:
     study = load_scene(payload["scene"], trust=True).study
     if study is not None and study.surrogate.kernel not in (None, model.kernel):
         replace(model, kernel=study.surrogate.kernel).predict(points)
-    objective = RobustObjective(model, ("x",), [RandomVariable("y", Uniform(0.0, 1.0))])
+    objective = RobustObjective(model, ("x",), [RandomVariable("y", Uniform(0.5, 0.5))])
     minimise(objective, bounds[:1], iterations=4, rng=rng, size=2)
 
 

@@ -70,7 +70,7 @@ def tried(scene: Scene, simulate: bool) -> Tried:
     good = np.array([row for row in range(len(points)) if row not in refused], int)
     if simulate and good.size:
         brief = {
-            "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None, "uncertainty": False,
+            "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None,
             "max_steps": min(STEPS, scene.numerics.max_steps),
         }  # fmt: skip
         short = scene.with_({f"numerics.{name}": value for name, value in brief.items()})
@@ -83,9 +83,8 @@ def _refusal(scene: Scene, corner: Points) -> str:
     try:
         check_points(scene, corner)
         one = scene_of(scene, corner, 0)
-        if one.is_planar:
-            poses_at_start(one)  # refuses one that does not close
-        locked = refused_of(one) if one.is_planar else None
+        poses_at_start(one)  # refuses one that does not close
+        locked = refused_of(one)
     except InputError as error:
         return f"{error.reason}. {error.remedy}"
     return "" if locked is None else f"{locked[0].message}. {locked[0].remedy}"

@@ -1,8 +1,7 @@
 """The `effects` command: by how much each effect of a scene changes what its study asks, on all ranks.
 
-Root follows the certificate (`hpcclear.ensemble.certificate`); what it asks for is a design like any other, the same points
-for every variant, simulated on all ranks and kept in the checkpoint.
-"""
+Root follows the effect screening (`hpcclear.ensemble.certificate`); what it requests is a design like any other, the same
+points for every variant, simulated on all ranks and kept in the checkpoint."""
 
 import json
 import sys
@@ -30,7 +29,7 @@ from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
 SAMPLES = 4096
-"""Samples of a variant at most, unless another number is asked for."""
+"""Samples of a variant at most, unless another number is requested."""
 
 LEAST = 128
 """Samples of a variant at least: a first look."""
@@ -114,12 +113,12 @@ RESPONSES = ("mean", "deviation", "peak force")
 
 
 def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, str]) -> xr.Dataset:
-    """A certificate as a dataset of kind ``effects``.
+    """An effect screening as a dataset of kind ``effects``.
 
     Raises
     ------
     InputError
-        The objective is nought with all effects on, so that no change of it is relative to anything.
+        The objective is zero with all effects on, so that no change of it is relative to anything.
     """
     book, plan, variants = found.book, found.book.plan, found.variants
     whole = book.all(())
@@ -172,11 +171,11 @@ def _refuse_nought(scene: Scene, whole: Seen) -> None:
     known = whole.objective[np.isfinite(whole.objective)]
     if known.size and not known.any():
         raise InputError(
-            "study.objective", scene.objective.name, "is nought whatever is off",
+            "study.objective", scene.objective.name, "is zero in every variant",
             'Choose another one, such as "peak-crank-moment"',
         )  # fmt: skip
     if not known.size:
         raise InputError(
-            "effects", len(whole.objective), "every simulation of the whole scene failed",
-            "See hpcclear simulate for why",
+            "effects", len(whole.objective), "every simulation of the complete scene failed",
+            "Run hpcclear simulate to see the reason",
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What lives come to, as a dataset: curves and their quantiles, profiles, survival, what decides, and what to mind."""
+"""Service lives as a dataset: curves and their quantiles, profiles, survival, main causes, and warnings."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -23,7 +23,7 @@ HOUR = 3600.0
 """s."""
 
 LEVELS = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
-"""Quantiles that are told."""
+"""Quantiles that are reported."""
 
 
 def ages_of(scene: Scene, lives: list[Life]) -> Array:
@@ -186,7 +186,8 @@ def _evenly(
 
 
 def doubts(content: xr.Dataset) -> list[str]:
-    """What to mind of lives in a file, a sentence each: rates that scatter too much, motion that had not settled."""
+    """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
+    state."""
     texts = []
     unsure = int((content["flags"] == Flag.TARGET_MISSED).sum())
     if unsure:
@@ -196,8 +197,11 @@ def doubts(content: xr.Dataset) -> list[str]:
     drift = content["drift"].to_numpy()
     moving = int((drift > content.attrs["tolerance"]).sum())
     if moving:
-        text = f"in {moving} lives wear rate or f still moves with a longer transient, by {drift.max():.1%} at most"
-        texts.append(f"{text}; raise numerics.transient_revolutions")
+        count = f"{moving} service {'life' if moving == 1 else 'lives'}"
+        texts.append(
+            f"{count} had not reached steady state ({drift.max():.1%} change with a longer transient); "
+            "raise numerics.transient_revolutions"
+        )
     if "sharpest" in content:
         narrow = int((content["sharpest"] > 1.0).sum())
         if narrow:
@@ -216,7 +220,7 @@ def statistics(
     values: dict[str, Array], ends: Array, lives: list[Life], cycles: Array, limit: float | None,
     local: Array, at_end: Array,
 ) -> dict[str, Array]:  # fmt: skip
-    """Quantiles over lives, survival and exceedance with limits; lives that failed are left out.
+    """Quantiles over lives, survival and exceedance with confidence intervals; lives that failed are left out.
 
     `values` by name as in the file, shape (lives, cycles, ...); `ends`, shape (lives,); `limit`, m, is what the
     largest clearance around a joint, `local` (lives, cycles, joints), exceeds.
@@ -250,7 +254,7 @@ def statistics(
 
 
 def _exceeded(clearance: Array, limit: float) -> Iterator[tuple[str, Array]]:
-    """Share of lives above a limit at each revolution and joint, and its 95 % limits."""
+    """Share of lives above a limit at each revolution and joint, and its 95 % confidence intervals."""
     total = (~np.isnan(clearance)).sum(axis=0)
     above = (clearance > limit).sum(axis=0)
     lower, upper = np.zeros(above.shape), np.ones(above.shape)

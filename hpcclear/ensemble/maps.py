@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import paths_of
@@ -15,20 +14,20 @@ from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place,
 from hpcclear.ensemble.simulate import first_compiled, sample_points, saving
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
+from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.units import UnitError, to_si
 
+__all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
+
 if TYPE_CHECKING:
     from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
 
-SHAPE = "map_shape"
-"""Attribute of a map: cells along its entries, in the order of the design variables."""
-
 
 def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
-    """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; limits in SI or with a unit.
+    """Name, scene entries and values (n,) of ``PATH=LO:HI:N``; bounds in SI or with a unit.
 
     Raises
     ------
@@ -50,7 +49,7 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
     except ValueError:
         raise wrong from None
     except UnitError as error:
-        raise InputError("map", words, str(error), f"Give limits in {unit or '1'}") from None
+        raise InputError("map", words, str(error), f"Give bounds in {unit or '1'}") from None
     if count < 1 or not np.isfinite([low, high]).all():
         raise wrong
     return name, paths, np.linspace(low, high, count)
@@ -62,6 +61,17 @@ def _number(words: str, unit: str) -> float:
         return float(words)
     except ValueError:
         return to_si(words.strip().strip('"'), unit)
+
+
+def number_of(key: str, words: str, unit: str) -> float:
+    """A plain number in SI, or one with a unit; raises InputError at `key` where it is neither."""
+    try:
+        value = _number(words, unit)
+    except UnitError as error:
+        raise InputError(key, words, error.reason, error.remedy) from None
+    if not np.isfinite(value):
+        raise InputError(key, words, "is not a finite number", f"Write a number in {unit}")
+    return value
 
 
 def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]:
@@ -87,7 +97,7 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
         raise InputError(
             "joints",
             None,
-            "without clearance there is nothing to map",
+            "there is no joint with clearance",
             'Set a joint\'s kind = "clearance"',
         )
     return points, grid[0].shape
@@ -150,32 +160,3 @@ def run_map(
                 )
         session.close()
     return session.finished(content, began)
-
-
-def grid(content: xr.Dataset) -> xr.Dataset:
-    """A map's cells with its entries as coordinates, in place of sample numbers.
-
-    Raises
-    ------
-    InputError
-        If the dataset is no map.
-    """
-    if SHAPE not in content.attrs:
-        raise InputError(
-            "map", content.attrs.get("hpcclear_kind"), "is no map", "Make one with hpcclear map"
-        )
-    shape = tuple(int(n) for n in str(content.attrs[SHAPE]).split())
-    names = [
-        str(v.name) for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"
-    ]
-    coords: dict[str, Any] = {}
-    for k, name in enumerate(names):
-        values = np.moveaxis(content[name].to_numpy().reshape(shape), k, 0).reshape(shape[k], -1)
-        coords[name] = (name, values[:, 0], content[name].attrs)
-    coords["joint"] = content["joint"]
-    data = {}
-    for key, variable in content.drop_vars(names).data_vars.items():
-        rest = variable.dims[1:]
-        folded = variable.to_numpy().reshape(*shape, *variable.shape[1:])
-        data[key] = ((*names, *rest), folded, variable.attrs)
-    return xr.Dataset(data, coords, content.attrs)

@@ -85,7 +85,7 @@ def take_parts(sums: Accumulator, records: np.ndarray) -> None:
 
 
 class Parts:
-    """What is left of a design, as parts: rows of first sample and length, made when they are asked for.
+    """What is left of a design, as parts: rows of first sample and length, made when they are requested.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
 
 
 class PartsProgress(Progress):
-    """Progress of a stage of parts, told in samples."""
+    """Progress of a stage of parts, reported in samples."""
 
     def __init__(self, label: str, style: Style, samples: int, done: int) -> None:
         super().__init__(label, style)

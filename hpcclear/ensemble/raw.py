@@ -83,11 +83,10 @@ def raw_files(
     Parameters
     ----------
     raw : mapping or None
-        ``folder``, ``attributes``, ``objective`` (its name) and ``joints``; see `RawFiles`.
+        ``folder``, ``attributes`` and ``joints``; see `RawFiles`.
     scene : Scene
     points : MonteCarloPoints
     """
     if raw is None:
         return None
-    objective = scene.objective_named(raw["objective"])
-    return RawFiles(Path(raw["folder"]), points, raw["attributes"], objective, raw["joints"])
+    return RawFiles(Path(raw["folder"]), points, raw["attributes"], scene.objective, raw["joints"])

@@ -55,18 +55,19 @@ def repeated(place: Path, count: int) -> Iterator[Repeated]:
         There is no result file; or `place` is a file that is damaged, or was made from no valid scene.
     """
     if not place.is_dir():
-        yield from _repeated(place, str(place), count)
+        yield from _repeated(dataset.read(place), str(place), count)
         return
-    for path in dataset.files_in(place):
+    for path, content in dataset.each_in(place):
         name = str(path.relative_to(place))
         try:
-            yield from _repeated(path, name, count)
+            yield from _repeated(content, name, count)
         except InputError as error:
             yield Repeated(name, f"not simulated: {error.reason}", unread=True)
 
 
-def _repeated(path: Path, name: str, count: int) -> Iterator[Repeated]:
-    content = dataset.read(path)
+def _repeated(content: xr.Dataset | InputError, name: str, count: int) -> Iterator[Repeated]:
+    if isinstance(content, InputError):
+        raise content
     kind = str(content.attrs["hpcclear_kind"])
     if kind in REPEATED:
         yield _compared(name, content, kind, count)

@@ -21,7 +21,7 @@ MEMORY = 2.3e-6
 """GB that root takes for a sample (`analysis/many_ranks.py`)."""
 
 NOTABLE = 1.0
-"""GB from which on that is told."""
+"""Memory (GB) above which a warning is printed."""
 
 
 def design(scene: Scene, table: Path | None) -> Points:
@@ -38,7 +38,7 @@ def design(scene: Scene, table: Path | None) -> Points:
         raise InputError(
             "study",
             None,
-            "the scene says nothing about sampling",
+            "the scene has no [study] table",
             "Add a [study] table, or give --points designs.csv",
         )
     return sampled(scene)
@@ -59,7 +59,7 @@ def run_sample(
     ----------
     scene : Scene
     output : Path
-        NetCDF file; timing.nc goes beside it, finished samples into a hidden directory until it is written.
+        NetCDF file; NAME.timing.nc goes beside it, finished samples into a hidden directory until it is written.
     ranks : Ranks
     table : Path, optional
         CSV of designs.
@@ -83,7 +83,7 @@ def run_sample(
         place = Place.of_file(output, options.fresh)
     else:
         rows, key = part.rows(len(points)), part.key(scene, points)
-        place = Place.of_part(part.place(output))
+        place = Place.of_file(part.place(output), False)
     with Session(place, key, ranks, options) as session:
         samples = session.found("samples")
         if samples is None:

@@ -97,21 +97,15 @@ class Place:
         if fresh and any(os.path.lexists(path) for path in (output, parts_of(output))):
             output = fresh_sibling(output)
         files.probe(output, netcdf.SEAL)
-        parent = output.parent
-        files.refuse_foreign(parent / "timing.nc", netcdf.SEAL)
+        parent, timing = output.parent, output.with_name(f"{output.stem}.timing.nc")
+        files.refuse_foreign(timing, netcdf.SEAL)
         lock = parent / f".{output.name}.lock"
-        return cls(output, parts_of(output), parent / "timing.nc", lock, (parent,))
+        return cls(output, parts_of(output), timing, lock, (parent,))
 
     @classmethod
     def of_response(cls, output: Path) -> Self:
         """The file of a single response, which any directory may hold, a run's as well."""
         return replace(cls.of_file(output, fresh=False), guest=True)
-
-    @classmethod
-    def of_part(cls, output: Path) -> Self:
-        """The file of a part, with times of its own: others are written beside it at the same time."""
-        place = cls.of_file(output, fresh=False)
-        return replace(place, timing=output.with_name(f"{output.stem}.timing.nc"))
 
     @classmethod
     def of_directory(
@@ -300,7 +294,7 @@ class Session:
         return self._checkpoint
 
     def tell_problems(self) -> None:
-        """Tell what was found in the checkpoint and could not be used, each once."""
+        """Report what was found in the checkpoint and could not be used, each once."""
         problems = [] if self._checkpoint is None else self._checkpoint.problems
         for problem in problems[self._told :]:
             self.tell(problem)
@@ -340,12 +334,13 @@ def samples_of(
     joints: Sequence[str] = JOINTS,
 ) -> xr.Dataset:
     """A dataset of kind ``samples`` of points and what became of them, a record each."""
+    drawn = {"sampling": points.sampling} if points.sampling else {}
     return dataset.samples_dataset(
         points.names,
         points.values,
         dict(zip(points.names, points.units, strict=True)),
         records,
-        attributes,
+        {**attributes, **drawn},
         objective,
         points.words,
         joints,

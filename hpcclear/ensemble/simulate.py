@@ -30,11 +30,11 @@ Compiled = TypeVar("Compiled", bound="Worker")
 def content_of(scene: "Scene") -> dict[str, Any]:
     """A scene as it travels to ranks. Its study is left out: they simulate, whatever for.
 
-    What the study asks of each sample goes into the numerics.
+    Requests of the study for each sample become part of the numerics.
     """
     content = scene.resolved()
     content.pop("study", None)
-    content["numerics"]["responses"] = scene.responses_asked()
+    content["numerics"] |= {"responses": scene.responses_asked(), "objective": scene.objective.name}
     return content
 
 
@@ -44,7 +44,6 @@ def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
 
     return {
         "scene": content_of(scene),
-        "objective": scene.objective.name,
         "names": points.names,
         "paths": points.paths,
         "lanes": DEFAULT_LANES,
@@ -58,7 +57,7 @@ _MOST_COMPILED = 8
 
 
 class Judge:
-    """A rank's worker: an evaluator whose records hold the objective that was asked for; see `ranks.schedule.Worker`."""
+    """A rank's worker: an evaluator whose records contain the requested objective; see `ranks.schedule.Worker`."""
 
     def __init__(self, evaluator: "Evaluator | SteadyEvaluator", objective: Objective) -> None:
         self._evaluator, self._objective = evaluator, objective
@@ -89,7 +88,7 @@ def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> Judge:
     if payload not in _COMPILED:
         first_compiled(evaluator, ranks)
         _COMPILED[:] = [*_COMPILED[1 - _MOST_COMPILED :], payload]
-    return Judge(evaluator, scene.objective_named(payload["objective"]))
+    return Judge(evaluator, scene.objective)
 
 
 def first_compiled(worker: Compiled, ranks: Ranks) -> Compiled:

@@ -50,7 +50,6 @@ def responses_of(
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
     payload = {
         "scene": content_of(scene),
-        "objective": scene.objective.name,
         "variants": list(variants),
         "told": told,
         "dtype": dtype,
@@ -67,7 +66,6 @@ class Responses:
 
     def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
         self._scene = load_scene(payload["scene"], trust=True)
-        self._objective = self._scene.objective_named(payload["objective"])
         self._variants, self._told = payload["variants"], payload["told"]
         self._dtype = payload["dtype"]
         self._queue: list[tuple[int, int, int]] = []
@@ -88,6 +86,6 @@ class Responses:
         for record in records:
             record["sample"], variant, copy = self._queue.pop(0)
             scene = self._scene.with_(self._variants[variant])
-            response = simulate(scene, self._objective, copy, checked=False)
+            response = simulate(scene, copy=copy, checked=False)
             record["values"] = self._told(scene, response).ravel()
         return records

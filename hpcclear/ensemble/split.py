@@ -1,8 +1,7 @@
 """A design in parts that know nothing of each other, one a job of an array, and the parts put together again.
 
-A part is a stretch of the design's samples, with a file, a checkpoint and a lock of its own. What merging writes has the bytes
-that one run would have written.
-"""
+A part is an interval of the design's samples, with a file, a checkpoint and a lock of its own. What merging writes has the
+bytes that one run would have written."""
 
 import re
 import time
@@ -48,7 +47,7 @@ class Part:
         """Numbers of its samples, of so many; raises InputError if there are more parts than samples."""
         if samples < self.count:
             reason = f"the design has {samples} samples only"
-            raise InputError("--part", str(self), reason, "Ask for fewer parts")
+            raise InputError("--part", str(self), reason, "Request fewer parts")
         return range(samples * (self.number - 1) // self.count, samples * self.number // self.count)
 
     def place(self, output: Path) -> Path:
@@ -80,13 +79,13 @@ def whole(output: Path) -> list[Part]:
     ]
     counts = sorted({int(count) for _, count in there})
     if not counts:
-        reason = f"no part of it is there, such as {Part(1, 20).place(output).name}"
+        reason = f"no part of it exists, such as {Part(1, 20).place(output).name}"
         raise InputError(
-            "output", str(output), reason, "Run hpcclear sample with --part 1/20 and on"
+            "output", str(output), reason, "Run hpcclear sample with --part 1/20, 2/20, ..."
         )
     if len(counts) > 1:
-        reason = f"parts of different divisions are there, by {' and by '.join(map(str, counts))}"
-        raise InputError("output", str(output), reason, "Move those of one of them away")
+        reason = f"parts of different divisions exist, by {' and by '.join(map(str, counts))}"
+        raise InputError("output", str(output), reason, "Move the parts of one division away")
     every = [Part(number, counts[0]) for number in range(1, counts[0] + 1)]
     missing = [part for part in every if not part.place(output).exists()]
     if missing:
@@ -143,7 +142,7 @@ def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarr
         raise InputError(
             "file",
             str(path),
-            "it does not hold the samples of its part",
+            "it does not contain the samples of its part",
             "Remove it, and run that part again",
         )
     return records.astype(OUTCOME)

@@ -1,4 +1,4 @@
-"""Direct Monte Carlo of any size: points made on demand, statistics kept, samples only if asked for."""
+"""Direct Monte Carlo of any size: points made on demand, statistics kept, samples only on request."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -70,7 +70,7 @@ def run_statistics(
     scene : Scene
         With a study that samples by Monte Carlo.
     output : Path
-        NetCDF file of kind ``statistics``; timing.nc goes beside it, what is unfinished into a hidden directory.
+        NetCDF file of kind ``statistics``; NAME.timing.nc goes beside it, what is unfinished into a hidden directory.
     ranks : Ranks
     samples : int, optional
         Number of samples, the study's by default.
@@ -137,7 +137,7 @@ def _refuse_unkept(folder: Path, samples: int, output: Path) -> None:
     if blocks <= collection.LISTED and not (folder / collection.NAME).is_file():
         missing.append(collection.NAME)
     if missing:
-        reason = f"the statistics are there, in {output}, and the samples were not kept ({missing[0]} is missing)"
+        reason = f"the statistics exist, in {output}, but the samples were not kept ({missing[0]} is missing)"
         raise InputError("--raw", str(folder), reason, "Choose another output, or add --fresh")
 
 
@@ -170,7 +170,6 @@ class _Streaming:
             self._raw = {
                 "folder": str(raw.absolute()),
                 "attributes": session.attributes,
-                "objective": scene.objective.name,
                 "joints": session.joints,
             }
         self._files = raw_files(self._raw, scene, points)

@@ -36,13 +36,13 @@ VICINITY = 0.01
 
 DEARER = 5
 """Steps, or revolutions to a target error, that a variant may take, times the most that the whole scene took: what is so much
-dearer without an effect (contacts without damping bounce on) ends as failed, and the effect stays on."""
+more expensive without an effect (contacts without damping bounce on) ends as failed, and the effect stays on."""
 
 EVALUATIONS, IMPLICIT_EVALUATIONS = 6, 16
 """Of an explicit step, and of an implicit one on average."""
 
 IMPLICIT = 2.5
-"""What an evaluation counts as where a sample took implicit steps, which solve for what they evaluate, eight samples abreast:
+"""Cost weight of an evaluation in implicit steps, eight samples per batch:
 by processor times 3.6 for a film, 2.1 for bristles, 2.2 in the median of 28 variants of random scenes (0.5 to 8)."""
 
 Simulate = Callable[[Scene, Points], Records]
@@ -99,7 +99,7 @@ class Drawn:
 
 
 class Wanted(NamedTuple):
-    """What a certificate has to hold to."""
+    """What an effect screening has to hold to."""
 
     tolerance: float
     """Relative change that is allowed."""
@@ -144,8 +144,8 @@ class Trial:
                 self.kept[one.name] = error.reason
         if not self.switches:
             raise InputError(
-                "effects", None, "the scene has no effect that could be left out",
-                "See hpcclear check for what is on",
+                "effects", None, "the scene has no effect that could be disabled",
+                "Run hpcclear check to see the effects",
             )  # fmt: skip
         self._variants: dict[Variant, Off | None] = {}
         self._bare = scene.with_({"study": None})  # quick to change
@@ -194,7 +194,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
-        """What is asked of the certificate.
+        """What is asked of the effect screening.
 
         Raises
         ------
@@ -203,7 +203,7 @@ class Trial:
         """
         if not 0.0 < wanted.tolerance < 1.0:
             raise InputError(
-                "--tolerance", wanted.tolerance, "is no relative change above 0 and below 1", "Write 1%, or 0.01"
+                "--tolerance", wanted.tolerance, "is not a relative change above 0 and below 1", "Write 1%, or 0.01"
             )  # fmt: skip
         most = max(wanted.samples // self.drawn.size, 4)
         return Plan(
@@ -220,7 +220,7 @@ class Trial:
         return Points(points.names, points.values, tuple(made.paths(row) for row in points.paths))
 
     def simulated(self, off: Variant) -> Scene:
-        """What is simulated of a variant: its scene, with limits to its cost once the whole scene's is known."""
+        """What is simulated of a variant: its scene, with bounds on its cost once the whole scene's is known."""
         scene = self.variant(off).scene
         if not off or self._evaluations == 0:
             return scene
@@ -239,7 +239,7 @@ class Trial:
             self._turns = {"numerics.target_revolutions": limit}
 
     def seen(self, asked: Asked, records: Records) -> Seen:
-        """What the certificate is told of records."""
+        """What the effect screening uses of records."""
         if not asked.off and self._evaluations == 0:
             self._limit(records)
         scene, labels = self.variant(asked.off).scene, self.scene.joint_labels
@@ -262,7 +262,7 @@ class Trial:
         return [payload_of(self.variant(one.off).scene, self.points(one)) for one in asked]
 
     def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
-        """Follow the certificate to its end; raises what `simulate` does."""
+        """Follow the effect screening to its end; raises what `simulate` does."""
 
         def told(wanted: Sequence[Asked]) -> list[Seen]:
             return [

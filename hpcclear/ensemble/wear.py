@@ -1,4 +1,4 @@
-"""The `wear` command: lives of a mechanism whose joints wear, on all ranks.
+"""The `wear` command: service lives of a mechanism with wear, on all ranks.
 
 Root follows the lives (`hpcclear.dynamics.wear.life`) side by side: what all of them ask for is a design like any other,
 simulated on all ranks and kept in the checkpoint; who goes on after a kill asks for the same once more and finds it done.
@@ -46,7 +46,7 @@ def check_worn(scene: Scene) -> None:
     """
     if scene.wear is None:
         raise InputError(
-            "wear", None, "the scene does not say what lives to follow", "Add [wear], as in jobs/wear.toml"
+            "wear", None, "the scene has no [wear] table", "Add [wear], as in jobs/wear.toml"
         )  # fmt: skip
     if not scene.worn_joints():
         raise InputError(
@@ -55,15 +55,15 @@ def check_worn(scene: Scene) -> None:
     alike = scene.study is None or not of_lives(scene).required_study.random
     if scene.wear.lives > 1 and alike:
         raise InputError(
-            "wear.lives", scene.wear.lives, "without random inputs all lives are the same",
-            "Add [study.random], or follow one life",
+            "wear.lives", scene.wear.lives, "without random inputs all service lives are the same",
+            "Add [study.random], or simulate one service life",
         )  # fmt: skip
     if scene.study is not None and scene.study.worn and scene.wear.lives == 1:
         raise InputError(
             "wear.lives",
             1,
-            "one life has no distribution of clearances",
-            "Follow more, such as 100",
+            "one service life gives no distribution of clearances",
+            "Simulate more, such as 100",
         )
     for name in KINDS["wear"].data.keys() | KINDS["wear"].coords.keys():
         if scene.study is not None and name in [row.name for row in scene.study.random]:
@@ -71,12 +71,12 @@ def check_worn(scene: Scene) -> None:
                 f"study.random.{name}", name, "is the name of a result", "Rename it, and give its path"
             )  # fmt: skip
     _check_bounds(scene)
-    for entry, off in (("target_error", None), ("uncertainty", False)):
-        if getattr(scene.numerics, entry) != off:
-            raise InputError(
-                f"numerics.{entry}", getattr(scene.numerics, entry),
-                "lives have copies of their own for the limits of rate and f", "Remove it, and set wear.copies",
-            )  # fmt: skip
+    if scene.numerics.target_error is not None:
+        raise InputError(
+            "numerics.target_error", scene.numerics.target_error,
+            "wear simulations have replicas of their own for the confidence intervals of wear rate and f",
+            "Remove it, and set wear.copies",
+        )  # fmt: skip
 
 
 def _check_bounds(scene: Scene) -> None:
@@ -97,7 +97,7 @@ def _check_bounds(scene: Scene) -> None:
     if limit is not None and limit > DEEPEST * max(radii):
         raise InputError(
             "wear.limit.clearance", limit,
-            f"no clearance is followed beyond {DEEPEST:g} of its bearing's radius, {DEEPEST * max(radii):g} m",
+            f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, {DEEPEST * max(radii):g} m",
             "Lower it",
         )  # fmt: skip
 
@@ -176,7 +176,7 @@ def follow(
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
     plan = Plan(
-        scene.wear.cycles, scene.wear.tolerance, float(_averaged(scene)), scene.wear.copies,
+        scene.wear.cycles, scene.wear.tolerance, float(scene.numerics.averaged_revolutions), scene.wear.copies,
         scene.wear.most_copies, scene.wear.limit.given(), scene.wear.beyond_limit,
     )  # fmt: skip
     relief = relief_of(scene)
@@ -227,15 +227,10 @@ def _simulated(
 
 
 def waiting_longer(scene: Scene) -> Scene:
-    """The scene for copies that wait longer before they are measured, by a stretch as long as is averaged."""
+    """The scene for copies that wait longer before they are measured, by an interval as long as is averaged."""
     numerics = scene.numerics
-    wait = numerics.transient_revolutions + int(_averaged(scene))
+    wait = numerics.transient_revolutions + numerics.averaged_revolutions
     return scene.with_({"numerics.transient_revolutions": wait})
-
-
-def _averaged(scene: Scene) -> int:
-    averaged: Any = scene.numerics.averaged_revolutions
-    return 1 if averaged == "auto" else averaged
 
 
 def _go_on(
@@ -271,7 +266,7 @@ def run_wear(
     options: Options = DEFAULT_OPTIONS,
     timing: Path | None = None,
 ) -> Finished:
-    """Follow the lives of a scene on all ranks and write them; on root.
+    """Simulate the service lives of a scene on all ranks and write them; on root.
 
     Parameters
     ----------

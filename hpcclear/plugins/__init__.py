@@ -1,9 +1,10 @@
-"""The one place where laws, distributions, surrogates and searches are found by their names.
+"""The one place where laws, objectives, distributions, surrogates and searches are found by their names.
 
 A name in a scene file is one of ours (``"normal"``), that of an installed package's entry point, or ``"module:Name"``: `Name`
 of the Python file ``module.py`` beside the scene file. See `Registry`, and docs/extending.md for what each kind has to offer.
 """
 
+from hpcclear.base.objectives import OURS
 from hpcclear.plugins.registry import Registry
 from hpcclear.plugins.sources import raised, run_source, trusting, using
 
@@ -12,6 +13,7 @@ __all__ = [
     "DISTRIBUTIONS",
     "FRICTION_LAWS",
     "KINDS",
+    "OBJECTIVES",
     "SEARCHES",
     "SURROGATES",
     "Registry",
@@ -23,14 +25,17 @@ __all__ = [
 
 CONTACT_LAWS = Registry("contact law", "hpcclear.contact_laws")
 FRICTION_LAWS = Registry("friction law", "hpcclear.friction_laws")
+OBJECTIVES = Registry("objective", "hpcclear.objectives")
 DISTRIBUTIONS = Registry("distribution", "hpcclear.distributions", needs=("ppf",))
 SURROGATES = Registry("surrogate", "hpcclear.surrogates")
 SEARCHES = Registry("search", "hpcclear.searches")
 
+for _name, _objective in OURS.items():
+    OBJECTIVES.add(_name, _objective)
 SURROGATES.add("kriging", "hpcclear.statistics.surrogate.fitting:KrigingMethod")
 SEARCHES.add("swarm", "hpcclear.statistics.search.mopso:swarm")
 for _name in ("AGEMOEA", "AGEMOEA2", "GDE3", "NSGA2", "NSGA3", "RVEA", "SMSEMOA", "UNSGA3"):
     SEARCHES.add(f"pymoo:{_name}", f"hpcclear.statistics.search.foreign:{_name}")
 
-KINDS = (CONTACT_LAWS, FRICTION_LAWS, DISTRIBUTIONS, SURROGATES, SEARCHES)
+KINDS = (CONTACT_LAWS, FRICTION_LAWS, OBJECTIVES, DISTRIBUTIONS, SURROGATES, SEARCHES)
 """Every registry."""

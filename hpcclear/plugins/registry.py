@@ -113,7 +113,7 @@ class Registry:
         if name not in self._offered:
             points = list(entry_points(group=self.group, name=name))
             if not points:
-                reason = f"is no {self.kind} that is known here"
+                reason = f"is not a known {self.kind}"
                 raise InputError(self.kind, name, reason, self._known(name))
             if len({point.value for point in points}) > 1:
                 packages = " and ".join(sorted(_package(point)[0] for point in points))
@@ -131,8 +131,8 @@ class Registry:
         except (Exception, SystemExit) as error:
             raise InputError(
                 self.kind, point.name,
-                f"{package} {version} offers it, and importing it raised {type(error).__name__}: {error}",
-                "Mend or reinstall that package",
+                f"{package} {version} offers it, but importing it raised {type(error).__name__}: {error}",
+                "Repair or reinstall that package",
             ) from error  # fmt: skip
 
     def _known(self, name: str) -> str:

@@ -132,8 +132,8 @@ def run_source(module: str, text: str) -> ModuleType:
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise InputError(
-            f"{module}.py", _said(error, path), "this was raised while it was read",
-            "Mend it; a plug-in is one file, which may import installed packages",
+            f"{module}.py", _said(error, path), "reading the file raised this error",
+            "Correct it; a plug-in is one file, which may import installed packages",
         ) from error  # fmt: skip
     return made
 
@@ -142,7 +142,7 @@ def raised(key: str, name: str, what: str, error: Exception) -> InputError:
     """Return the error of an entry `key` whose plug-in `name` raised in use, with the line it came from."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     reason = f"{what}: {type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
-    return InputError(key, name, reason, "Mend it, or leave the entry out")
+    return InputError(key, name, reason, "Correct it, or leave the entry out")
 
 
 def _said(error: BaseException, path: str) -> str:

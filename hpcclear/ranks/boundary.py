@@ -24,6 +24,7 @@ from hpcclear.base.errors import (
     check_address_space,
     mendable,
 )
+from hpcclear.base.extras import installing
 from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
 from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
@@ -165,7 +166,7 @@ def _refused(mail: Mail, complaint: str, code: int) -> int:
     elif len(lanes) > 1:
         shown = ", ".join(asked or "nothing" for asked in lanes)
         reason = "it differs from rank to rank"
-        remedy = "Set the same for all, or for none"
+        remedy = "Set it to the same value on all ranks, or on none"
         text, code = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}", Exit.BAD_INPUT
     else:
         return Exit.DONE
@@ -204,8 +205,8 @@ def _load_mpi() -> Any:
             "MPI library",
             "none",
             f"mpi4py cannot load one ({' '.join(str(error).split())})",
-            "Load the site's MPI module, set MPI4PY_LIBMPI to its libmpi, or install one with "
-            "pip install 'hpcclear[mpich]'",
+            "Load the site's MPI module, or set MPI4PY_LIBMPI to its libmpi. To have one of your own: "
+            + installing("mpich").partition(": ")[2],
         ) from error
     return MPI
 
@@ -229,8 +230,8 @@ def _open_mail(patience: float = PATIENCE) -> Mail:
         raise InputError(
             variable,
             copies,
-            f"the launcher started {copies} processes, but each of them sees only itself: it does "
-            f"not belong to the MPI library in use ({describe_mpi()})",
+            f"the launcher started {copies} processes, but each sees only itself: the launcher "
+            f"does not belong to the MPI library in use ({describe_mpi()})",
             "Start with the mpiexec of that library, or set MPI4PY_LIBMPI to the launcher's; with "
             "srun, choose the right --mpi",
         )
@@ -279,7 +280,7 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
 def _dismiss(ranks: Ranks, code: int, told: str = "") -> int:
     """Tell the others to leave; after a failure those who do not listen are ended.
 
-    What another rank told is said last: who found root deaf says it itself, does not leave, and ends the job.
+    An error of another rank is reported last. A rank that cannot reach root reports the error itself and ends the job.
     """
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)

@@ -61,7 +61,7 @@ def pin_threads() -> None:
     """Keep BLAS, OpenMP and Numba of this process to one thread.
 
     Ranks share a node's cores, and sums over several threads differ in the last bit. Libraries that
-    are not loaded yet read the environment; those that are get told.
+    are not loaded yet read the environment; those that are get informed.
     """
     for name in _THREADS:
         os.environ[name] = "1"

@@ -1,6 +1,6 @@
 """Who hands samples out: root to all ranks; where these are many, root to a leader on each node, and that to its others.
 
-A rank serves whoever told it that a stage begins. Shared out twice, samples cost root a message for each bundle of them,
+A rank serves whoever announced the stage to it. Shared out twice, samples cost root a message for each bundle of them,
 and within a node all is as between root and a few ranks.
 """
 
@@ -35,10 +35,10 @@ class Process(Protocol):
         """A worker for a task, and the seconds it took to make it."""
 
     def raise_if_stopped(self) -> None:
-        """Raise `Stopped` if asked to end early."""
+        """Raise `Stopped` if requested to end early."""
 
     def pass_on_stop(self) -> None:
-        """Tell root of a signal that only this rank may have got."""
+        """Report to root a signal that only this rank may have received."""
 
     def heed(self, message: Message, /) -> None:
         """Act on what a rank may say at any time."""
@@ -91,7 +91,7 @@ class Lead:
         self.book = book
 
     def _answer(self, message: Message) -> None:
-        """Book what a rank sends, and give it what it asks for."""
+        """Book what a rank sends, and give it what it requests."""
         source, tag, body = message
         if tag == Tag.ASK:
             records, need = body
@@ -290,7 +290,7 @@ class NodeLead(Lead):
                 self._give(source, need)
 
     def _speak(self) -> None:
-        """Hand root the bundles that are done, and ask for others in time."""
+        """Hand root the bundles that are done, and request others in time."""
         done = self._sharing.finished()
         if not (self._asked or self._exhausted) and self._stock < self._ask_below:
             self._mail.send(0, Tag.ASK, (done, Need(1, self._stock, 0.0)))

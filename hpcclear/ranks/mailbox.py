@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+from hpcclear.base import host
+
 _SHORTEST = 2e-4  # s
 
 
@@ -99,7 +101,7 @@ class Mail:
         self.neighbours: list[int] = []
         self.leaders: list[int] = []
         self.crew: list[int] = []
-        cores = os.sched_getaffinity(0) if sys.platform == "linux" else range(os.cpu_count() or 1)
+        cores = host.cores()
         if mpi is None:
             self.rank, self.size = 0, 1
             self.node_rank, self.node_size, self.node_cores = 0, 1, len(cores)
@@ -109,7 +111,7 @@ class Mail:
         self._pulses = mpi.COMM_WORLD.Dup()
         self._node = self._comm.Split_type(mpi.COMM_TYPE_SHARED)
         self.node_rank, self.node_size = self._node.rank, self._node.size
-        self.node_cores = len(set().union(*self._node.allgather(set(cores))))
+        self.node_cores = len(set().union(*self._node.allgather(cores)))
         self._look_around(mpi.Query_thread() >= mpi.THREAD_SERIALIZED)
 
     def _look_around(self, threads: bool) -> None:

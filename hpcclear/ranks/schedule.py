@@ -1,4 +1,4 @@
-"""Who simulates what: how many samples a rank gets at a time, and the books that are kept of them.
+"""Who simulates what: how many samples a rank gets at a time, and the record that is kept of them.
 
 Free of MPI, so that a scaling model can run the same policy on ranks that do not exist.
 """
@@ -46,7 +46,7 @@ class Worker(Protocol):
 
 
 class Points(Protocol):
-    """A design: an array (n, d), or anything that makes the rows asked for."""
+    """A design: an array (n, d), or anything that makes the rows requested."""
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -56,7 +56,7 @@ class Points(Protocol):
 
 
 class Need(NamedTuple):
-    """What a rank says of itself when it asks for samples."""
+    """What a rank says of itself when it requests samples."""
 
     lanes: int  # samples it works on at once
     pending: int  # samples it still has
@@ -64,7 +64,7 @@ class Need(NamedTuple):
 
 
 class Allotment(NamedTuple):
-    """What it gets: so many samples, and the stock below which it asks again."""
+    """What it gets: so many samples, and the stock below which it requests more."""
 
     size: int
     ask_below: int
@@ -87,7 +87,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
     ranks : int
         Ranks that work.
     need : Need
-        Lanes, stock and speed of the rank that asks.
+        Lanes, stock and speed of the requesting rank.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
 
 
 class HandOut:
-    """Root's books of one design: what is left, what is out, what is finished.
+    """Root's record of one design: what is left, what is out, what is finished.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class HandOut:
         return 0 < self.remaining <= ENDING * self._rate * self._ranks
 
     def grant(self, need: Need) -> tuple[np.ndarray, int]:
-        """Indices of samples for the rank that asks (none when nothing is left), and when to ask again."""
+        """Indices of samples for the requesting rank (none when nothing is left), and when it requests more."""
         self._rate = need.rate
         size, ask_below = allot(self.remaining, self._ranks, need)
         index = self._waiting(self._next, self._next + size)
@@ -238,14 +238,14 @@ class Desk:
 
     @property
     def need(self) -> Need:
-        """What to tell root."""
+        """What to report to root."""
         finished, seconds = self._recent
         rate = float(finished / seconds) if seconds > 0.0 else 0.0
         return Need(self._worker.lanes, self._worker.pending, rate)
 
     @property
     def hungry(self) -> bool:
-        """Whether it is time to ask for more."""
+        """Whether it is time to request more."""
         return not self.exhausted and self._worker.pending < self._ask_below
 
     @property

@@ -10,13 +10,11 @@ from collections.abc import Callable
 from enum import IntEnum
 from types import FrameType, TracebackType
 
+from hpcclear.base.host import STOP_SIGNALS
 from hpcclear.ranks.launcher import launched_rank
 
-STOP_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
-"""What batch systems and people send to end a job."""
-
 GRACE = 3.8
-"""Seconds a rank has to flush and leave once it was told to; the promise is 5."""
+"""Seconds a rank has to flush and leave after a stop; documented as 5."""
 
 
 LONGEST_WAIT = 3600.0
@@ -34,7 +32,7 @@ class Exit(IntEnum):
 
 
 class Stopped(Exception):
-    """The run was asked to end early; everything finished is saved, the same command goes on."""
+    """The run was stopped early; everything finished is saved, the same command resumes."""
 
 
 class RankFailed(Exception):
@@ -97,7 +95,7 @@ class StopSwitch:
 
     @property
     def reason(self) -> str:
-        """What asked to stop; empty while nothing did."""
+        """Source of the stop; empty without one."""
         if self._reason is None and self._limit is not None and time.monotonic() >= self._limit:
             self.request("the time limit was reached")
         return self._reason or ""
@@ -112,7 +110,7 @@ class StopSwitch:
         self._rouse()
 
     def request(self, reason: str) -> None:
-        """Ask to stop; the first reason counts."""
+        """Request a stop; the first reason counts."""
         if self._reason is None:
             self._reason = reason
             self.leave_within(GRACE, Exit.STOPPED)

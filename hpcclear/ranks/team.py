@@ -112,7 +112,7 @@ class Ranks:
         return f"{place}, sample {shown}" if samples else place
 
     def stop_requested(self) -> bool:
-        """Whether a signal on any rank or the time limit asks to end early; for root.
+        """Whether a signal on any rank or the time limit requests an early end; for root.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Ranks:
         return self.stop_switch.is_set()
 
     def raise_if_stopped(self) -> None:
-        """Raise `Stopped` if asked to end early; for loops of serial code on root."""
+        """Raise `Stopped` if requested to end early; for loops of serial code on root."""
         if self.stop_requested():
             raise Stopped(self.stop_switch.reason)
 
@@ -155,7 +155,7 @@ class Ranks:
         ----------
         task : Task
         points : ndarray, shape (n, d), or Points
-            The design, or an object that makes the rows asked for.
+            The design, or an object that makes the rows requested.
         completed : structured ndarray, optional
             Records of samples finished before; they are not simulated again.
         on_records : callable, optional
@@ -176,7 +176,7 @@ class Ranks:
         Raises
         ------
         Stopped
-            If asked to end early; `on_records` got everything that was finished, `save` may be due.
+            If requested to end early; `on_records` got everything that was finished, `save` may be due.
         RankFailed
             If another rank failed; likewise.
         """
@@ -212,7 +212,7 @@ class Ranks:
         Raises
         ------
         Stopped
-            If asked to end early.
+            If requested to end early.
         RankFailed
             If another rank failed.
         """
@@ -336,7 +336,7 @@ class Ranks:
         return records
 
     def pass_on_stop(self) -> None:
-        """Tell root of a signal that only this rank may have got."""
+        """Report to root a signal that only this rank may have received."""
         if self.stop_switch.is_set() and not self._passed_on:
             self.mail.send(0, Tag.STOP, f"{self.stop_switch.reason} on rank {self.rank}")
             self._passed_on = True

@@ -59,7 +59,7 @@ class Neighbour:
 
 
 class Pulses(Protocol):
-    """What carries pulses; none of it blocks, and any thread may call it."""
+    """Transport of pulses; it never blocks, and any thread may call it."""
 
     @property
     def neighbours(self) -> list[int]:

@@ -3,8 +3,10 @@
 Figures need matplotlib (the extra ``analysis``), which is imported when the first one is drawn.
 """
 
+from hpcclear.report.figures.compared import overlay_figure
 from hpcclear.report.figures.designs import comparison_figure, front_figure
 from hpcclear.report.figures.effects import effects_figure
+from hpcclear.report.figures.maps import bifurcation_figure, map_figure
 from hpcclear.report.figures.portraits import (
     force_polar_figure,
     orbit_figure,
@@ -12,7 +14,6 @@ from hpcclear.report.figures.portraits import (
     poincare_figure,
 )
 from hpcclear.report.figures.response import (
-    bifurcation_figure,
     energy_figure,
     penetration_figure,
     response_figure,
@@ -40,7 +41,9 @@ __all__ = [
     "fit_figure",
     "force_polar_figure",
     "front_figure",
+    "map_figure",
     "orbit_figure",
+    "overlay_figure",
     "parity_figure",
     "penetration_figure",
     "phase_figure",

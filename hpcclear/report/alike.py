@@ -24,10 +24,48 @@ def words(ours: xr.Dataset, best: xr.Dataset) -> str:
     return f"{shown} ({spans})" if spans else shown
 
 
+FLAT = 0.01
+"""Relative difference of merit up to which other designs are listed beside the best."""
+
+
+def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
+    """Return the designs whose merit (n,) is within `FLAT` of the best, what they share, and the lightest; "" if none."""
+    least = float(merit.min())
+    near = np.isfinite(merit) & (merit - least <= FLAT * abs(least))
+    own = [*again(ours, best), str(best["design"].item())]
+    names = [str(name) for name in ours["design"].to_numpy()[near] if str(name) not in own]
+    if not names:
+        return ""
+    together = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names]))
+    text = f"{_listed(names)}: merit within {FLAT:.0%} of the recommended design"
+    if spans := _spans(together):
+        text += f"; they differ in {spans}"
+    same = [
+        f"{labels.words(one)} = {labels.quantity(float(one[0]), str(one.attrs['units']))}"
+        for one in labels.design_variables(together)
+        if float(one.max()) - float(one.min()) <= SAME * abs(float(one.max()))
+    ]
+    text += f"; in common: {', '.join(same)}" if same else ""
+    return text + _lightest(together, best)
+
+
+def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
+    """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
+    masses = [one.name for one in labels.design_variables(together) if one.attrs["units"] == "kg"]
+    if not masses:
+        return ""
+    whole = np.sum([together[name].to_numpy() for name in masses], axis=0)
+    saved = float(sum(float(best[name]) for name in masses)) - float(np.nanmin(whole))
+    if not saved > 1e-6:
+        return ""
+    name = str(together["design"].to_numpy()[int(np.nanargmin(whole))])
+    return f"; lightest: {name}, {labels.quantity(saved, 'kg', 2)} less"
+
+
 def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     """Return other designs that are statistically indistinguishable from the best."""
-    again = _again(ours, best)
-    return [name for name in _twins(ours, best) if name not in again]
+    same = again(ours, best)
+    return [name for name in _twins(ours, best) if name not in same]
 
 
 def _listed(names: list[str]) -> str:
@@ -39,8 +77,8 @@ def _listed(names: list[str]) -> str:
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
-def _again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Other names of the best: all variables are the same numbers."""
+def again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+    """Return other names of a design: all variables are the same numbers."""
     variables = labels.design_variables(ours)
     alike = np.full(ours.sizes["design"], bool(variables))  # of none nothing is known
     for variable in variables:

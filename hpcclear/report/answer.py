@@ -3,16 +3,18 @@
 The command prints them at its end, and they head the page.
 """
 
+import re
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ENDS, ORDINALS
+from hpcclear.base.objectives import ORDINALS
 from hpcclear.base.outcome import Flag
-from hpcclear.report import alike, failures
+from hpcclear.report import alike, failures, scatter
 from hpcclear.report.figures import fits, labels
+from hpcclear.report.scatter import HALF_WIDTH
+from hpcclear.report.spread import Line
 
 SPAN = 2.0
 """Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
@@ -32,18 +34,8 @@ LARGE = 0.1
 LITTLE = 0.01
 """Share of the variance of f, with its half-width, below which a variable is called negligible."""
 
-HALF_WIDTH = 1.96
-"""Half-width of a 95 % confidence interval, standard errors."""
-
 COARSE = 0.1
 """Half-width of a Sobol index above which more samples are advised."""
-
-
-class Line(NamedTuple):
-    """One line of the answer: its subject and its text."""
-
-    label: str
-    text: str
 
 
 def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
@@ -62,119 +54,45 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ours = _ours(verified)
     best = _best(ours)
     original = _original(ours)
-    scatter = _scatter(files, best)
+    chaotic = _scatter(files, best)
+    near = alike.flat(ours, best, _judged(ours))
     return [
         Line("recommended", _named(best)),
-        Line("criterion", f"lowest {_merit(ours)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
+        Line("criterion", f"{_merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
              f"f: {labels.objective(verified)}"),
         Line("values", _values(best)),
         Line("mean", _moment(best, "mean", original)),
         Line("std. deviation", _moment(best, "deviation", original)),
         *(Line("objective", text) for text in _goals(best)),
-        *(Line("constraint", text) for text in _constraints(best)),
+        *(Line("constraint", text) for text in constraints(best)),
         Line("equivalent", alike.words(ours, best)),
-        Line("active bounds", _bounds(best)),
+        *([Line("near", near)] if near else []),
+        Line("active bounds", bounds(best)),
+        *scatter.lines(files, best),
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
         Line("contact model", _left(files, best)),
         *(Line("failed", text) for text in _failed(files)),
-        *([Line("chaos", scatter)] if scatter else []),
+        *([Line("chaos", chaotic)] if chaotic else []),
         Line("confidence", _sure(best, verified)),
         Line("next steps", "; ".join(_next(files, ours, best, place))),
     ]  # fmt: skip
 
 
-BESIDE = ("original", *ENDS[:2])
-"""Designs of a case that stand beside each other, and with them further ends where its front has more."""
-
-_ROWS = {
-    "mean": "mean_true",
-    "std. deviation": "deviation_true",
-    "95th percentile": "percentile",
-    "mean, own wear": "life_mean",
-    "std. dev., own wear": "life_deviation",
-}
-"""Lines of the table of a case, and the variables they show."""
-
-
-def beside_original(
-    verified: xr.Dataset,
-) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """Yield each case, the headers of its table, and its lines: a quantity and its value for each design, with half-width and
-    change from the baseline. The designs are `BESIDE`, and the recommended one if it is another one."""
+def recommended(verified: xr.Dataset) -> str:
+    """Return the name of the recommended design; "" if no design was verified."""
     known = bool(np.isfinite(verified["mean_true"]).any())
-    best = str(_best(_ours(verified))["design"].item()) if known else ""
-    names = [str(name) for name in verified["design"].to_numpy()]
-    for case in [name.removesuffix(" original") for name in names if name.endswith(" original")]:
-        if not {f"{case} {end}" for end in BESIDE} <= set(names):
-            continue
-        own = best.removeprefix(f"{case} ")
-        ends = (*BESIDE, *(end for end in ENDS[2:] if f"{case} {end}" in names))
-        ends = ends if own == best or own in ends else (*ends, own)
-        designs = [verified.sel(design=f"{case} {end}") for end in ends]
-        lines = [
-            (words, *(_against(one, designs[0], name) for one in designs))
-            for words, name in _ROWS.items()
-            if name in verified or not name.startswith("life_")
-        ]
-        for name in _asked(designs[0]):
-            words = labels.statistic(str(designs[0][f"{name}_goal"].item())).removesuffix(" of f")
-            lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
-        if kept := [str(one["constraints"].item()) for one in designs if "constraints" in one]:
-            lines.append(
-                ("constraints", *(_VERDICTS.get(_standing(text), "none") for text in kept))
-            )
-        plain = is_plain(designs[0])
-        headers = tuple(
-            _header(end, plain) + (", recommended" if end == own != best else "") for end in ends
-        )
-        yield case, headers, [*lines, ("active bounds", "", *(_bounds(one) for one in designs[1:]))]
+    return str(_best(_ours(verified))["design"].item()) if known else ""
 
 
-def _header(end: str, plain: bool) -> str:
-    """What a design of a case is called: its role, and the name that it has in the files."""
-    if end == "original":
-        return "baseline"
-    if end not in ENDS:
-        return end
-    roles = ("lowest mean", "lowest std. dev.")
-    if plain and end in ENDS[:2]:
-        return f"{roles[ENDS.index(end)]} ({end})"
-    return f"lowest objective {ENDS.index(end) + 1} ({end})"
-
-
-def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
-    """A simulated value, its half-width, and its change from the baseline's."""
-    if name not in one or not np.isfinite(float(one[name])):
-        return "not known"
-    value, stem = float(one[name]), name.removesuffix("_true")
-    unit = _unit(one, name)
-    text = labels.quantity(value, unit)
-    if not unit:  # a share or a formula
-        ends = [float(one[f"{stem}_{end}"]) for end in ("lower", "upper")]
-        return text if ends[0] == ends[1] else f"{text} ({ends[0]:.2g} to {ends[1]:.2g})"
-    if f"{stem}_upper" in one and value:
-        half = (float(one[f"{stem}_upper"]) - float(one[f"{stem}_lower"])) / 2.0
-        text += f" ±{abs(half / value):.2%}" if np.isfinite(half) else ", interval not known"
-    if one["design"].item() == original["design"].item():
-        return text
-    before = float(original[name])
-    return f"{text} {value / before - 1.0:+.0%}" if before else text
-
-
-def _unit(one: xr.Dataset, name: str) -> str:
-    """Unit of a variable; of what a case makes small it stands beside it."""
-    own = f"{name.removesuffix('_true')}_unit"
-    return str(one[own].item()) if own in one else str(one[name].attrs["units"])
-
-
-_USUAL = ("mean of f", "deviation of f", "95th percentile of f")
+USUAL = ("mean of f", "deviation of f", "95th percentile of f")
 """Quantities that are printed of every design, whatever the objectives of its case."""
 
 
-def _asked(one: xr.Dataset) -> list[str]:
-    """Objectives of the case of a design that have no line anyway: "first", "second"."""
-    return [name for name in goals_of(one) if str(one[f"{name}_goal"].item()) not in _USUAL]
+def unit_of(one: xr.Dataset, name: str) -> str:
+    """Return the unit of a variable; of what a case makes small it stands beside it."""
+    own = f"{name.removesuffix('_true')}_unit"
+    return str(one[own].item()) if own in one else str(one[name].attrs["units"])
 
 
 def goals_of(one: xr.Dataset) -> list[str]:
@@ -184,7 +102,7 @@ def goals_of(one: xr.Dataset) -> list[str]:
 
 def leading_goals(verified: xr.Dataset) -> list[str]:
     """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
-    if not any(_counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
+    if not any(counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
         return []
     first = _ours(verified).isel(design=0)
     return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
@@ -194,9 +112,9 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
     """Objectives of the case of a design besides mean and standard deviation, with confidence intervals."""
     names = [] if is_plain(best) else goals_of(best)
     for name in names:
-        if len(names) > 2 and str(best[f"{name}_goal"].item()) in _USUAL[:2]:
+        if len(names) > 2 and str(best[f"{name}_goal"].item()) in USUAL[:2]:
             continue  # has a line of its own
-        value, unit = float(best[f"{name}_true"]), _unit(best, f"{name}_true")
+        value, unit = float(best[f"{name}_true"]), unit_of(best, f"{name}_true")
         low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
         text = (
             f"{labels.statistic(str(best[f'{name}_goal'].item()))} {labels.quantity(value, unit)}"
@@ -206,16 +124,19 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
         yield text
 
 
-_VERDICTS = {"broken": "violated", "cannot be told": "undecided", "kept": "satisfied"}
+VERDICTS = {"broken": "violated", "cannot be told": "undecided", "kept": "satisfied"}
 """How a file states the verdict on a constraint, the worst first, and what is printed."""
 
 
-def _constraints(best: xr.Dataset) -> Iterator[str]:
-    """Constraints of the case of a design, each with its value and verdict."""
+def constraints(best: xr.Dataset) -> Iterator[str]:
+    """Yield the constraints of the case of a design, each with its value and verdict."""
     if "constraints" in best and str(best["constraints"].item()):
         for text in str(best["constraints"].item()).split("; "):
-            head, _, verdict = text.rpartition(": ")
-            yield f"{head}: {_VERDICTS.get(verdict, verdict)}" if head else text
+            text = re.sub(r" ([^\s)]+) at most", r" = \1, at most", labels.statistic(text))
+            text = text.replace(") at most", "), at most")
+            for word, printed in VERDICTS.items():
+                text = text.replace(f": {word}", f": {printed}")
+            yield text
 
 
 def is_plain(one: xr.Dataset) -> bool:
@@ -223,20 +144,20 @@ def is_plain(one: xr.Dataset) -> bool:
     if "first_goal" not in one:
         return True
     asked = tuple(str(one[f"{name}_goal"].item()) for name in goals_of(one))
-    return asked == _USUAL[:2] and not str(one["constraints"].item())
+    return asked == USUAL[:2] and not str(one["constraints"].item())
 
 
-def _standing(text: str) -> str:
-    """The worst verdict on a design's constraints, in the words of the file."""
-    for word in _VERDICTS:
-        if any(part.endswith(f": {word}") for part in text.split("; ")):
+def standing(text: str) -> str:
+    """Return the worst verdict on a design's constraints, in the words of the file."""
+    for word in VERDICTS:
+        if f": {word}" in text:
             return word
     return ""
 
 
 def _ours(verified: xr.Dataset) -> xr.Dataset:
-    """Designs of the case in which most is random, the original among them, without those a publication prints."""
-    rows = [k for k in range(verified.sizes["design"]) if _counts(verified.isel(design=k))]
+    """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
+    rows = [k for k in range(verified.sizes["design"]) if counts(verified.isel(design=k))]
     if "case" in verified:
         cases = [str(case) for case in verified["case"].to_numpy()]
         chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
@@ -248,7 +169,8 @@ def _random_inputs(verified: xr.Dataset, k: int) -> int:
     return len(str(verified["random"].to_numpy()[k]).split()) if "random" in verified else 0
 
 
-def _counts(one: xr.Dataset) -> bool:
+def counts(one: xr.Dataset) -> bool:
+    """Return whether a design was simulated and is no design of a publication."""
     finite = np.isfinite(float(one["mean_true"])) and np.isfinite(float(one["deviation_true"]))
     return finite and not labels.is_printed(one)
 
@@ -270,21 +192,45 @@ def _judged(ours: xr.Dataset) -> np.ndarray:
     if is_plain(ours.isel(design=0)):
         return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
     order = ("", "kept", "cannot be told", "broken")
-    ranks = np.array([order.index(_standing(str(one))) for one in ours["constraints"].to_numpy()])
-    return np.where(ranks == ranks.min(), ours["first_true"].to_numpy(), np.inf)
+    ranks = np.array([order.index(standing(str(one))) for one in ours["constraints"].to_numpy()])
+    merit = ours["first_true"].to_numpy()
+    level = ranks == ranks.min()
+    if ranks.min() > 1 and "constraint_excess" in ours:  # none is surely within: the nearest
+        excess = ours["constraint_excess"].to_numpy()
+        within = level & (excess <= 0.0)
+        level, merit = (within, merit) if within.any() else (level, excess)
+    return np.where(level, merit, np.inf)
 
 
-def _merit(ours: xr.Dataset) -> str:
+def _merit(ours: xr.Dataset, best: xr.Dataset) -> str:
     """What `_judged` goes by, in words."""
-    first = ours.isel(design=0)
-    if is_plain(first):
-        return f"mean + {SPAN:g} standard deviations of f"
-    words = labels.statistic(str(first["first_goal"].item()))
-    return f"{words} within the constraints" if str(first["constraints"].item()) else words
+    if is_plain(best):
+        return f"lowest mean + {SPAN:g} standard deviations of f"
+    words = f"lowest {labels.statistic(str(best['first_goal'].item()))}"
+    found = standing(str(best["constraints"].item()))
+    if found == "broken":
+        return "smallest violation of the constraints"
+    if found == "cannot be told":
+        inside = float(best.get("constraint_excess", np.nan)) <= 0.0
+        return (
+            f"{words} where estimates satisfy the constraints,"
+            if inside
+            else "smallest estimated violation of the constraints"
+        )
+    return f"{words} within the constraints" if found else words
+
+
+_NONE = {
+    "broken": "none: every simulated design violates a constraint",
+    "cannot be told": "none: no simulated design is certain to satisfy the constraints",
+}
+"""What stands in place of a recommendation where no design significantly satisfies the constraints, by the best verdict."""
 
 
 def _named(best: xr.Dataset) -> str:
     name = str(best["design"].item())
+    if (verdict := standing(str(best.get("constraints", xr.DataArray("")).item()))) in _NONE:
+        return f"{_NONE[verdict]}; nearest: {name}"
     if name.rpartition(" ")[2] == "original":
         return f"keep the baseline design ({name}): no simulated design is better"
     return name
@@ -318,7 +264,8 @@ def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
     return f"{text}, {abs(change):.0%} {'below' if change < 0 else 'above'} the baseline ({labels.quantity(before, unit)})"
 
 
-def _bounds(best: xr.Dataset) -> str:
+def bounds(best: xr.Dataset) -> str:
+    """Return the active bounds of a design, "none" without any."""
     found = str(best["on_bounds"].item()) if "on_bounds" in best else ""
     return found or "none"
 
@@ -354,21 +301,20 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
     little = total + HALF_WIDTH * error < LITTLE
     texts = {
         kind: ", ".join(
-            f"{names[k]} {value[k]:.0%} ± {HALF_WIDTH * error[k]:.1%}"
-            for k in order
-            if not little[k]
+            scatter.share(names[k], value[k], HALF_WIDTH * error[k]) for k in order if not little[k]
         )
         for kind, (value, error) in indices.items()
     }
-    own = (
-        "first-order Sobol indices, the share of the variance of f over the study's ranges that a variable makes by itself "
-        "(± 95 % half-width)"
-    )
+    own = "first-order Sobol indices, the share of the variance of f that a variable explains alone (± 95 % half-width)"
     if texts["total"] and "first" in texts:
         yield Line("sensitivity", f"{own}: {texts['first']}")
     if texts["total"]:
         words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
         yield Line("interactions", f"{words}: {texts['total']}")
+    noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
+    if noise > HALF_WIDTH * doubt and noise > LITTLE:
+        text = f"{scatter.share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
+        yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
     if little.any():
         hardly = ", ".join(names[k] for k in order if little[k])
         yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")
@@ -429,7 +375,7 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
 
 
 def _surrogate_errors(best: xr.Dataset) -> list[float]:
-    """Relative errors of the surrogate's mean and deviation, as far as they are known."""
+    """Relative errors of the surrogate's mean and standard deviation, as far as they are known."""
     found = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
     return [error for error in found if np.isfinite(error)]
 
@@ -440,6 +386,10 @@ def _next(
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
         yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
+    prices = re.findall(r"about (\d+) simulations would decide", str(best.get("constraints", "")))
+    if prices:
+        key = "most_samples" if ours.attrs.get("method") == "qmc" else "samples"
+        yield f"study.verification.{key}={max(map(int, prices))} to decide the constraints"
     if "on_bounds" in best and str(best["on_bounds"].item()):
         yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):

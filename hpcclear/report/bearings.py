@@ -1,5 +1,7 @@
 """Loads of the bearings in one response: forces with their angles, contact, pressure, torque, and warnings."""
 
+from collections.abc import Callable, Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
 from hpcclear.scene.loading import scene_of_text
+from hpcclear.scene.mechanism import length_path
 
 MISSED = 0.01
 """Of a peak force: what the largest stored force may lack of it and still be the same peak."""
@@ -26,6 +29,8 @@ _SENSITIVE_WORDS = (
 )
 
 REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
+WARNED = tuple(flag for flag in REMARKS if flag is not Flag.STIFF)
+"""Flags that are warnings: all but notes."""
 
 
 class Bearing(NamedTuple):
@@ -42,6 +47,10 @@ class Bearing(NamedTuple):
     """Time mean of the contact force, N."""
     pressure: float
     """Mean force over the projected area 2 R_B L, Pa; the scene gives L for a film or for wear."""
+    peak_pressure: float
+    """Largest contact pressure at the peak force, Pa; the geometry of contact has it for lines and liners."""
+    half_angle: float
+    """Half of the angle over which the surfaces touch there, rad."""
     contact: float
     """Share of the time in contact."""
     gap: float
@@ -83,6 +92,8 @@ def bearings(response: xr.Dataset) -> list[Bearing]:
                 float(angles[at] % (2.0 * np.pi)) if len(force) else np.nan,
                 mean,
                 mean / areas.get(joint, np.nan),
+                _known(response, "peak_contact_pressure", k),
+                _known(response, "contact_half_angle", k),
                 float(weight @ touching) if len(force) else np.nan,
                 float(response["mean_gap"][k]),
             )
@@ -106,9 +117,9 @@ def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
     found = []
     f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
-        found.append(("Warning", _SENSITIVE_WORDS.format(half_width / abs(f))))
+        found.append(("Warning", sensitive_words(half_width / abs(f))))
     flags = int(response["flags"])
-    warnings = flag_remarks(flags & ~int(Flag.STIFF))
+    warnings = flag_remarks(flags & sum(WARNED))
     notes = flag_remarks(flags & int(Flag.STIFF))
     return [
         *found, *(("Warning", text) for text in warnings), *(("Note", text) for text in notes)
@@ -132,16 +143,39 @@ def validity(response: xr.Dataset) -> str:
 def share(contact: float) -> str:
     """Return a share of the time in words; a share that is not 0 or 1 is never rounded to it."""
     if not np.isfinite(contact):
-        return "nan"
+        return "–"
     if contact in (0.0, 1.0):
         return f"{contact:.0%}"
     return "> 99.9%" if contact > 0.999 else "< 0.1%" if contact < 0.001 else f"{contact:.1%}"
+
+
+def pressures(found: Sequence[Bearing]) -> list[tuple[str, Callable[[Bearing], str]]]:
+    """Return headings and cells of further columns of the bearings' table, of what some bearing has."""
+    columns: list[tuple[str, str, Callable[[Bearing], str]]] = [
+        ("mean pressure", "pressure", lambda one: labels.quantity(one.pressure, "Pa", 3)),
+        ("half angle of contact", "half_angle", lambda one: _in_degrees(one.half_angle)),
+        ("peak pressure", "peak_pressure", lambda one: labels.quantity(one.peak_pressure, "Pa", 3)),
+    ]  # fmt: skip
+    return [
+        (title, shown)
+        for title, entry, shown in columns
+        if any(np.isfinite(getattr(one, entry)) for one in found)
+    ]
+
+
+def _in_degrees(angle: float) -> str:
+    return f"{np.degrees(angle):.0f} deg" if np.isfinite(angle) else "–"
 
 
 def degrees(one: Bearing) -> str:
     """Return the crank angle of the peak in words, a dash where no stored instant has it."""
     known = np.isfinite(one.angle) and not one.between_instants and one.peak > 0.0
     return f"{np.degrees(one.angle):.0f} deg" if known else "–"
+
+
+def sensitive_words(relative: float) -> str:
+    """Return the warning of a half-width of f that is so large, relative to f."""
+    return _SENSITIVE_WORDS.format(relative)
 
 
 def flag_remarks(flags: int) -> list[str]:
@@ -155,6 +189,11 @@ def averaged(response: xr.Dataset) -> Booleans:
     first = int(response.attrs.get("transient_turns", 0))
     inside: Booleans = turned - turned[:1] > first - 1e-6
     return inside
+
+
+def _known(response: xr.Dataset, name: str, k: int) -> float:
+    """A number of joint k; NaN where the response has none."""
+    return float(response[name][k]) if name in response else np.nan
 
 
 def _weights(time: Array) -> Array:
@@ -175,7 +214,8 @@ def _projected_areas(response: xr.Dataset) -> dict[str, float]:
     areas = {}
     for joint in scene.clearance_joints():
         one = scene.clearance_joint(joint)
-        part = one.film or one.wear
-        if part is not None:
-            areas[joint] = 2.0 * one.bearing_radius * part.length
+        path = length_path(one)
+        if path is not None:
+            length: float = attrgetter(path)(one)
+            areas[joint] = 2.0 * one.bearing_radius * length
     return areas

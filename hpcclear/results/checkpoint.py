@@ -71,8 +71,8 @@ def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
         raise InputError(
             "output",
             str(place),
-            f"it holds results of another run ({'; '.join(shown)}{more})",
-            "Choose another output, or start anew beside it with --fresh",
+            f"it contains results of another run ({'; '.join(shown)}{more})",
+            "Choose another output, or start a new run beside it with --fresh",
         )
 
 
@@ -153,7 +153,7 @@ class Checkpoint:
     attributes : mapping, optional
         Global attributes of the part files (`hpcclear.results.dataset.provenance`).
     joints : sequence of str
-        Labels of the joints that records tell of.
+        Labels of the joints of the records.
     clock : callable
         Seconds since any instant.
 

@@ -1,4 +1,4 @@
-"""Many files of samples that open as one: a file that holds none of them and says where each is.
+"""Many files of samples that open as one: a file that refers to each of them.
 
 Its variables are virtual datasets of HDF5: xarray, netCDF4 and h5py read them as if all samples were in it. Names are relative,
 so that the directory may be moved. Opening thousands of files one by one takes minutes. Of more files than `LISTED` there is

@@ -37,15 +37,13 @@ def write_crate(directory: Path, tell: Callable[[str], object] = lambda text: No
     InputError
         There is no result file, all are damaged, or a file of that name says something else: its user may have added to it.
     """
-    found: dict[Path, xr.Dataset] = {}
-    for path in dataset.files_in(directory):
-        try:
-            found[path] = dataset.read(path)
-        except InputError as error:
-            damage = error
-            tell(f"{path} is left out: {error.reason}")
-    if not found:
-        raise damage
+    read = dict(dataset.each_in(directory))
+    found = {path: one for path, one in read.items() if isinstance(one, xr.Dataset)}
+    for path, one in read.items():
+        if isinstance(one, InputError):
+            tell(f"{path} is left out: {one.reason}")
+            if not found:
+                raise one
     place = directory / NAME
     graph = {"@context": f"{CRATE}/context", "@graph": _graph(directory, found)}
     content = (json.dumps(graph, indent=2) + "\n").encode()

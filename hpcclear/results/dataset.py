@@ -8,7 +8,7 @@ import functools
 import os
 import platform
 import re
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from importlib import metadata
 from pathlib import Path
 
@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from hpcclear.base import host
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import (
@@ -46,7 +47,7 @@ _LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 # Building
 
 
-NOT_CHECKED = "not checked: no replicas were simulated (numerics.uncertainty)"
+NOT_CHECKED = "not checked: no replicas were simulated (numerics.target_error)"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 
@@ -71,7 +72,7 @@ def dataset(
         The coordinates of the kind, all of them.
     data : mapping of str to array
         Variables of the kind, and design variables under their names or scene paths; for Kriging
-        models also their limits, NAME_lower and NAME_upper. Shapes as in the table.
+        models also their bounds, NAME_lower and NAME_upper. Shapes as in the table.
     attributes : mapping, optional
         Further global attributes, text or numbers; see `provenance`.
     units : mapping of str to str, optional
@@ -114,7 +115,7 @@ def dataset(
             variable.attrs.update(marks)
             variables[variable_name(name, kind)] = variable
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
-    if objective != MEAN_GAP:
+    if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
     return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
 
@@ -173,7 +174,7 @@ def variable_name(name: str, kind: str = "samples") -> str:
         reason = "a name consists of letters, digits and underscores, a letter first"
         raise InputError("study.variables", name, reason, "Choose another name")
     if plain in KINDS[kind].data or plain in KINDS[kind].coords:
-        reason = "a result is called so"
+        reason = "a result has this name"
         raise InputError("study.variables", name, reason, "Choose another name")
     return plain
 
@@ -350,14 +351,7 @@ def _versions() -> str:
 
 @functools.cache
 def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            for line in file:
-                if line.startswith("model name"):
-                    return line.partition(":")[2].strip()
-    except OSError:
-        pass  # not Linux
-    return platform.processor() or platform.machine()
+    return host.processor()
 
 
 # -----------------------------------------------------------------------------------------------
@@ -432,10 +426,21 @@ def files_in(directory: Path) -> list[Path]:
     return found
 
 
+def each_in(directory: Path) -> Iterator[tuple[Path, xr.Dataset | InputError]]:
+    """Read `files_in` a directory, one after the other: what each holds, or why it cannot be read; errors as there."""
+    for path in files_in(directory):
+        try:
+            yield path, read(path)
+        except InputError as error:
+            yield path, error
+
+
 def _path(path: str | os.PathLike[str]) -> Path:
     text = os.fspath(path)
     if "\0" in text:
-        raise InputError("file", text, "a path holds no NUL character", "Choose another name")
+        raise InputError(
+            "file", text, "a path cannot contain a NUL character", "Choose another name"
+        )
     return Path(text)
 
 

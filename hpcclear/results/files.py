@@ -6,8 +6,10 @@ import os
 import re
 import secrets
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
+from hpcclear.base import host
 from hpcclear.base.errors import InputError, StorageError
 
 Buffer = bytes | memoryview
@@ -16,6 +18,8 @@ TEMPORARY = re.compile(r"\.hpcclear-[0-9a-f]{16}\.tmp")
 """Names of files that were being written; what is left of them after a kill is rubbish."""
 
 _LOOK = 4096  # bytes at each end of a file in which the mark of its kind stands
+
+_OPENS_DIRECTORIES = os.open in os.supports_dir_fd  # not on native Windows
 
 _ATTEMPTS = 5  # of writing a file whose temporary a run that starts takes for such a leftover
 
@@ -45,7 +49,9 @@ def refused(path: Path, error: OSError | ValueError) -> InputError | StorageErro
     A `ValueError` (a NUL character, text that no file name can be) is a wrong place.
     """
     if isinstance(error, ValueError):
-        return InputError("output", str(path), "no file can be called so", "Choose another name")
+        return InputError(
+            "output", str(path), "the system does not allow this name", "Choose another name"
+        )
     reason = os.strerror(error.errno) if error.errno else str(error)
     if error.errno in _USER_ERRORS:
         return InputError("output", str(path), reason, _USER_ERRORS[error.errno].capitalize())
@@ -85,9 +91,9 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     if not ours:
         regular = stat.S_ISREG(about.st_mode)
         reason = (
-            "hpcclear did not write what is there, or it was cut off"
+            "the existing file was not written by hpcclear, or it was cut off"
             if regular
-            else "it is no regular file"
+            else "it is not a regular file"
         )
         remedy = "Choose another name" + (", or move that file away" if regular else "")
         raise InputError("output", str(path), reason, remedy)
@@ -124,27 +130,38 @@ def write_bytes(path: Path, content: Buffer, mark: bytes = b"") -> None:
     """
     refuse_foreign(path, mark)
     try:
-        directory = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        with _opened(path) as (directory, name):
+            if not any(_replaced(name, content, directory) for _ in range(_ATTEMPTS)):
+                raise OSError(errno.EIO, "temporary files are removed at once")
+            if directory is not None:
+                fsync_directory(directory)
     except OSError as error:
         raise refused(path, error) from None
-    # Everything goes through the open directory: a link swapped in meanwhile cannot lead elsewhere.
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[tuple[int | None, str]]:
+    """The open directory of a file and the name in it: a link swapped in meanwhile cannot lead elsewhere.
+
+    None and the whole path where the system opens no directories.
+    """
+    if not _OPENS_DIRECTORIES:
+        yield None, str(path)
+        return
+    directory = os.open(path.parent, host.flags("O_RDONLY", "O_DIRECTORY"))
     try:
-        if not any(_replaced(path.name, content, directory) for _ in range(_ATTEMPTS)):
-            raise OSError(errno.EIO, "temporary files are removed at once")
-        fsync_directory(directory)
-    except OSError as error:
-        raise refused(path, error) from None
+        yield directory, path.name
     finally:
         os.close(directory)
 
 
-def _replaced(name: str, content: Buffer, directory: int) -> bool:
+def _replaced(name: str, content: Buffer, directory: int | None) -> bool:
     """Write aside and rename; False if somebody removed the temporary in between."""
-    temporary = f".hpcclear-{secrets.token_hex(8)}.tmp"
+    temporary = os.path.join(os.path.dirname(name), f".hpcclear-{secrets.token_hex(8)}.tmp")
     try:
         _write_whole(temporary, content, directory)
         try:
-            os.rename(temporary, name, src_dir_fd=directory, dst_dir_fd=directory)
+            os.replace(temporary, name, src_dir_fd=directory, dst_dir_fd=directory)
         except FileNotFoundError:
             return False
     except BaseException:
@@ -161,9 +178,9 @@ def remove_leftovers(directory: Path) -> None:
                 path.unlink()
 
 
-def _write_whole(name: str, content: Buffer, directory: int) -> None:
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    file = os.open(name, flags, 0o666, dir_fd=directory)
+def _write_whole(name: str, content: Buffer, directory: int | None) -> None:
+    how = host.flags("O_WRONLY", "O_CREAT", "O_EXCL", "O_NOFOLLOW")
+    file = os.open(name, how, 0o666, dir_fd=directory)
     try:
         rest = memoryview(content)
         while rest:
@@ -173,7 +190,7 @@ def _write_whole(name: str, content: Buffer, directory: int) -> None:
         os.close(file)  # may raise as well: NFS reports a full disk here
 
 
-def _unlink(name: str, directory: int) -> None:
+def _unlink(name: str, directory: int | None) -> None:
     try:
         os.unlink(name, dir_fd=directory)
     except FileNotFoundError:

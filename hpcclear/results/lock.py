@@ -7,7 +7,6 @@ exclusive creation of the file decides, and what it says about its holder.
 """
 
 import errno
-import fcntl
 import json
 import os
 import secrets
@@ -17,6 +16,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Self
 
+from hpcclear.base import host
 from hpcclear.base.errors import InputError
 from hpcclear.results.files import refused
 
@@ -62,7 +62,7 @@ class Holder:
         return holder if isinstance(holder.pid, int) and holder.pid > 0 else None
 
     def is_over(self) -> bool:
-        """Whether the holder is known to be gone; False when that cannot be told."""
+        """Whether the holder is known to be gone; False when that is not known."""
         here = Holder.this_process()
         if self.host == here.host:
             return self.boot != here.boot or not _alive(self.pid, self.started)
@@ -82,28 +82,15 @@ def _boot() -> str:
         return ""
 
 
-def _stat(pid: int) -> list[str]:
-    """Fields of /proc/PID/stat from the third, the state, on; empty where it cannot be read."""
-    try:
-        # the second field, the command, may itself hold blanks and brackets
-        return Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
-    except OSError:
-        return []
-
-
 def _started(pid: int) -> str:
-    found = _stat(pid)
+    found = host.process_fields(pid)
     return found[19] if len(found) > 19 else ""
 
 
 def _alive(pid: int, started: str) -> bool:
-    try:
-        os.kill(pid, 0)
-    except (ProcessLookupError, OverflowError):
+    if not host.is_running(pid):
         return False
-    except PermissionError:
-        pass  # somebody else's, so there is one
-    found = _stat(pid)
+    found = host.process_fields(pid)
     if len(found) <= 19:
         return True
     return found[0] not in "ZX" and (started == "" or found[19] == started)
@@ -111,7 +98,7 @@ def _alive(pid: int, started: str) -> bool:
 
 def _is_flocked(descriptor: int) -> bool:
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        host.lock_file(descriptor, shared=True)
     except BlockingIOError:
         return True
     except OSError:
@@ -165,9 +152,7 @@ class Lock:
     def refuse_others(self) -> None:
         """Raise InputError while another process holds the lock, which is not taken; one that cannot be read counts as free."""
         try:
-            descriptor = os.open(
-                self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-            )
+            descriptor = os.open(self.path, host.flags("O_RDONLY", "O_NOFOLLOW", "O_NONBLOCK"))
         except OSError:
             return
         try:
@@ -212,22 +197,26 @@ class Lock:
         """Give the lock back; nothing happens when it is not held."""
         if self._descriptor is None:
             return
-        if self._is_current(self._descriptor):
+        descriptor, self._descriptor = self._descriptor, None
+        current = self._is_current(descriptor)
+        if os.name == "nt":  # where an open file cannot be removed
+            os.close(descriptor)
+        if current:
             self.path.unlink(missing_ok=True)  # while flock still keeps others out
-        os.close(self._descriptor)
-        self._descriptor = None
+        if os.name != "nt":
+            os.close(descriptor)
 
     def _open(self) -> tuple[int, bool]:
-        flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        how = host.flags("O_RDWR", "O_NOFOLLOW", "O_NONBLOCK")
         try:
-            return os.open(self.path, flags | os.O_CREAT | os.O_EXCL, 0o644), True
+            return os.open(self.path, how | os.O_CREAT | os.O_EXCL, 0o644), True
         except FileExistsError:
-            return os.open(self.path, flags), False
+            return os.open(self.path, how), False
 
     def _take(self, descriptor: int, created: bool) -> bool:
         """Make the open file ours: True if it is, False to try again, `InputError` if refused."""
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            host.lock_file(descriptor)
             guarded = True
         except BlockingIOError:
             raise self._refusal(Holder.parse(os.read(descriptor, 4096))) from None
@@ -247,7 +236,8 @@ class Lock:
             self._bury(text)
             return False
         os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, json.dumps(asdict(Holder.this_process())).encode(), 0)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        os.write(descriptor, json.dumps(asdict(Holder.this_process())).encode())
         os.fsync(descriptor)
         return True
 
@@ -273,7 +263,7 @@ class Lock:
     def _refusal(self, holder: Holder | None) -> InputError:
         who = f"{holder} holds it" if holder is not None else "another run is taking it"
         remedy = (
-            f"Wait for that run or stop it. If it is gone for certain, remove {self.path} "
+            f"Wait for that run or stop it. If no run is active any more, remove {self.path} "
             "and run the command again"
         )
         return InputError("output", str(self.path.parent), f"{who}", remedy)

@@ -70,12 +70,13 @@ FURTHER: dict[str, dict[str, object]] = {
     "accepted": _meanings("refused", "accepted"),
     "verified": _meanings("not_simulated", "simulated"),
     "off": _meanings("on", "off"),
-    "told": _meanings("within", "beyond", "untold"),
-    "decision": _meanings("within", "beyond", "untold"),
-    "judged": _meanings("told", "judged"),
+    "told": _meanings("within", "beyond", "undecided"),
+    "decision": _meanings("within", "beyond", "undecided"),
+    "judged": _meanings("reported", "judged"),
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
-    "dominated": _meanings("not_surely", "dominated"),
+    "together": _meanings("independent", "correlated"),
+    "dominated": _meanings("not_significantly", "dominated"),
 }
 """CF attributes beyond units and long name: what the codes mean."""
 
@@ -104,6 +105,11 @@ KINDS = {
     "samples": _kind(
         "Samples of a mechanism with clearance joints", columns.SAMPLES, ("sample",), whole=True
     ),
+    "bifurcation": _kind(
+        "One value for each revolution, against an entry of the scene",
+        columns.BIFURCATION,
+        ("value",),
+    ),
     "sensitivity": _kind("Sensitivity of the objective against clearance", columns.SENSITIVITY),
     "kriging": _kind(
         "Kriging models of the objective",
@@ -111,15 +117,18 @@ KINDS = {
         ("model", "point"),
         limit_dims=("model",),
     ),
-    "front": _kind("Fronts of mean and deviation", columns.FRONT, ("case", "run", "solution")),
-    "verification": _kind("Designs simulated directly", columns.VERIFICATION, ("design",)),
-    "chaos": _kind("How much of the scatter of designs is chaos", columns.CHAOS),
-    "claims": _kind("What the paper claims, tested on our data", columns.CLAIMS),
-    "readings": _kind("The paper's designs under readings of its text", columns.READINGS),
-    "statistics": _kind("Statistics of many samples, streamed", columns.STATISTICS),
-    "wear": _kind("Lives of a mechanism whose joints wear", columns.WEAR, ("life",)),
-    "effects": _kind("Which effects a scene can do without", columns.EFFECTS),
-    "timing": _kind("Where the time went", columns.TIMING),
-    "accuracy": _kind("What accuracy costs in time", columns.ACCURACY),
+    "front": _kind("Pareto fronts, by the surrogate", columns.FRONT, ("case", "run", "solution")),
+    "verification": _kind(
+        "Simulated designs with confidence intervals", columns.VERIFICATION, ("design",)
+    ),
+    "chaos": _kind("Sensitivity of the designs to initial conditions", columns.CHAOS),
+    "contributions": _kind("Contributions to the scatter of designs", columns.CONTRIBUTIONS),
+    "claims": _kind("Claims of the paper, tested on these results", columns.CLAIMS),
+    "readings": _kind("Designs of the paper under interpretations of its text", columns.READINGS),
+    "statistics": _kind("Statistics of many samples", columns.STATISTICS),
+    "wear": _kind("Service lives of a mechanism with wear", columns.WEAR, ("life",)),
+    "effects": _kind("Effect screening: effects that can be neglected", columns.EFFECTS),
+    "timing": _kind("Run time of the ranks", columns.TIMING),
+    "accuracy": _kind("Accuracy against run time", columns.ACCURACY),
 }
 """Every result file by its kind."""

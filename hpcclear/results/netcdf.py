@@ -21,6 +21,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
+from hpcclear.base import host
 from hpcclear.base.errors import InputError
 from hpcclear.results.files import Buffer, write_bytes
 
@@ -63,10 +64,10 @@ def read_bytes(path: Path) -> bytes:
     again = "Remove it or restore a copy, and run the command that makes it again"
     try:
         # non-blocking: opening a pipe must not hang
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+        with open(os.open(path, host.flags("O_RDONLY", "O_NONBLOCK")), "rb") as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode):
-                raise bad("it is no regular file", "Name a file that hpcclear wrote")
+                raise bad("it is not a regular file", "Name a file that hpcclear wrote")
             if about.st_size < _SEAL_LENGTH:
                 raise bad("it is empty or cut off", again)
             file.seek(about.st_size - _SEAL_LENGTH)
@@ -112,9 +113,7 @@ def load(path: Path) -> xr.Dataset:
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, OverflowError) as error:
         # Only a file sealed by somebody else gets here. Damage cannot; malice can, and HDF5 itself
         # may then loop: the seal keeps out accidents and idle hands, not an attacker who forges it.
-        reason = (
-            f"its structure is not that of an hpcclear file ({str(error).splitlines()[0][:120]})"
-        )
+        reason = f"it does not have the structure of an hpcclear file ({str(error).splitlines()[0][:120]})"
         raise InputError("file", str(path), reason, "Name a file that hpcclear wrote") from None
 
 

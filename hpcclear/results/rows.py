@@ -1,6 +1,7 @@
 """What a row of the tables of result files is, and rows that several of them share.
 
-``objective`` in the place of a unit, and ``objective^2``, stand for the unit of the study's objective (`Column.of`).
+``objective`` in the place of a unit, and ``objective^2``, stand for the unit of the study's objective, ``rate`` for that of
+what is made of its rate (`Column.of`).
 Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
 """
 
@@ -20,18 +21,17 @@ class Column(NamedTuple):
     dtype: str  # "f8", "i8", "i1" or "text"
     required: bool = False
 
-    def unit(self, objective: str) -> str:
-        """The unit in a study whose objective has the unit `objective`."""
-        if self.units == "objective":
-            return objective
+    def unit(self, objective: str, rate: str = "that of the rate") -> str:
+        """The unit in a study whose objective has the unit `objective`, and what is made of its rate the unit `rate`."""
         if self.units == "objective^2":
             return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
-        return self.units
+        return {"objective": objective, "rate": rate}.get(self.units, self.units)
 
     def of(self, objective: Objective) -> "Column":
         """The row in a file of results for that objective: its unit, and its words in place of the mean gap's."""
         words = self.long_name.replace(MEAN_GAP.words, objective.words)
-        return self._replace(units=self.unit(objective.unit), long_name=words)
+        unit = self.unit(objective.unit or "1", objective.unit_of_rate or "1")
+        return self._replace(units=unit, long_name=words)
 
 
 Columns = dict[str, Column]
@@ -64,31 +64,32 @@ def outcome(*per_sample: str) -> Columns:
     return {
         "objective": number(per_sample, "objective", f"objective f, {MEAN_GAP.words}", required=True),
         "objective_spread": number(per_sample, "objective",
-        "standard deviation of f between averaged revolutions", required=True),
-        "objective_uncertainty": number(per_sample, "objective", "how far f may be off, by stricter and kicked copies"),
-        "objective_limit": number(per_sample, "objective", "95 % half-width of the limits of f as a steady mean"),
+        "cycle-to-cycle standard deviation of f", required=True),
+        "objective_uncertainty": number(per_sample, "objective", "half-width of f, by replicas or of its steady mean"),
+        "objective_limit": number(per_sample, "objective", "half-width of the 95 % confidence interval of f as a steady mean"),
         "regime": flag(per_sample, "kind of motion"),
-        "period": number(per_sample, "1", "revolutions after which the motion repeats itself"),
-        "kick_growth": number(per_sample, "1", "mean logarithm of the growth of a kick per revolution"),
-        "kick_growth_limit": number(per_sample, "1", "95 % half-width of the limits of kick_growth"),
-        "attractors": number(per_sample, "1", "kinds of motion that several starts ended in"),
-        "steady_rtol": number(per_sample, "1", "tightest relative tolerance that the steady mean took"),
-        "steady_revolutions": number(per_sample, "1", "revolutions of all copies that the steady mean took"),
+        "period": number(per_sample, "1", "period of the motion in revolutions"),
+        "kick_growth": number(per_sample, "1", "largest Lyapunov exponent, per revolution"),
+        "kick_growth_limit": number(per_sample, "1", "half-width of the 95 % confidence interval of kick_growth"),
+        "attractors": number(per_sample, "1", "number of different motions reached from several starts"),
+        "steady_rtol": number(per_sample, "1", "tightest relative tolerance used for the steady mean"),
+        "steady_revolutions": number(per_sample, "1", "revolutions of all replicas used for the steady mean"),
         "mean_gap": number(per_joint, "m", "time mean of the distance from the clearance circle"),
         "peak_contact_force": number(per_joint, "N", "largest contact force over the averaged revolutions"),
         "mean_contact_force": number(per_joint, "N", "mean contact force over the averaged revolutions"),
-        "peak_crank_moment": number(per_sample, "N m", "largest size of the moment of the drive on the crank"),
+        "peak_crank_moment": number(per_sample, "N m", "largest absolute torque of the drive on the crank"),
         "slider_acceleration_deviation": number(per_sample, "m/s^2",
         "standard deviation of the slider acceleration in time"),
         "point_acceleration_deviation": number(per_sample, "m/s^2",
-        "root mean square about its mean of the acceleration of the followed point"),
+        "root mean square of the acceleration of the followed point about its mean"),
         "peak_point_acceleration": number(per_sample, "m/s^2", "largest acceleration of the followed point"),
+        "rate_of_objective": number(per_joint, "rate", "what is made of the objective's own rate"),
         "sliding_work": number(per_joint, "J", "normal force times sliding distance in a revolution"),
-        "energy_error": number(per_sample, "1", "what the energy balance leaves unexplained, relative"),
-        "latched": flag(per_joint, "whole revolutions in contact, impact speed frozen"),
+        "energy_error": number(per_sample, "1", "residual of the energy balance, relative"),
+        "latched": flag(per_joint, "whether damping uses the last impact velocity, for whole revolutions"),
         "rhs_evaluations": count(per_sample, "number of evaluations of the equations of motion", required=True),
-        "status": flag(per_sample, "how the simulation ended", required=True),
-        "flags": flag(per_sample, "what to mind when reading the result"),
+        "status": flag(per_sample, "outcome of the simulation", required=True),
+        "flags": flag(per_sample, "validity warnings of the result"),
     }
     # fmt: on
 
@@ -125,12 +126,12 @@ def statistics_of(name: str, dims: Dims, units: str, words: str) -> Columns:
 
 
 def goal(name: str) -> Columns:
-    """What a case makes small, where that is not mean and deviation: each design has that of its case."""
-    of = f"of what is made small, the {name}"
+    """Objectives of a case, other than mean and standard deviation; each design has those of its case."""
+    of = f"{name} objective of the case"
     return {
-        f"{name}_goal": text(("design",), f"{of}: in words"),
-        f"{name}_unit": text(("design",), f"{of}: its unit, empty for none"),
-        f"{name}_true": number(("design",), "", f"{of}: by direct simulation"),
-        f"{name}_lower": number(("design",), "", f"{of}: lower confidence limit"),
-        f"{name}_upper": number(("design",), "", f"{of}: upper confidence limit"),
+        f"{name}_goal": text(("design",), f"{of}, in words"),
+        f"{name}_unit": text(("design",), f"{of}: unit, empty for none"),
+        f"{name}_true": number(("design",), "", f"{of}, by simulation"),
+        f"{name}_lower": number(("design",), "", f"{of}: lower end of its confidence interval"),
+        f"{name}_upper": number(("design",), "", f"{of}: upper end of its confidence interval"),
     }

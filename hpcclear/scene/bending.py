@@ -28,24 +28,24 @@ def _check_bar(planar: Any, body: Any) -> None:
     key = f"bodies.{body.name}.bending"
     if body.length is None:
         raise invalid(
-            "what bends is a bar, and this body has no length",
+            "only a bar can bend, and this body has no length",
             "Give its length, or leave bending out", key=key, value=None,
         )  # fmt: skip
     if body.points:
         raise invalid(
-            f"the bar has a further point, {body.points[0].name}, and bending moves its ends alone",
+            f"the bar has a further point, {body.points[0].name}, but bending is modelled for its two ends only",
             "Leave out its points, or bending", key=key, value=None,
         )  # fmt: skip
     for row in planar.drives:
         if row.body == body.name:
             raise invalid(
-                f"{row.name} turns the bar, which would clamp it, and modes are those of pinned ends",
+                f"{row.name} drives the bar and clamps it, but the modes are those of pinned ends",
                 "Leave bending out, or drive another body", key=key, value=None,
             )  # fmt: skip
     for row in planar.loads:
         if getattr(row, "body", None) == body.name:
             raise invalid(
-                f"the torque {row.name} acts at no place of the bar",
+                f"the torque {row.name} has no point of application on the bar",
                 "Leave bending out, or replace it by two forces", key=key, value=None,
             )  # fmt: skip
     held = set()
@@ -57,7 +57,7 @@ def _check_bar(planar: Any, body: Any) -> None:
         held.update(ends)
         if ends and joint.kind in ("slide", "fixed"):
             raise invalid(
-                f"{joint.name} guides the bar, and modes are those of pinned ends",
+                f"{joint.name} guides the bar, but the modes are those of pinned ends",
                 "Leave bending out", key=key, value=None,
             )  # fmt: skip
         if ends and getattr(joint, "out_of_round", None) is not None:
@@ -65,7 +65,7 @@ def _check_bar(planar: Any, body: Any) -> None:
     for end in ("a", "b"):
         if end not in held:
             raise invalid(
-                f"nothing holds its end {end}, and modes are those of pinned ends",
+                f"its end {end} is free, but the modes are those of pinned ends",
                 "Leave bending out, or join both ends", key=key, value=None,
             )  # fmt: skip
 
@@ -75,18 +75,12 @@ def check_scene(scene: Any, bending: Mapping[str, Bending]) -> None:
     if not bending:
         return
     key = f"{next(iter(bending))}.bending"
-    if not scene.is_planar and scene.numerics.formulation == "baumgarte":
-        raise invalid(
-            "the nine coordinates of Baumgarte's slider-crank have no place for modes",
-            'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
-            key=key, value=None,
-        )  # fmt: skip
-    for name in () if scene.is_planar else scene.clearance_joints():
+    for name in scene.clearance_joints() if scene.template is not None else ():
         if scene.clearance_joint(name).out_of_round is not None:
             raise out_of_round(name, key)
     if scene.wear is not None and scene.wear.waves and scene.worn_joints():
         raise invalid(
-            "a profile of wear goes by the angles of rigid bodies, and a body bends",
+            "an angular wear profile needs rigid bodies, but a body bends",
             'Set it to "uniform", or leave bending out',
             key="wear.profile", value=scene.wear.profile,
         )  # fmt: skip
@@ -95,6 +89,6 @@ def check_scene(scene: Any, bending: Mapping[str, Bending]) -> None:
 def out_of_round(joint: str, key: str) -> Exception:
     """An error for validators: what of a joint at a bar that bends is refused."""
     return invalid(
-        f"surfaces of {joint} are out of round, and their angles are those of rigid bodies",
+        f"surfaces of {joint} are out of round, which needs rigid bodies",
         "Leave out bending, or out_of_round", key=key, value=None,
     )  # fmt: skip

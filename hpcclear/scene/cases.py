@@ -30,7 +30,9 @@ class Case(Table):
     def _some_random(self) -> "Case":
         if not self.random:
             raise invalid(
-                "a case without random inputs has no deviation to minimise", "Name some", "random"
+                "a case without random inputs has no standard deviation to minimise",
+                "Name some",
+                "random",
             )
         if len(set(self.random)) < len(self.random):
             raise invalid("a random input is named twice", "Remove one", key="random")
@@ -42,21 +44,21 @@ class Case(Table):
         rows = self.goals
         if len(rows) < 2:
             raise invalid(
-                "a case trades two things or more for each other",
+                "a case needs two objectives or more",
                 'Add one, such as "deviation" or { formula = "m2 + m3" }',
                 "objectives",
             )
         if len(rows) > len(ENDS):
             raise invalid(
-                f"on a front of more than {len(ENDS)} things nearly every design is one of the best",
-                "Keep some below limits instead, in constraints, or add some up in one formula",
+                f"with more than {len(ENDS)} objectives nearly every design is on the front",
+                "Use constraints for some of them, or combine some in one formula",
                 "objectives",
             )
         for k, goal in enumerate(rows):
             if any(goal.same_as(other) for other in rows[:k]):
                 raise invalid(
-                    "is made small already",
-                    "Remove it, or name another thing",
+                    "is an objective already",
+                    "Remove it, or name another objective",
                     f"objectives.{k}",
                     goal.formula or goal.statistic,
                 )
@@ -79,5 +81,5 @@ class Case(Table):
 
     @property
     def plain(self) -> bool:
-        """Whether mean and deviation alone are asked for."""
+        """Whether mean and standard deviation are the only objectives."""
         return self.goals == (MEAN, DEVIATION) and not self.kept

@@ -1,7 +1,7 @@
 """The published work that the numbers of a scene are taken from: its result files cite it.
 
-A scene is recognised by what it holds, not by its name or place: the lengths and the materials of
-the paper's Tables 1 and 2, which none of its studies varies. Masses, clearances, drive, effects and
+A scene is recognised by its content, not by its name or place: the lengths and materials of the paper's Tables 1 and 2.
+No study of the paper varies them. Masses, clearances, drive, effects and
 numerics may differ.
 """
 
@@ -14,6 +14,17 @@ TITLE = (
     "Robust Optimization of Planar Constrained Mechanical System with Varying Joint Clearance "
     "Size Based on Sensitivity Analysis"
 )
+
+BIBTEX = f"""@article{{ShockVibration6079249,
+  title   = {{{TITLE}}},
+  journal = {{Shock and Vibration}},
+  volume  = {{2020}},
+  pages   = {{6079249}},
+  year    = {{2020}},
+  url     = {{https://www.hindawi.com/journals/sv/2020/6079249/}},
+  note    = {{Add the authors from the journal's page}},
+}}"""
+"""The same work for BibTeX; the text used for this program does not name its authors."""
 
 _LENGTHS = {"crank.length": 0.05, "rod.length": 0.12}  # m
 _JOINT = {

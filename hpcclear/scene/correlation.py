@@ -29,14 +29,16 @@ class Correlation(Table):
     matrix: tuple[tuple[Entry, ...], ...]
     """Correlations, symmetric with ones along the diagonal."""
     measure: Literal["normal", "rank"] = "normal"
-    """What the matrix holds: "normal", correlations of the normals behind the inputs (those of the inputs themselves,
-    where these are normal), or "rank", Spearman's of the inputs, whatever their distributions."""
+    """Meaning of the matrix. "normal": correlations of the underlying normal variables (of the inputs themselves, if these are
+    normal). "rank": Spearman rank correlations of the inputs."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Correlation":
         count = len(self.inputs)
         if count < 2 or len(set(self.inputs)) < count:
-            raise invalid("two inputs or more, each once, are expected here", "Name them", "inputs")
+            raise invalid(
+                "a list of two or more different inputs is expected here", "Name them", "inputs"
+            )
         if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
             raise invalid(
                 f"{count} inputs need {count} rows of {count} numbers",
@@ -47,13 +49,13 @@ class Correlation(Table):
         if (entries != entries.T).any() or (entries.diagonal() != 1.0).any():
             raise invalid(
                 "a correlation matrix is symmetric, with ones along its diagonal",
-                "Mend the entries that differ",
+                "Correct the entries that differ",
                 "matrix",
             )
         least = float(np.linalg.eigvalsh(self.normal(self.inputs)).min())
         if least < LEAST_EIGENVALUE:
             raise invalid(
-                f"no inputs vary so together: the least eigenvalue is {least:.2g}, and none may be 0 or below",
+                f"the matrix is not positive definite: its lowest eigenvalue is {least:.2g}",
                 f"Multiply all entries off the diagonal by {0.99 / (1.0 - least):.2g}, say",
                 "matrix",
             )

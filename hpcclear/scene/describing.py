@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.plugins.sources import digest
-from hpcclear.scene.mechanism import TorqueDrive, slender_inertia
+from hpcclear.scene.mechanism import Mechanism, TorqueDrive, slender_inertia
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar, PlanarSlide
 from hpcclear.scene.plausibility import implausible
@@ -58,15 +58,13 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if scene.numerics.energy:
         yield "energy balance of each sample"
     if scene.responses_asked():
-        yield "mean contact forces, crank moment and slider acceleration of each sample"
-    if scene.numerics.uncertainty:
-        yield "uncertainty of each sample"
+        yield "mean contact forces, torque of the drive and slider acceleration of each sample"
 
 
 def warnings(scene: SceneTables) -> Iterator[str]:
     """What is allowed and still deserves a look."""
     yield from implausible(scene)
-    for name in () if scene.is_planar else ("crank", "rod"):
+    for name in ("crank", "rod") if isinstance(scene.mechanism, Mechanism) else ():
         link = getattr(scene.mechanism, name)
         least = slender_inertia(link.mass, link.length)
         if link.inertia < least * (1 - 1e-12):
@@ -110,8 +108,8 @@ def unused(scene: SceneTables) -> Iterator[str]:
         return
     if study.sensitivity.model_fields_set - {"parameter"}:  # which has a default of the scene's own
         yield (
-            "study.sensitivity is not used: no variables are named that would be fitted together, and those there are have no "
-            "usual groups; name them in study.sensitivity.groups, and in study.sensitivity.parameter what is held fixed"
+            "study.sensitivity is not used: no group of variables is named, and these variables have no usual groups. "
+            "Name them in study.sensitivity.groups, and the fixed one in study.sensitivity.parameter"
         )
 
 

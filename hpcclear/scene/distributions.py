@@ -66,7 +66,7 @@ def _weibull(entries: Mapping[str, Any]) -> quantiles.Quantiles:
 def _worn(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     raise InputError(
         f"study.random.{entries['name']}.distribution", "wear",
-        "is known once the lives of [wear] have been followed, which `hpcclear run` does first",
+        "is known only after the wear simulation of [wear], which `hpcclear run` does first",
         'Use `hpcclear run`, or give clearances of your own: distribution = "samples", values = [...]',
     )  # fmt: skip
 
@@ -100,7 +100,7 @@ def is_ours(name: object) -> bool:
 
 
 def form_of(name: str, parameters: Mapping[str, float]) -> Form:
-    """What is known of a distribution; raises an error for validators where there is none of that name."""
+    """Return the requirements of a distribution; raise an error for validators if the name is not known."""
     if name in OURS:
         return OURS[name]
     module, _, own = name.partition(":")
@@ -145,7 +145,7 @@ def _of_scipy(
     for key in parameters:
         if key not in (*shapes, "loc", "scale"):
             raise invalid(
-                f"is no parameter of scipy's {own}", nearest(key, (*shapes, "loc", "scale")), key
+                f"is not a parameter of scipy's {own}", nearest(key, (*shapes, "loc", "scale")), key
             )
     for key in shapes:
         if key not in parameters:
@@ -162,7 +162,7 @@ def _of_plugin(
         whole = factory(**parameters)
     except Exception as error:
         reason = f"{name} could not be made of its parameters: {type(error).__name__}: {error}"
-        raise invalid(reason, "Give those that it takes", "distribution") from error
+        raise invalid(reason, "Give the parameters that it takes", "distribution") from error
     law = quantiles.Foreign(whole, *_ends(entries))
     if "range" in entries and not hasattr(whole, "cdf"):
         raise invalid(f"{name} has no cdf, so it cannot be cut off", "Remove it", "range")
@@ -184,6 +184,6 @@ def _check(law: quantiles.Cut, name: str, parameters: Mapping[str, float]) -> No
     fine = found.shape == _TESTED.shape and np.isfinite(found).all() and (np.diff(found) >= 0).all()
     if not fine or not found[0] < found[-1]:
         raise invalid(
-            f"{name} with {given} has no finite quantiles that rise with the probability",
-            "Mend its parameters", "distribution",
+            f"{name} with {given} has no finite, increasing quantiles",
+            "Correct its parameters", "distribution",
         )  # fmt: skip

@@ -97,7 +97,7 @@ def _bounds(
         raise InputError(
             f"study.random.{variable.name}",
             low,
-            "takes the smallest inertia of the box to 0 or below",
+            "reduces the smallest inertia of the box to 0 or below",
             f"Narrow it, or raise study.variables.{variable.name}.ratio",
         )
     return min(ratios), max(ratios)

@@ -16,9 +16,11 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.places import Angle, PairTable
 
+Turns = Annotated[int, Count(least=1, most=64)]
+
 
 def check_start(drive: Any) -> None:
-    """Refuses a drive that starts from rest where nothing tells how fast it will be.
+    """Refuse a drive that starts from rest without an expected speed.
 
     Raises
     ------
@@ -34,7 +36,7 @@ def check_start(drive: Any) -> None:
 
 
 def speed_entry(drive: Any) -> str:
-    """The entry of a drive that tells how fast it is: `speed`, or of a torque `expected_speed` or `initial_speed`."""
+    """The entry of a drive that gives its speed: `speed`, or of a torque `expected_speed` or `initial_speed`."""
     if hasattr(drive, "speed"):
         return "speed"
     return "initial_speed" if drive.expected_speed is None else "expected_speed"
@@ -47,11 +49,11 @@ class PlanarSpeed(Table):
     kind: Literal["constant-speed"]
     body: str
     """That turns."""
-    speed: Annotated[float, Quantity("rad/s")]
+    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
     """rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
     period: bool = False
     """Whether its turn is the revolution; the first drive is, where none says so."""
-    turns: Annotated[int, Count(least=1, most=64)] = 1
+    turns: Turns = 1
     """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
     360 degrees or more begins in the second."""
 
@@ -83,8 +85,8 @@ class PlanarTable(Table):
     body: str
     """That is moved."""
     angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
-    """``[[time, angle], ...]``, s and rad: the first time is 0, and the motion repeats at the last, where the angle is the
-    first one again, or a turn further on or (clockwise) back. A cubic spline between, smooth where it repeats."""
+    """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats at the last time, where the angle is the first
+    one, or a turn more or (clockwise) less. A cubic spline lies between, smooth where it repeats."""
     period: bool = False
     """Whether the table's span is the revolution; the first drive is, where none says so."""
 
@@ -108,7 +110,7 @@ class PlanarTorque(Table):
     """Inertia that turns with the body, kg m2."""
     period: bool = False
     """Whether a turn of the body is the revolution; the first drive is, where none says so."""
-    turns: Annotated[int, Count(least=1, most=64)] = 1
+    turns: Turns = 1
     """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
     360 degrees or more begins in the second."""
 

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
-from hpcclear.scene.laws import LawTable, quantity_of
+from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
 
 
 class Contact(LawTable):
@@ -16,12 +16,25 @@ class Contact(LawTable):
     formula: ClassVar[str] = "force"
     law: str
     """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
+    geometry: str | None = None
+    """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner" or "power"."""
     minimum_impact_speed: Speed = 1e-3
-    """Floor of the latched impact speed, m/s."""
+    """Lower bound of the impact velocity in the damping, m/s."""
     force: str | None = None
     """The law "expression": the force in N of depth d, its rate v, Hertz' stiffness K, the impact speed v0 and parameters."""
     units: dict[str, str] | None = None
     """The law "expression": units of its parameters, which are further entries of this table."""
+
+    @field_validator("geometry")
+    @classmethod
+    def _sphere_is_the_default(cls, name: str | None) -> str | None:
+        return None if name == SPHERE else name
+
+    @property
+    def has_length(self) -> bool:
+        """Whether the length of each bearing is needed."""
+        shapes = getattr(self.declared, "geometry", None)
+        return shapes is not None and bool(shapes.has_length)
 
     @property
     def latched(self) -> bool:
@@ -65,14 +78,14 @@ class Effects(Table):
     """Friction in the clearance joints; "none" or left out is off."""
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
     """m/s2, towards -y; 0 is off."""
-    slider_load: Annotated[Curve, CurveOf("N")] | None = None
-    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over one turn; "none" or
+    slider_load: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over the turns of a revolution; "none" or
     left out is off."""
     guide_friction: GuideFriction | None = None
     """Friction of the slider in its guide; "none" or left out is off."""
 
     def law_unit(self, path: str) -> str | None:
-        """Return the unit of a parameter of the scene's own laws by its path; None of any other entry."""
+        """Return the unit of a parameter of the scene's own laws by its path; None for any other entry."""
         for table in (self.contact, self.friction):
             if table is not None and path.startswith(f"effects.{table.kind}."):
                 parameter = table.declared.parameter(path.rpartition(".")[2])

@@ -38,7 +38,7 @@ def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> Pyd
 def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
     """An error for validators unless just one of the two is given; `key` is that of `value`."""
     if (value is None) == (other is None):
-        raise invalid("is given twice, or not at all", remedy, key=key, value=value)
+        raise invalid("is given twice or not at all", remedy, key=key, value=value)
 
 
 def check_table(data: Any) -> None:
@@ -89,7 +89,7 @@ class Converted:
 @dataclass(frozen=True)
 class Quantity(Converted):
     """A finite float in an SI unit, given as a number or as a string with a unit; open or closed
-    bounds."""
+    bounds, `nonzero` for numbers of either sign."""
 
     unit: str = ""
     above: float | None = None
@@ -97,6 +97,7 @@ class Quantity(Converted):
     least: float | None = None
     most: float | None = None
     why: str = ""
+    nonzero: bool = False
 
     def convert(self, value: Any) -> float:
         """The value in SI; raises PydanticCustomError."""
@@ -123,7 +124,7 @@ class Quantity(Converted):
         if not math.isfinite(number):
             raise invalid("the number must be finite", self._remedy())
         if abs(number) > LARGEST or 0 < abs(number) < SMALLEST:
-            raise invalid("the number is of no physical size", self._remedy())
+            raise invalid("the number is outside the physical range", self._remedy())
         return number
 
     def holds(self, value: Any) -> Any:
@@ -132,7 +133,8 @@ class Quantity(Converted):
         upper = math.inf if self.below is None else self.below
         least = -LARGEST if self.least is None else self.least
         most = LARGEST if self.most is None else self.most
-        return (value > lower) & (value < upper) & (value >= least) & (value <= most)
+        within = (value > lower) & (value < upper) & (value >= least) & (value <= most)
+        return within & (value != 0.0) if self.nonzero else within
 
     def bounds(self) -> str:
         """The bounds in words."""
@@ -146,6 +148,7 @@ class Quantity(Converted):
             )
             if bound is not None
         ]
+        parts += ["other than 0"] * self.nonzero
         return " and ".join(parts) + (f" {self.unit}" if self.unit else "")
 
     def _remedy(self) -> str:
@@ -165,6 +168,8 @@ class Quantity(Converted):
         ):
             if bound is not None:
                 number[name] = bound
+        if self.nonzero:
+            number["not"] = {"const": 0}
         if not self.unit:
             share = {"type": "string", "pattern": r"%\s*$", "description": "a number with %"}
             return {"anyOf": [number, share]}
@@ -174,19 +179,14 @@ class Quantity(Converted):
 
 @dataclass(frozen=True)
 class Count(Converted):
-    """A whole number within closed bounds, or one word in its place."""
+    """A whole number within closed bounds."""
 
     least: int = 0
     most: int = LARGEST_COUNT
-    word: str | None = None
 
-    def convert(self, value: Any) -> int | str:
+    def convert(self, value: Any) -> int:
         """The value; raises PydanticCustomError."""
-        if self.word is not None and value == self.word:
-            return self.word
-        remedy = f"Write a whole number from {self.least} to {self.most}" + (
-            f', or "{self.word}"' if self.word else ""
-        )
+        remedy = f"Write a whole number from {self.least} to {self.most}"
         if isinstance(value, float) and value.is_integer():
             value = int(value)
         if isinstance(value, bool) or not isinstance(value, int):
@@ -198,13 +198,12 @@ class Count(Converted):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        number = {"type": "integer", "minimum": self.least, "maximum": self.most}
-        return number if self.word is None else {"anyOf": [number, {"const": self.word}]}
+        return {"type": "integer", "minimum": self.least, "maximum": self.most}
 
 
 Curve = float | tuple[tuple[float, float], ...]
-"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn,
-a monotone cubic between: no higher than the higher of two rows, no lower than the lower."""
+"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn. Between two rows lies a monotone
+cubic."""
 
 
 _ENTRY: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
@@ -239,7 +238,7 @@ class CurveOf(Converted):
             )
         if not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
-        remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...] over one turn"
+        remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...]"
         if not 2 <= len(value) <= LONGEST_CURVE:
             raise invalid(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
         if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
@@ -264,7 +263,7 @@ class CurveOf(Converted):
         }
 
 
-_LONGER = "For more turns write a linkage with `turns` of its drive, as init --four-stroke does"
+_LONGER = "For more turns give its drive `turns`, 2 for the 720 degrees of a four-stroke engine"
 
 
 def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: str = "") -> None:
@@ -311,8 +310,8 @@ class MotionTable(Converted):
         gained = pairs[-1][1] - pairs[0][1]
         if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
             raise invalid(
-                f"the last angle is {gained:.6g} rad from the first, and the motion repeats there",
-                "Let it end where it began, or a turn further on or back",
+                f"the last angle is {gained:.6g} rad from the first, but the motion repeats there",
+                "End it where it began, or a full turn further on or back",
             )
         return pairs
 

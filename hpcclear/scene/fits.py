@@ -22,7 +22,7 @@ INSTEAD = {
 
 
 class Tolerance(Table):
-    """How a bore or a pin is made: its limits, and its distribution within them."""
+    """Diameters of a bore or a pin: limits of size, and the distribution within them."""
 
     range: tuple[float, float] | None = None
     """Smallest and largest diameter, m; left out, those of the fit."""
@@ -36,7 +36,7 @@ class Tolerance(Table):
     towards: Literal["upper", "lower"] | None = None
     """Limit towards which the mean is off, where `cpk` is less than `cp`."""
     inspected: bool = True
-    """Whether parts beyond the limits are sorted out."""
+    """Whether parts beyond the limits of size are sorted out."""
 
     @model_validator(mode="before")
     @classmethod
@@ -90,7 +90,7 @@ def law_of(entries: Mapping[str, Any]) -> tolerances.Clearance:
         tolerance = Tolerance(**entries.get(name, {}))
         if tolerance.range is None and limits is None:
             raise invalid(
-                "its limits are not known",
+                "its limits of size are not known",
                 f'Add fit = "20 H7/f7", give the joint a fit, or write {name} = {{ range = [smallest, largest] }}',
                 name, entries.get(name),
             )  # fmt: skip

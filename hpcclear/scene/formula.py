@@ -56,18 +56,18 @@ def names_in(text: str) -> tuple[str, ...]:
                     and isinstance(power.value, int | float)
                     and 0 <= power.value <= MOST_POWER
                 ):
-                    raise FormulaError(f"has a power that is no number from 0 to {MOST_POWER:g}")
+                    raise FormulaError(f"has a power that is not a number from 0 to {MOST_POWER:g}")
                 walk(node.left)
             case ast.BinOp() if type(node.op) in _TWO:
                 walk(node.left)
                 walk(node.right)
             case _:
-                raise FormulaError("has more in it than numbers, variables and + - * / **")
+                raise FormulaError("contains more than numbers, variables and + - * / **")
 
     try:
         walk(_parsed(text))
     except (OverflowError, RecursionError):
-        raise FormulaError("has a number or a depth beyond all use") from None
+        raise FormulaError("has a number that is too large or is nested too deeply") from None
     return tuple(dict.fromkeys(found))
 
 

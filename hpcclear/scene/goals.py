@@ -1,4 +1,4 @@
-"""What a case asks of a design: statistics of f over its random inputs, or a formula, made small or kept below a limit."""
+"""Objectives and constraints of a case: statistics of f over its random inputs, or formulas, minimised or bounded."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -6,11 +6,29 @@ from typing import Annotated, Any, Literal
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
-from hpcclear.base.objectives import OBJECTIVES
+from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import Objective
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.formula import FormulaError, names_in
+from hpcclear.scene.laws import check_objective
+from hpcclear.scene.plugged import PluginName
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
+
+
+class ObjectiveName(PluginName):
+    """An entry that names an objective."""
+
+    def convert(self, value: Any) -> str:
+        """The name of one that is there and without fault; raises PydanticCustomError."""
+        name = super().convert(value)
+        found = self.registry.get(name)
+        if not isinstance(found, Objective):
+            raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
+        if name not in self.registry.ours():
+            check_objective(found)
+        return name
 
 
 class Goal(Table):
@@ -40,7 +58,9 @@ class Goal(Table):
                     str(error), "Write, say, m2 + m3", "formula", self.formula[:80]
                 ) from None
         if self.statistic == "exceedance" and self.limit is None:
-            raise invalid("what is exceeded is not said", "Add limit, a value of f", "limit", None)
+            raise invalid(
+                "the threshold is missing", "Add limit, the threshold of f", "limit", None
+            )
         for key, owner in (("level", "quantile"), ("limit", "exceedance")):
             if getattr(self, key) is not None and self.statistic != owner:
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
@@ -52,7 +72,7 @@ class Goal(Table):
         return 0.95 if self.level is None else self.level
 
     def same_as(self, other: "Goal") -> bool:
-        """Whether it is the same of every design, as far as spelling tells."""
+        """Whether it is the same for every design, as far as its spelling shows."""
         if self.formula is not None and other.formula is not None:
             return "".join(self.formula.split()) == "".join(other.formula.split())
         same = (self.statistic, self.limit) == (other.statistic, other.limit)
@@ -84,7 +104,7 @@ MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
 def in_si(case: Any, objective: object, key: str) -> Any:
-    """A case's row with words as goals, and `limit` and `most` in SI by the unit of the study's objective.
+    """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
     Raises
     ------
@@ -93,8 +113,10 @@ def in_si(case: Any, objective: object, key: str) -> Any:
     """
     if not isinstance(case, Mapping):
         return case
-    found = OBJECTIVES.get(objective) if isinstance(objective, str) else None
-    unit = "" if found is None else found.unit
+    try:
+        unit = OBJECTIVES.get(objective).unit  # type: ignore[arg-type]
+    except (InputError, AttributeError, TypeError):  # which the entry itself says
+        unit = ""
     made = dict(case)
     for table in ("objectives", "constraints"):
         if isinstance(rows := made.get(table), (list, tuple)):

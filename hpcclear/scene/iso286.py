@@ -1,4 +1,4 @@
-"""Limits of holes and shafts by ISO 286, and what a fit of them leaves between both.
+"""Limits of size of holes and shafts by ISO 286, and the clearance of a fit.
 
 Source: ISO 286-1:2010 (standard tolerances, fundamental deviations) and ISO 286-2:2010 (limit deviations), sizes to 500 mm,
 grades 5
@@ -40,7 +40,7 @@ PARTS = (
     450,
     500,
 )
-"""Largest size of each part of a range, mm: of the deviations a, b and c."""
+"""Largest size of each part of a range, mm: of the fundamental deviations a, b and c."""
 
 GRADES = {
     5: (4, 5, 6, 8, 9, 11, 13, 15, 18, 20, 23, 25, 27),
@@ -190,7 +190,8 @@ class Fit(NamedTuple):
 
 
 def fit_of(text: object) -> Fit:
-    """The limits of a fit such as ``"20 H7/f7"``; raises an error for validators if there are none, or no clearance."""
+    """Return the limits of size of a fit such as ``"20 H7/f7"``; raise an error for validators if there are none, or no
+    clearance."""
     if not isinstance(text, str):
         raise invalid("a fit is written in quotes", _EXAMPLE)
     found = _FIT.fullmatch(text)

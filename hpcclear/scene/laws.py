@@ -1,6 +1,6 @@
 """Tables of the scene that name a law: what entries they have, the law says.
 
-Laws are found by name at the door of their plug-ins; no floor above is imported here.
+Laws are found by name in the registry of plug-ins; no higher layer is imported here.
 """
 
 import contextlib
@@ -20,9 +20,18 @@ from hpcclear.scene.wanted import hint
 
 _HOME = "hpcclear.dynamics.laws"
 
+SPHERE = "sphere"
+"""The geometry of contact that laws of this package have by themselves."""
+
 
 def _module(name: str) -> Any:
     return importlib.import_module(f"{_HOME}.{name}")
+
+
+def check_objective(objective: Any) -> None:
+    """An error for validators where an objective is at fault."""
+    with as_mended(""):
+        _module("objectives").check_objective(objective)
 
 
 @contextlib.contextmanager
@@ -54,8 +63,36 @@ def our_laws(kind: str) -> Mapping[str, Any]:
     return found
 
 
+@cache
+def _on(law: Any, geometry: Any) -> Any:
+    return law.on(geometry)
+
+
+def on_geometry(law: Any, name: str) -> Any:
+    """A law on the elastic part of a geometry of that name; an error for validators where there is none."""
+    found = our_laws("geometry")
+    if name not in found:
+        known = (SPHERE, *found)
+        raise invalid("is not one of the known values", nearest(name, known), "geometry", name)
+    if law.factor is None:
+        raise invalid(
+            f"the law {law.name!r} has an elastic force of its own",
+            'Remove geometry, or use a law with damping only, such as "hunt-crossley"', "geometry", name,
+        )  # fmt: skip
+    return _on(law, found[name])
+
+
+def _with_entries(kind: str) -> Iterator[Any]:
+    """All of this package that has entries in a law's table: laws, and for contact the geometries."""
+    yield from our_laws(kind).values()
+    if kind == "contact":
+        yield from our_laws("geometry").values()
+
+
 def known_laws(kind: str) -> dict[str, Any]:
-    """Our laws and those of installed packages, by name."""
+    """Our laws and those of installed packages, by name; geometries are ours alone."""
+    if kind == "geometry":
+        return dict(our_laws(kind))
     registry = CONTACT_LAWS if kind == "contact" else FRICTION_LAWS
     others = {name: named(registry.get(name), name) for name in registry.names()}
     return {**our_laws(kind), **others}
@@ -75,7 +112,7 @@ def _declare(kind: str, parameter: Any) -> None:
 
 def law_entries(kind: str) -> Iterator[tuple[str, Quantity]]:
     """Paths and quantities of the numbers that laws of this package have."""
-    for law in our_laws(kind).values():
+    for law in _with_entries(kind):
         for parameter in law.parameters:
             if parameter.count == 1:
                 yield f"effects.{kind}.{parameter.name}", quantity_of(parameter)
@@ -115,6 +152,9 @@ class LawTable(Table):
     @classmethod
     def find(cls, name: str, data: Mapping[str, Any]) -> Any:
         """The law of a name, with what the table says besides; an error for validators where there is none."""
+        shape = data.get("geometry")
+        if isinstance(shape, str) and shape != SPHERE:
+            return on_geometry(cls.find(name, {**data, "geometry": None}), shape)
         known = our_laws(cls.kind)
         if name in known:
             return known[name]
@@ -154,7 +194,7 @@ class LawTable(Table):
 
     @classmethod
     def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
-        others = {p.name: p for one in our_laws(cls.kind).values() for p in one.parameters}
+        others = {p.name: p for one in _with_entries(cls.kind) for p in one.parameters}
         entries = () if law is None else tuple(p.name for p in law.parameters)
         for key in data:
             if key in cls._own() or key in entries or (law is None and key in others):
@@ -219,7 +259,7 @@ class LawTable(Table):
         return dict(self.__pydantic_extra__ or {})
 
     def value(self, name: str) -> Any:
-        """That of one parameter; None of one that the law has not."""
+        """Return the value of one parameter; None if the law does not have it."""
         return self.values().get(name)
 
     @classmethod
@@ -228,13 +268,13 @@ class LawTable(Table):
     ) -> dict[str, Any]:
         """With the entries of all laws of this package."""
         made = handler.resolve_ref_schema(handler(schema))
-        laws = our_laws(cls.kind)
+        laws = {one.name: one for one in _with_entries(cls.kind)}
         for law in laws.values():
             for p in law.parameters:
                 made["properties"].setdefault(p.name, _schema(p, law, laws))
         words = made["properties"]["law"].get("description")
         made["properties"]["law"] = {
-            "anyOf": [{"enum": [*laws]}, {"type": "string", "pattern": PATTERN}],
+            "anyOf": [{"enum": [*our_laws(cls.kind)]}, {"type": "string", "pattern": PATTERN}],
             **({} if words is None else {"description": words}),
         }
         made["additionalProperties"] = True  # of users' laws
@@ -243,7 +283,9 @@ class LawTable(Table):
 
 def _schema(parameter: Any, law: Any, laws: Mapping[str, Any]) -> dict[str, Any]:
     entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
-    whose = [name for name, one in laws.items() if one.parameter(parameter.name) is not None]
+    whose = [
+        name for name, one in laws.items() if parameter.name in {p.name for p in one.parameters}
+    ]
     if parameter.count > 1:
         many = parameter.count
         entry = {"type": "array", "items": entry, "minItems": many, "maxItems": many}

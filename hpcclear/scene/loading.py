@@ -102,8 +102,8 @@ def scene_of_text(text: str, name: str) -> Scene:
     changes = dict(_change(line) for line in reversed(notes) if line.startswith(_CHANGE))
     files = [path for path in changes if path.rpartition(".")[2] == "file"]
     for key in (*files_named(content), *files):
-        reason = "its scene names a file of values, which the result does not carry"
-        raise InputError(key, name, reason, "Make the result again with this version")
+        reason = "its scene names a file of values that the result does not contain"
+        raise InputError(key, name, reason, "Create the result again with this version")
     changed = content
     for path, value in changes.items():
         changed = entry_replaced(changed, path, value)
@@ -120,7 +120,7 @@ def _change(line: str) -> tuple[str, Any]:
         return path, ast.literal_eval(value)
     except (ValueError, SyntaxError, RecursionError, MemoryError):
         reason = "the note of a change cannot be read"
-        raise InputError("scene", line, reason, "Mend the line, or remove it") from None
+        raise InputError("scene", line, reason, "Correct the line, or remove it") from None
 
 
 def _plugins(scene: Scene) -> str:
@@ -158,7 +158,7 @@ def _read(
             what,
             name,
             f"is larger than {LARGEST_FILE} bytes",
-            "A scene needs a few thousand",
+            "Scenes have a few thousand bytes",
         )
     try:
         return data.decode("utf-8-sig")
@@ -176,13 +176,13 @@ def parse(text: str, name: str) -> dict[str, Any]:
     InputError
         If it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
     """
-    remedy = "Mend the TOML syntax there"
+    remedy = "Correct the TOML syntax there"
     if len(text) > LARGEST_FILE:
         raise InputError(
             "scene file",
             name,
             f"is larger than {LARGEST_FILE} bytes",
-            "A scene needs a few thousand",
+            "Scenes have a few thousand bytes",
         )
     if _DOTTED.search(text):
         raise InputError(

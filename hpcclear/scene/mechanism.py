@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.bending import Bending
-from hpcclear.scene.driving import check_start
+from hpcclear.scene.driving import Turns, check_start
 from hpcclear.scene.fields import (
     Curve,
     CurveOf,
@@ -60,21 +60,25 @@ class Mechanism(Table):
     crank: Link
     rod: Link
     slider: Slider
+    offset: Length | None = None
+    """Of the slider's line from the crank's axis along +y, m; left out, the line goes through the axis."""
 
     @model_validator(mode="after")
     def _assembles(self) -> "Mechanism":
         if self.crank.bending is not None:
             raise invalid(
-                "the drive turns the crank, which clamps it, and modes are those of pinned ends",
+                "the drive clamps the crank, but the modes are those of pinned ends",
                 "Leave it out, or let the rod bend",
                 key="crank.bending",
                 value=None,
             )
-        if self.rod.length <= self.crank.length:
+        offset = abs(self.offset or 0.0)
+        if self.rod.length <= self.crank.length + offset:
+            beside = f" and the offset ({offset:g} m)" if offset else ""
             raise invalid(
-                f"the rod must be longer than the crank ({self.crank.length:g} m), "
-                "or the crank cannot turn round",
-                "Lengthen the rod or shorten the crank",
+                f"the rod must be longer than the crank ({self.crank.length:g} m){beside}, "
+                "or the crank cannot rotate",
+                "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset),
                 key="rod.length",
                 value=self.rod.length,
             )
@@ -85,8 +89,10 @@ class ConstantSpeed(Table):
     """The crank angle is prescribed: it turns at a constant speed, whatever moment that takes."""
 
     kind: Literal["constant-speed"]
-    speed: Annotated[float, Quantity("rad/s", above=0)]
-    """Crank speed, rad/s, counter-clockwise; "600 min^-1" means 600 revolutions a minute."""
+    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
+    """Crank speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
+    turns: Turns = 1
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns."""
 
     elsewhere: ClassVar = dict.fromkeys(
         ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),
@@ -101,8 +107,8 @@ class TorqueDrive(Table):
     """A torque acts on the free crank; its speed is part of the motion."""
 
     kind: Literal["torque"]
-    torque: Annotated[Curve, CurveOf("N*m")]
-    """N m, constant or ``[[crank angle, torque], ...]`` over one turn."""
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    """N m, constant or ``[[crank angle, torque], ...]`` over the turns of a revolution."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
@@ -111,6 +117,8 @@ class TorqueDrive(Table):
     """Crank speed at the start, rad/s; 0 starts from rest."""
     expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """About how fast it will turn, rad/s, from rest needed: tolerances and the first step go by it; else by `initial_speed`."""
+    turns: Turns = 1
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns."""
 
     elsewhere: ClassVar = {
         "speed": (
@@ -137,8 +145,16 @@ class Material(Table):
     """Poisson's ratio."""
 
 
+def length_path(joint: Any) -> str | None:
+    """Where a joint with clearance has the length of its bearing: its own entry, or that of its film or wear."""
+    if joint.length is not None:
+        return "length"
+    parts = ("film", "wear")
+    return next((f"{part}.length" for part in parts if getattr(joint, part) is not None), None)
+
+
 def check_journal(joint: Any) -> None:
-    """An error for validators unless a journal is left in a joint with clearance, and its film and waves fit the play."""
+    """Refuse a joint whose clearance leaves no journal, or whose film or waves exceed the clearance."""
     clearance, radius = joint.clearance, joint.bearing_radius
     if clearance >= radius:
         raise invalid(
@@ -159,6 +175,8 @@ class ClearanceJoint(Table):
     """Radial clearance c = R_B - R_J, m."""
     bearing_radius: PositiveLength
     """R_B, m; it stays as it is when the clearance varies."""
+    length: PositiveLength | None = None
+    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
     fit: str | None = None
     """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
     diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
@@ -188,7 +206,7 @@ class ClearanceJoint(Table):
 
 
 class IdealJoint(Table):
-    """A pin without play."""
+    """A pin without clearance."""
 
     kind: Literal["ideal"]
 
@@ -211,7 +229,7 @@ Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]
 
 
 class Joints(Table):
-    """The two joints that may have play; the crank-frame joint is ideal."""
+    """The two joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
     """O12."""

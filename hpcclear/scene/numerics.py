@@ -5,7 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from hpcclear.base.remarks import remark
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
+from hpcclear.scene.goals import ObjectiveName
 
 
 class Numerics(Table):
@@ -22,42 +24,36 @@ class Numerics(Table):
     method: Literal[
         "auto", "tsitouras", "dormand-prince", "fehlberg", "prince-dormand", "switching", "radau"
     ] = "auto"
-    """Integrator, of responses and samples alike: explicit pairs of order 5, 5, 4 and 8, the last for tolerances of 1e-9 and
-    less; "switching" takes implicit steps where the motion is stiff, "radau" always, "auto" as "switching" in scenes with
-    steep friction ramps, strong damping, oil or bristles, as "radau" where bars bend in modes too fast for explicit steps, as
-    "tsitouras" in others."""
+    """Integrator of responses and samples. The four named pairs are explicit, of order 5, 5, 4 and 8; the last is for
+    tolerances of 1e-9 and less. With "switching" steps are implicit where the motion is stiff, with "radau" always. By
+    default ("auto") the method is "switching" for steep friction ramps, strong damping, oil or bristles, "radau" for fast
+    bending modes, and "tsitouras" otherwise."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
-    """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled alike (see
+    """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled in proportion (see
     the manual)."""
     target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
-    """Relative error of the objective to aim at; chooses tolerance and revolutions in place of the
-    entries here."""
+    """Relative error of the objective to aim at, of responses and samples: f becomes a steady mean, with its 95 % half-width.
+    Chooses tolerance and revolutions in place of the entries here."""
     target_revolutions: Annotated[int, Count(100, 10**12)] = 20_000
-    """With target_error: most revolutions of a design, those of all its copies together; beyond it the target counts
-    as missed."""
+    """With target_error: largest number of revolutions of a design, all replicas together; beyond it the target is missed."""
     transient_revolutions: Annotated[int, Count(0, 10**9)] = 5
     """Revolutions before the average starts."""
-    averaged_revolutions: Annotated[int | Literal["auto"], Count(1, 10**9, word="auto")] = 5
-    """Revolutions of the average; "auto" goes on until objective_tolerance is met."""
-    objective_tolerance: Annotated[float, Quantity("", above=0, below=1)] = 1e-3
-    """For "auto": relative standard error of the objective at which averaging ends."""
-    max_averaged_revolutions: Annotated[int, Count(2, 10**9)] = 200
-    """For "auto": the cap."""
+    averaged_revolutions: Annotated[int, Count(1, 10**9)] = 5
+    """Revolutions of the average."""
+    objective: Annotated[str, ObjectiveName(OBJECTIVES)] | None = None
+    """What a sample is judged by in a scene without a study; default "mean-gap". A study has an entry of its own."""
     objective_joints: tuple[str, ...] = ()
-    """Joints with clearance whose gaps or contact forces count for the objective; all, where none is named."""
+    """Joints with clearance whose gaps or contact forces make up the objective; default all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
-    """Accepted and rejected steps of one sample together; beyond it the sample ends with status
+    """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status
     STEP_CAP."""
-    uncertainty: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also reports the half-width of its objective, by replicas of tighter tolerance, their starts
-    perturbed by 1e-10. A single response (`hpcclear simulate`) always does."""
     energy: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also closes its energy balance."""
+    """Whether each sample also records its energy balance."""
     responses: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also records mean contact forces, peak crank moment and deviation of the
-    slider acceleration. A study of one of these turns it on."""
+    """Whether each sample also records mean contact forces, peak torque of the drive and standard deviation of the
+    slider acceleration. A study of one of these enables it."""
 
     @field_validator("method", mode="before")
     @classmethod

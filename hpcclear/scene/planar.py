@@ -38,7 +38,7 @@ class PlanarBody(Table):
     mass: Mass
     """kg."""
     inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    """About its mass centre, kg m2; of no consequence where it cannot turn."""
+    """About its mass centre, kg m2; ignored if the body cannot rotate."""
     inertia_ratio: Annotated[float, Quantity("", above=0)] | None = None
     """Of a bar, in place of its inertia: this over that of a slender bar, m L^2/12, so that it follows mass and length."""
     length: Annotated[float, Quantity("m", above=0)] | None = None
@@ -76,7 +76,7 @@ class PlanarBody(Table):
             return self
         if self.inertia_ratio is not None and self.inertia:
             raise invalid(
-                "stands beside the inertia itself",
+                "is given beside the inertia itself",
                 "Remove one of the two",
                 key="inertia_ratio",
                 value=self.inertia_ratio,
@@ -91,7 +91,7 @@ class PlanarBody(Table):
         for point in self.points:
             if point.name in ("a", "b"):
                 raise invalid(
-                    "is a point that a bar has anyway",
+                    "is a point that every bar has",
                     "Give it another name",
                     key=f"points.{point.name}",
                 )
@@ -106,7 +106,7 @@ class Ground(Table):
 
 
 class PlanarRevolute(Table):
-    """A pin without play."""
+    """A pin without clearance."""
 
     name: str
     kind: Literal["revolute"]
@@ -136,6 +136,8 @@ class PlanarClearance(Table):
     """R_B - R_J, m."""
     bearing_radius: PositiveLength
     """R_B, m."""
+    length: PositiveLength | None = None
+    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
     fit: str | None = None
     """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
     diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
@@ -210,11 +212,11 @@ class Planar(Table):
     joints: Annotated[tuple[PlanarJoint, ...], Rows]
     """What holds it together. ``like = "NAME"`` takes over what another joint says."""
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
-    """What moves it; one is enough."""
+    """Drives of the mechanism; one is enough."""
     loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
     """Forces, torques and springs; gravity is an effect."""
     followed: str | None = None
-    """``body.point`` whose acceleration and path responses tell of."""
+    """``body.point`` whose acceleration and path the responses report."""
 
     @model_validator(mode="after")
     def _followed_is_a_point(self) -> "Planar":
@@ -270,7 +272,7 @@ def _with_model(table: str, name: str, rows: Mapping[str, Any]) -> Any:
     if not isinstance(model, Mapping) or "like" in model:
         others = [other for other in rows if other != name and "like" not in rows[other]]
         raise invalid(
-            "there is no such row to be like, or it is like another one itself",
+            "there is no such row, or it refers to another one itself",
             nearest(str(row["like"]), others),
             key=f"{table}.{name}.like",
             value=row["like"],

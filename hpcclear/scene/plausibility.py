@@ -1,12 +1,13 @@
 """Numbers that are allowed and hardly meant: rad/s taken for rpm, Pa for GPa, mm for m, grams for kilograms.
 
-Limits lie well beyond what is built, so that a warning is worth reading; each says what would be plausible and what to write.
-"""
+Thresholds lie well beyond built machines, so that a warning is worth reading; each says what would be plausible and what to
+write."""
 
 import math
 from collections.abc import Iterator
 
 from hpcclear.scene.driving import speed_entry
+from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.tables import SceneTables
 
 FASTEST = 30.0
@@ -29,16 +30,16 @@ STEEL = 7850.0
 
 def implausible(scene: SceneTables) -> Iterator[str]:
     """A sentence for each number that is likely a slip of units."""
-    if not scene.is_planar:
+    if isinstance(scene.mechanism, Mechanism):
         yield from _drive(scene)
         yield from _bodies(scene)
         yield from _rod(scene)
     yield from _joints(scene)
     yield from _films(scene)
     if scene.numerics.beta == 0.0 and (
-        scene.is_planar or scene.numerics.formulation == "baumgarte"
+        scene.template is None or scene.numerics.formulation == "baumgarte"
     ):
-        yield "numerics.beta = 0 leaves loops without play to drift; 100 to 1000 1/s pull them together"
+        yield "numerics.beta = 0 lets loops without clearance drift; use 100 to 1000 1/s"
     effects = scene.effects
     if effects.gravity > 100.0:
         yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
@@ -53,7 +54,7 @@ def implausible(scene: SceneTables) -> Iterator[str]:
 def _drive(scene: SceneTables) -> Iterator[str]:
     drive = scene.drive
     key = speed_entry(drive)
-    speed = float(getattr(drive, key))
+    speed = abs(float(getattr(drive, key)))
     turns = speed / (2.0 * math.pi)
     mean = 4.0 * scene.slider_crank.crank.length * turns
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:
@@ -73,7 +74,7 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
         if link.inertia > 100.0 * link.mass * link.length**2:
             yield (
                 f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is {link.inertia / (link.mass * link.length**2):.2g} "
-                "times mass times length squared; mind the unit, or give a flywheel as drive.flywheel_inertia"
+                "times mass times length squared; check the unit, or give a flywheel as drive.flywheel_inertia"
             )
     for name in ("crank", "rod", "slider"):
         mass = getattr(mechanism, name).mass
@@ -115,7 +116,7 @@ def _joints(scene: SceneTables) -> Iterator[str]:
         if joint.clearance > WIDEST * joint.bearing_radius:
             yield (
                 f"{key}.clearance = {joint.clearance:g} m is {joint.clearance / joint.bearing_radius:.0%} of the "
-                "bearing's radius; write the radial play, half of the difference of the diameters"
+                "bearing's radius; write the radial clearance, half of the difference of the diameters"
             )
 
 
@@ -133,6 +134,6 @@ def _films(scene: SceneTables) -> Iterator[str]:
             film.model == "long" and ratio < SHORTEST_LONG
         ):
             yield (
-                f'{key}.model = "{film.model}" carries far too much where the bearing is {ratio:.2g} diameters long; '
-                f'short films go to {LONGEST_SHORT:g}, long ones begin at {SHORTEST_LONG:g}; model = "finite" is for both'
+                f'{key}.model = "{film.model}" overestimates the load capacity of a bearing {ratio:.2g} diameters long. '
+                f'Short films go up to {LONGEST_SHORT:g}, long ones begin at {SHORTEST_LONG:g}; model = "finite" covers both'
             )

@@ -66,7 +66,7 @@ class PluginName(Converted):
 
 @contextlib.contextmanager
 def as_invalid(key: str = "") -> Iterator[None]:
-    """Where a validator asks for a plug-in: what is wrong with that as an error of the entry."""
+    """Where a validator requests a plug-in: what is wrong with that as an error of the entry."""
     try:
         yield
     except InputError as error:
@@ -114,7 +114,7 @@ def check_trust(content: Mapping[str, Any], name: str) -> None:
     listed = ", ".join(f"{one}.py (SHA-256 {digest(text)[:12]})" for one, text in texts.items())
     raise UntrustedSource(
         "plugins.files", name,
-        f"its scene carries Python source, which is run only where --trust allows it: {listed}",
-        "Read it first; in Python use `with hpcclear.plugins.trusting()`. In a scene file of your own leave the table out: "
-        "files are read beside it",
+        f"its scene contains Python source, which runs only with --trust: {listed}",
+        "Read it first; in Python use `with hpcclear.plugins.trusting()`. In your own scene file leave the table out: "
+        "the files beside it are read",
     )  # fmt: skip

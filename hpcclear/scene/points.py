@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.scene.domain import entries
+from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
 
@@ -25,6 +26,8 @@ class Points:
     """Scene entries that each column drives."""
     labels: tuple[str, ...] = ()
     """Names of the rows, length n, where they have some."""
+    sampling: str = ""
+    """How a study drew them (`Study.method`); empty for designs that somebody chose, which are no random sample."""
 
     def __post_init__(self) -> None:
         values = np.array(self.values, dtype=np.float64)
@@ -34,7 +37,7 @@ class Points:
             or len(self.paths) != len(self.names)
         ):
             raise InputError(
-                "points", values.shape, "one column a name is needed", "Give an (n, d) array"
+                "points", values.shape, "one column per name is needed", "Give an (n, d) array"
             )
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
@@ -60,7 +63,7 @@ class Points:
         """Some of the points: a slice, indices or a mask."""
         chosen = rows if isinstance(rows, slice) else np.asarray(rows)
         labels = tuple(np.array(self.labels, object)[chosen]) if self.labels else ()
-        return Points(self.names, self.values[chosen], self.paths, labels)
+        return Points(self.names, self.values[chosen], self.paths, labels, self.sampling)
 
 
 def check_points(
@@ -85,7 +88,7 @@ def check_points(
                 if usual not in scene.numeric_paths():
                     _refuse(column == 0.0, column, name, reason, label)
     pairs = []
-    if not scene.is_planar:
+    if isinstance(scene.mechanism, Mechanism):
         reason = "the rod no longer than the crank"
         pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
     for joint in scene.clearance_joints():
@@ -132,4 +135,4 @@ def _refuse(
     if bad.any():
         row = int(np.argmax(bad))
         key = f"{label(row)}, {name}"
-        raise InputError(key, float(values[row]), reason, "Narrow its range, or mend that row")
+        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")

@@ -33,7 +33,7 @@ class Waves(Table):
     sine_8: Wave = 0.0
 
     def given(self) -> int:
-        """The number of the last wave that is not nought."""
+        """The number of the last wave that is not zero."""
         found = [
             n for n in range(1, MOST_WAVES + 1)
             if getattr(self, f"cosine_{n}") or getattr(self, f"sine_{n}")
@@ -58,14 +58,14 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
         return
     if film is not None:
         raise invalid(
-            "an oil film is that of round surfaces", "Remove out_of_round, or film",
+            "an oil film needs round surfaces", "Remove out_of_round, or film",
             key="out_of_round", value=None,
         )  # fmt: skip
     for name in ("bearing", "journal"):
         own = getattr(waves, name)
         if own is not None and own.deepest() >= clearance:
             raise invalid(
-                f"waves come to {own.deepest():g} m, and the clearance is {clearance:g} m: the journal may not fit",
+                f"waves are up to {own.deepest():g} m high, but the clearance is {clearance:g} m: the journal may not fit",
                 "Make them smaller than the clearance",
                 key=f"out_of_round.{name}",
                 value=own.deepest(),

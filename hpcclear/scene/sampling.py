@@ -7,6 +7,7 @@ the index of the sample, so that nothing depends on how many points are drawn at
 import hashlib
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -90,7 +91,12 @@ def latin_hypercube(
     study = scene.required_study
     count = study.samples if samples is None else samples
     if count < 1:
-        raise InputError("samples", count, "a design needs at least one point", "Ask for 1 or more")
+        raise InputError(
+            "samples",
+            count,
+            "a design of experiments needs at least one point",
+            "Request 1 or more",
+        )
     region = box(scene, names, widen)
     rng = generator(study.seed, f"lhs {purpose}")
     unit = unit_lhs(count, len(region.names), rng)
@@ -116,7 +122,7 @@ def _chances(
     first, count = span
     if stratified:
         if first:
-            raise InputError("first", first, "a Latin hypercube has no parts", "Begin at 0")
+            raise InputError("first", first, "a Latin hypercube cannot be divided", "Begin at 0")
         rng = generator(seed, f"stratified {purpose}")
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
     if scrambling is None:
@@ -129,7 +135,7 @@ def _chances(
 def _scrambled(
     seed: int, purpose: str, scrambling: int, dimensions: int, first: int, count: int
 ) -> Array:
-    """Points of a scrambling, (count, dimensions), read only: all designs of a study meet the same."""
+    """Points of a randomised sequence, (count, dimensions), read only: all designs of a study meet the same."""
     rng = generator(seed, f"sobol {purpose}", str(scrambling))
     points = sobol(dimensions, rng, first, count)
     points.flags.writeable = False
@@ -165,8 +171,8 @@ def monte_carlo(
     purpose, first
         Which stream, and where in it to begin.
     scrambling : int, optional
-        Samples of the scrambled Sobol sequence of that number, in place of independent ones: each
-        scrambling is one independent estimate. Begin and end at powers of two.
+        Number of a randomised Sobol sequence whose samples replace independent ones; each sequence
+        is one independent estimate. Begin and end at powers of two.
     stratified : bool
         A Latin hypercube of probabilities in their place; all of it, so from index 0 on. Of inputs that vary together the first
         alone keeps its strata.
@@ -177,7 +183,7 @@ def monte_carlo(
     count = study.samples if samples is None else samples
     if count < 1 or first < 0:
         reason = "at least one sample, from index 0 on, is needed"
-        raise InputError("samples", count, reason, "Ask for 1 or more")
+        raise InputError("samples", count, reason, "Request 1 or more")
     inputs = {row.name: row for row in study.random}
     chosen = _known("random", inputs if random is None else random, inputs)
     fixed = (
@@ -270,7 +276,7 @@ def _uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Arra
 
 
 SOBOL_BITS = 30
-"""Digits of a point of a Sobol sequence; a sequence has as many points as they can tell apart."""
+"""Digits of a point of a Sobol sequence; a sequence has as many points as they can represent."""
 
 
 def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
@@ -288,15 +294,17 @@ def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> 
 
 def sampled(scene: Scene) -> Points:
     """What `sample` simulates: the study's points by its method; raises InputError as `latin_hypercube`."""
-    match scene.required_study.method:
+    method = scene.required_study.method
+    match method:
         case "lhs":
-            return latin_hypercube(scene)
+            points = latin_hypercube(scene)
         case "random-lhs":
-            return monte_carlo(scene, stratified=True)
+            points = monte_carlo(scene, stratified=True)
         case "qmc":
-            return monte_carlo(scene, scrambling=0)
+            points = monte_carlo(scene, scrambling=0)
         case _:
-            return monte_carlo(scene)
+            points = monte_carlo(scene)
+    return replace(points, sampling=method)
 
 
 _PAGE = 4096  # points made at a time
@@ -304,7 +312,7 @@ _PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
 
 
 class MonteCarloPoints:
-    """The study's Monte Carlo points by index, made when they are asked for and soon forgotten.
+    """The study's Monte Carlo points by index, generated on request and not stored.
 
     Parameters
     ----------

@@ -6,6 +6,7 @@ from typing import Any, Self
 import tomli_w
 from pydantic import PrivateAttr, ValidationError, model_validator
 
+from hpcclear.base import markup
 from hpcclear.base.errors import InputError, unboxed
 from hpcclear.plugins.sources import using
 from hpcclear.scene import citation, describing, domain
@@ -62,7 +63,7 @@ class Scene(SceneTables):
             key = f"study.random.{row.name}"
             if self.wear is None:
                 raise invalid(
-                    "the scene does not say what lives to follow",
+                    "the scene has no [wear] table",
                     "Add [wear], as in jobs/worn_study.toml", key, "wear",
                 )  # fmt: skip
             for path in row.paths:
@@ -134,6 +135,15 @@ class Scene(SceneTables):
     def effects_on(self) -> tuple[str, ...]:
         """What is on, in words, one entry an effect."""
         return tuple(describing.effects_on(self))
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: mechanism, effects, study and hash."""
+        rows: list[tuple[str, str]] = [("mechanism", self.mechanism.kind)]
+        rows += [("effect", text) for text in self.effects_on()]
+        if self.study is not None:
+            rows.append(("study variables", ", ".join(self.study.names)))
+        rows += [("warning", text) for text in self.warnings]
+        return markup.table("Scene", [*rows, ("scene hash", self.hash[:16])])
 
     @property
     def text(self) -> str:

@@ -26,10 +26,10 @@ class Sensitivity(Table):
     """Response surfaces and first-order sensitivities (the paper's sections 4.2 and 5)."""
 
     groups: tuple[Names, ...] | None = None
-    """Inputs fitted together; default the masses, mass centres and inertias of each two links that are
-    joined, as far as they are study variables; of a linkage, what its bodies vary, two by two."""
+    """Inputs that share a surface. Default: masses, mass centres and inertias of each two joined links, as far as they are
+    study variables; of a linkage, the variables of its bodies, two by two."""
     parameter: str | None = None
-    """The study variable held fixed for each surface; default the one that drives clearances, if
+    """The study variable that is fixed for each surface; default the one that drives clearances, if
     there is just one."""
     levels: Annotated[int, Count(1, 1000)] = 8
     """Values of the parameter, evenly over its range."""
@@ -73,8 +73,8 @@ class Sensitivity(Table):
         """Contradictions between the entries; PydanticCustomError with a key below the study."""
         if self.sobol_samples & (self.sobol_samples - 1):
             raise invalid(
-                "must be a power of two, or the sequence is not balanced",
-                "Write 4096, say",
+                "must be a power of two: other lengths unbalance the sequence",
+                "Write 4096, for example",
                 key="sensitivity.sobol_samples",
             )
 
@@ -100,15 +100,15 @@ class Surrogate(Table):
     restarts: Annotated[int, Count(0, 100)] = 2
     """Further starts of Kriging's likelihood search."""
     kernel: Literal["squared-exponential", "matern-5/2"] | None = None
-    """Covariance function: "squared-exponential", the default, for what is smooth, or "matern-5/2", which can be differentiated
-    twice, for what has kinks or bends fast in places; under it the swarm averages over 256 points of a Sobol sequence."""
+    """Covariance function: "squared-exponential", the default, for smooth f; or "matern-5/2", twice differentiable, for f with
+    kinks. With the latter the swarm averages over 256 points of a Sobol sequence."""
 
 
 class CertificateOfEffects(Table):
-    """Which effects the study could do without, told before it begins; the study itself is carried out with all of them."""
+    """Effect screening before the study: effects that can be neglected. The study itself uses all effects."""
 
     tolerance: Annotated[float, Quantity("", above=0, below=1)] = 0.01
-    """Relative change that is allowed in mean and deviation of the objective."""
+    """Largest relative change of mean and standard deviation of f that counts as negligible."""
     samples: Annotated[int, Count(64, 10**9)] | None = None
     """Simulations of each variant at most; default as many as make a twentieth of the study."""
     forces: Annotated[bool, Field(strict=True)] = False
@@ -116,16 +116,16 @@ class CertificateOfEffects(Table):
 
 
 FEWEST = 8
-"""Designs at a time of which an algorithm of pymoo can make others: some go on for ever with fewer."""
+"""Fewest designs at a time for an algorithm of pymoo; some never end with fewer."""
 
 
 class Swarm(Table):
     """Multi-objective particle swarm (eqs. 22 and 23), or another search in its place."""
 
     algorithm: Annotated[str, PluginName(SEARCHES)] | None = None
-    """Default "swarm"; or "pymoo:NSGA2" and others of pymoo, which `pip install 'hpcclear[pymoo]'` brings, with their own
-    settings; or "module:Name" of a Python file beside the scene, or the name that an installed package offers. Each has as many
-    evaluations: `particles` designs at a time, `iterations` times."""
+    """Default "swarm". Others: "pymoo:NSGA2" and more of pymoo, with their own settings (`pip install pymoo`);
+    "module:Name" of a Python file beside the scene; the name of an installed plug-in. Each evaluates `particles` designs
+    at a time, `iterations` times."""
     particles: Annotated[int, Count(2, 10**6)] = 100
     """Designs that are moved at a time."""
     iterations: Annotated[int, Count(1, 10**6)] = 100
@@ -141,7 +141,7 @@ class Swarm(Table):
     archive: Annotated[int, Count(2, 10**5)] = 100
     """Solutions of a front."""
     statistics: Literal["quadrature", "monte-carlo"] = "quadrature"
-    """How mean and deviation over the random inputs are found."""
+    """How mean and standard deviation over the random inputs are computed."""
     monte_carlo_samples: Annotated[int, Count(2, 10**7)] = 1000
     """Samples a design, for "monte-carlo"."""
 
@@ -149,8 +149,8 @@ class Swarm(Table):
     def _enough(self) -> "Swarm":
         if (self.algorithm or "").startswith("pymoo:") and self.particles < FEWEST:
             raise invalid(
-                f"{self.algorithm} makes designs of each other, and needs {FEWEST} at a time",
-                f"Ask for {FEWEST} or more",
+                f"{self.algorithm} recombines designs and needs at least {FEWEST} of them",
+                f"Request {FEWEST} or more",
                 "particles",
                 self.particles,
             )
@@ -158,23 +158,23 @@ class Swarm(Table):
 
 
 class MomentAccuracy(Table):
-    """Half-widths of confidence limits, relative."""
+    """Half-widths of confidence intervals, relative."""
 
     mean: Share = 0.002
     """Of the mean."""
     deviation: Share = 0.005
-    """Of the deviation."""
+    """Of the standard deviation."""
     quantile: Share | None = None
-    """Of quantiles, where a case asks for one; default that of the deviation."""
+    """Of quantiles, where a case has one; default that of the standard deviation."""
     exceedance: Share | None = None
-    """Of the probability of exceeding a limit, where a case asks for it: absolute; default 0.01."""
+    """Of the probability of exceeding a threshold, where a case has it: absolute; default 0.01."""
 
 
 MOMENTS = ("mean", "deviation")
 
 
 def of_both(entry: Any) -> Any:
-    """A number as the accuracy of mean and deviation; of a table with one of the two, the other is the same.
+    """A number as the accuracy of mean and standard deviation; of a table with one of them, the other is the same.
 
     Raises
     ------
@@ -195,59 +195,59 @@ def of_both(entry: Any) -> Any:
 
 
 SCRAMBLINGS = 16
-"""Independent scramblings of the Sobol sequence, each as many simulations: enough to know their spread,
-few enough to be long."""
+"""Independently randomised Sobol sequences of equal length: enough to estimate their scatter, few enough to be long."""
 
 
 class Verification(Table):
-    """Chosen designs through the true dynamics."""
+    """Full simulation of the selected designs."""
 
     method: Literal["qmc", "monte-carlo"] | None = None
-    """What is simulated of a design: "qmc", 16 scramblings of a Sobol sequence over the random inputs, as long as
-    `study.accuracy` asks for; or "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
+    """Sampling of the random inputs: "qmc", 16 randomised Sobol sequences, as long as `study.accuracy` requires; or
+    "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
     least_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] | None = None
-    """Simulations of a design from which its accuracy is judged, for "qmc"; default 512, as far as it may have so many."""
+    """First number of simulations of a design, from which its accuracy is estimated, for "qmc"; default 512, at most
+    `most_samples`."""
     most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
-    """Simulations of a design at most, for "qmc"."""
+    """Largest number of simulations of a design, for "qmc"."""
     contest: Annotated[int, Count(1, 2**10)] = 4
-    """How many times the simulations that its accuracy takes a design of the search may get, for "qmc", while for all that is
-    known it may be the best in an objective, and is more than 0.4 of the accuracy asked for off the least; 1: none."""
+    """Factor on the simulations that the accuracy requires, for "qmc". Designs of the search may use
+    it while they may still be optimal within the confidence interval. Designs within 0.4 of the target of the lowest value do
+    not need it. 1: no factor."""
     samples: Annotated[int, Count(2, 10**9)] | None = None
-    """Draws of a design, for "monte-carlo"; 10 000 if it is asked for without a number."""
+    """Draws of a design, for "monte-carlo"; default 10 000."""
     designs: Annotated[int, Count(0, 10**5)] = 10
-    """Designs of each front, spread along it, beside alpha, beta and the original."""
+    """Designs along each front, besides alpha, beta and the baseline design."""
     confidence: Share = 0.95
-    """Level of the confidence limits."""
+    """Level of the confidence intervals."""
     tolerance: Share = 0.02
-    """Relative difference of surrogate and true mean of alpha and beta above which it is said."""
+    """Relative surrogate error of the mean of alpha and beta above which a warning is printed."""
     deviation_tolerance: Share = 0.05
-    """The same for the deviation."""
+    """The same for the standard deviation."""
     infill_rounds: Annotated[int, Count(0, 100)] = 8
-    """Rounds of further designs at most, beside those of the swarm: they are simulated where they decide the front. 0
-    verifies the swarm's designs alone."""
+    """Largest number of rounds of adaptive refinement: further designs are simulated where they decide the front.
+    0: only designs of the search are verified."""
     infill_designs: Annotated[int, Count(1, 10**4)] = 12
     """Designs of a case in each round."""
     infill_samples: Annotated[int, Count(SCRAMBLINGS * 2, 10**9)] = 256
-    """Simulations of each of these at most, by scrambled Sobol sequences; no more than `samples`, where that is given."""
+    """Largest number of simulations of each of these, by randomised Sobol sequences; at most `samples`, where that is given."""
     response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
-    """Clearance of all joints in the responses that are compared, m; default those of the scene and the design."""
+    """Clearance of all joints in the compared responses, m; default the clearances of scene and design."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2
     """Steady revolutions of these responses."""
     response_windows: Annotated[int, Count(2, 1000)] = 10
-    """How many such stretches their averages, fluctuations and peaks are taken over, to know how
-    much these scatter."""
+    """Number of such intervals for averages, fluctuations and peaks, to estimate their scatter."""
     response_copies: Annotated[int, Count(2, 1000)] = 8
-    """Copies of each response, kicked at their start: where they disagree the motion is chaotic, and what is said of averages,
-    fluctuations and peaks is no surer than they agree."""
+    """Replicas of each response with perturbed starts. If they differ, the motion is chaotic, and their scatter is the
+    uncertainty of averages, fluctuations and peaks."""
     audit_samples: Annotated[int, Count(0, 10**6)] = 256
-    """Direct simulations of each of the paper's designs under each reading of its text, by scrambled Sobol sequences, at most
-    (at least 16); 0 leaves the comparison out."""
+    """Largest number of simulations of each of the paper's designs under each reading of its text (at least 16); 0: no
+    comparison."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Verification":
         if self.method == "qmc" and self.samples is not None:
             raise invalid(
-                "how many points of a Sobol sequence are simulated follows from the accuracy",
+                "the number of points of a Sobol sequence follows from the accuracy",
                 'Leave it out and set study.accuracy or most_samples, or write method = "monte-carlo"',
                 key="samples",
                 value=self.samples,
@@ -256,7 +256,7 @@ class Verification(Table):
 
     @property
     def draws(self) -> int | None:
-        """Independent draws of a design; None for scrambled Sobol sequences."""
+        """Independent draws of a design; None for randomised Sobol sequences."""
         return (
             None
             if self.method in (None, "qmc") and self.samples is None

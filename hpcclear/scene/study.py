@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
+from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
 from hpcclear.scene.cases import Case
 from hpcclear.scene.correlation import Correlation
@@ -36,27 +37,19 @@ class Study(Table):
     seed: Annotated[int, Count(0, 2**63 - 1)] = 0
     """Every random number of the study follows from it."""
     method: Literal["lhs", "monte-carlo", "random-lhs", "qmc"] = "lhs"
-    """How `sample` draws its points: "lhs", a Latin hypercube over the ranges of the variables, whatever is random about
-    them; or by the distributions of the random inputs, "monte-carlo", independent draws, "random-lhs", stratified,
-    "qmc", a scrambled Sobol sequence (take a power of two)."""
+    """How `sample` draws its points. "lhs": a Latin hypercube over the ranges of the variables. By the distributions of the
+    random inputs: "monte-carlo", independent draws; "random-lhs", stratified; "qmc", a randomised Sobol sequence (use a power
+    of two)."""
     samples: Annotated[int, Count(1, 10**9)] = 200
     """Points of a design: training points of each Kriging model, or what `sample` simulates."""
     test_samples: Annotated[int, Count(0, 10**6)] = 50
     """Fresh points each Kriging model is tested on."""
-    objective: Literal[
-        "mean-gap",
-        "mean-contact-force",
-        "peak-contact-force",
-        "peak-crank-moment",
-        "slider-acceleration-deviation",
-        "point-acceleration-deviation",
-        "peak-point-acceleration",
-    ] = "mean-gap"
-    """What the study makes small: eq. 13, or another response."""
+    objective: Annotated[str, goals.ObjectiveName(OBJECTIVES)] = "mean-gap"
+    """The objective f to minimise: eq. 13, another response, or one of your own."""
     accuracy: MomentAccuracy | None = None
     """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: a number for
     both, or a table. Each design is simulated until it meets them. They include the error of the integration tolerance,
-    measured by pairs of samples at a stricter tolerance. Left out: mean = 0.002 and deviation = 0.005, sampling error only."""
+    measured by pairs of samples at a tighter tolerance. Left out: `mean = 0.002`, `deviation = 0.005`, sampling error only."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None
@@ -147,8 +140,8 @@ class Study(Table):
     def _check_width(self, row: RandomInput) -> None:
         if row.worn and row.name not in self.names:
             raise invalid(
-                "clearances that wear are no variable of this study, so nothing would be made of them",
-                f"Add study.variables.{row.name} with a range that holds them, or leave it out",
+                "worn clearances are not a variable of this study and would have no effect",
+                f"Add study.variables.{row.name} with a range that contains them, or leave it out",
                 key=f"random.{row.name}",
             )
         if row.name not in self.names:
@@ -189,7 +182,7 @@ class Study(Table):
                 )
             if self.random_input(name).worn:
                 raise invalid(
-                    f"{name!r} comes of lives of worn joints, which know of no other input",
+                    f"{name!r} comes from the wear simulation, which has no other input",
                     "Leave it out",
                     key="correlation.inputs",
                 )
@@ -205,14 +198,14 @@ class Study(Table):
                     )
                 if name not in self.optimisation:
                     raise invalid(
-                        f"the surrogate of the optimisation does not know {name!r}",
+                        f"the surrogate of the optimisation does not contain {name!r}",
                         "Add it to study.variables and to study.surrogate.optimisation",
                         key=f"cases.{case.name}",
                     )
             if not self.design_variables(case.name):
                 raise invalid(
-                    "every variable of this case is random wherever the design is, "
-                    "so nothing can be chosen",
+                    "every variable of this case has an absolute distribution,  "
+                    "so no design variable is left",
                     "Add a study variable, or give a half_width instead of a range",
                     key=f"cases.{case.name}",
                 )
@@ -222,8 +215,8 @@ class Study(Table):
         own = self.design_variables(case.name)
         if self.swarm.archive < len(case.goals):
             raise invalid(
-                f"case {case.name} makes {len(case.goals)} things small, and each has a solution of its own",
-                f"Ask for {len(case.goals)} solutions or more",
+                f"case {case.name} has {len(case.goals)} objectives, each with a best design of its own",
+                f"Request {len(case.goals)} solutions or more",
                 key="swarm.archive",
                 value=self.swarm.archive,
             )
@@ -265,7 +258,7 @@ class Study(Table):
             if self.sensitivity.parameter is None:
                 raise invalid(
                     "no study variable, or more than one, drives a clearance, "
-                    "so what is held fixed for each surface is not known",
+                    "so the fixed parameter of each surface is not known",
                     f"Name one of {', '.join(self.names)}",
                     key="sensitivity.parameter",
                 )
@@ -277,7 +270,7 @@ class Study(Table):
                 )
             if any(self.sensitivity.parameter in group for group in self.sensitivity.groups):
                 raise invalid(
-                    "the parameter is held fixed, so it cannot be an input of a surface",
+                    "the parameter is fixed, so it cannot be an input of a surface",
                     "Remove it from the group",
                     key="sensitivity.groups",
                 )
@@ -296,7 +289,7 @@ class Study(Table):
             if self.surrogate.model in (None, "kriging") and self.samples < inputs + 2:
                 raise invalid(
                     f"a Kriging model in {inputs} inputs has {inputs + 2} parameters to fit",
-                    f"Ask for at least {10 * inputs} samples",
+                    f"Request at least {10 * inputs} samples",
                     key="samples",
                     value=self.samples,
                 )
@@ -316,12 +309,12 @@ class Study(Table):
 
     @property
     def wanted(self) -> MomentAccuracy:
-        """Half-widths that verified designs are simulated for: those asked for, or usual ones."""
+        """Target half-widths of verified designs, or their defaults."""
         return MomentAccuracy() if self.accuracy is None else self.accuracy
 
     @property
     def paired(self) -> bool:
-        """Whether the tolerance has a share in an accuracy that is asked for; a fixed number of draws leaves none to meet."""
+        """Whether the error of the tolerance is part of a target accuracy; a fixed number of draws has no target."""
         return self.accuracy is not None and self.verification.draws is None
 
     def case(self, name: str) -> Case:
@@ -421,7 +414,7 @@ def _enough(stage: Sensitivity, inputs: int, order: int, samples: int, entry: st
             if chosen
             else f"a surface of order {order} in {inputs} inputs has {terms} terms, "
             f"more than the {samples} samples",
-            f"Ask for at least {10 * inputs if chosen else 2 * terms} samples"
+            f"Request at least {10 * inputs if chosen else 2 * terms} samples"
             + ("" if chosen else ", or lower the order"),
             key=f"sensitivity.{entry}",
             value=samples,

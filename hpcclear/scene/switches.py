@@ -40,7 +40,7 @@ class Switch:
     moved: Mapping[str, str] = field(default_factory=dict)
     """Numbers that stand elsewhere with the effect off."""
     joint: str | None = None
-    """The joint whose play it is."""
+    """The joint whose clearance it is."""
 
     def path(self, path: str) -> str | None:
         """Where a number of the scene stands with the effect off; None if nowhere."""
@@ -54,7 +54,7 @@ class Switch:
         return any(key.startswith(parts) or ".bending" in key for key in self.changes)
 
     def excludes(self, other: "Switch") -> bool:
-        """Whether both change the same entries, as two models of one effect do, or a joint's play and its film."""
+        """Whether both change the same entries, as two models of one effect do, or clearance and film of a joint."""
         return any(
             _holds(key, own) or _holds(own, key) for key in self.changes for own in other.changes
         )
@@ -68,7 +68,7 @@ def _holds(key: str, path: str) -> bool:
 def switches(scene: Scene) -> tuple[Switch, ...]:
     """All effects of a scene that may be switched off, joints first.
 
-    Play in a joint that ``numerics.objective_joints`` names is none of them: the study asks about it.
+    Clearance in a joint of ``numerics.objective_joints`` is left out, since it makes up the objective.
     """
     return (
         *_plays(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
@@ -85,7 +85,7 @@ def _plays(scene: Scene) -> Iterator[Switch]:
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
         else:
             ideal = {"kind": "ideal"}
-        yield Switch(f"play in {label}", {scene.joint_key(label): ideal}, joint=label)
+        yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
 
 
 def _films(scene: Scene) -> Iterator[Switch]:
@@ -145,7 +145,13 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
             "law": table.declared.without_loss,
             "minimum_impact_speed": table.minimum_impact_speed,
         }
-        yield Switch("contact damping", {"effects.contact": elastic}, {floor: floor})
+        kept = [floor]
+        if table.geometry is not None:
+            names = [one.name for one in table.declared.geometry.parameters]
+            elastic |= {"geometry": table.geometry} | {name: table.value(name) for name in names}
+            kept += [f"effects.contact.{name}" for name in names]
+        moved = {path: path for path in kept}
+        yield Switch("contact damping", {"effects.contact": elastic}, moved)
 
 
 def _outside(scene: Scene) -> Iterator[Switch]:
@@ -154,7 +160,8 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("gravity", {"effects.gravity": 0.0})
     if effects.slider_load is not None:
         yield Switch("slider load", {"effects.slider_load": None})
-        yield from _mean("slider load", "effects.slider_load", effects.slider_load, 1)
+        turns = turns_of(scene.linkage)
+        yield from _mean("slider load", "effects.slider_load", effects.slider_load, turns)
     if effects.guide_friction is not None:
         yield Switch("guide friction", {"effects.guide_friction": None})
     if isinstance(mechanism, Planar):
@@ -171,7 +178,7 @@ def _outside(scene: Scene) -> Iterator[Switch]:
 
 
 def _mean(name: str, key: str, curve: Curve | None, turns: int) -> Iterator[Switch]:
-    """Of a load that a table over so many turns tells: its mean in place of it."""
+    """Replace a load that is tabulated over so many turns by its mean."""
     if isinstance(curve, tuple):
         yield Switch(f"variation of {name}", {key: mean_of(curve, turns)})
 
@@ -199,7 +206,7 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
-        turns = turns_of(scene.mechanism) if isinstance(scene.mechanism, Planar) else 1
+        turns = turns_of(scene.linkage)
         yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 
@@ -273,7 +280,7 @@ class Off:
         cases = {name: case for name, case in cases.items() if case["random"]}
         if not left["variables"] or (study.cases and not cases):
             raise InputError(
-                "study", None, "nothing would be left to vary", "Keep the effect that it varies"
+                "study", None, "no variable would be left", "Keep the effect that it varies"
             )
         kept = {key: value for key, value in content.items() if key != "correlation"}
         return {

@@ -112,7 +112,7 @@ class _Driven:
                     where,
                     self.column.cells[row],
                     reason,
-                    "Mend the value or the unit of its column",
+                    "Correct the value or the unit of its column",
                 )
         return value
 

@@ -8,14 +8,15 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, of_joints
-from hpcclear.base.outcome import RESPONSES
+from hpcclear.base.objectives import MEAN_GAP, Objective, bound
+from hpcclear.plugins import OBJECTIVES
+from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending, check_scene
 from hpcclear.scene.effects import Effects
-from hpcclear.scene.fields import NamedRows, Table, invalid, nearest
+from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
 from hpcclear.scene.film import Film
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
-from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.planar import Planar, PlanarClearance
@@ -51,12 +52,13 @@ class SceneTables(Table):
     }
 
     _known_numbers: dict[str, float] | None = PrivateAttr(None)
+    _linkage: Planar | None = PrivateAttr(None)
 
     @field_validator("format_version", mode="before")
     @classmethod
     def _version_is_a_number(cls, value: Any) -> Any:
         if isinstance(value, bool):  # equal to 1 in Python
-            raise invalid("true or false is no version", "Write format_version = 1")
+            raise invalid("true or false is not a version", "Write format_version = 1")
         return value
 
     @model_validator(mode="before")
@@ -102,11 +104,11 @@ class SceneTables(Table):
     @model_validator(mode="after")
     def _tables_fit_mechanism(self) -> Self:
         for table in ("drive", "joints"):
-            if not self.is_planar and getattr(self, table) is None:
+            if self.template is not None and getattr(self, table) is None:
                 raise invalid("is missing", "Add it", key=table, value=None)
         for entry in ("slider_load", "guide_friction"):
             value = getattr(self.effects, entry)
-            if self.is_planar and value is not None:
+            if self.template is None and value is not None:
                 raise invalid(
                     "belongs to a slider-crank",
                     "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
@@ -115,8 +117,28 @@ class SceneTables(Table):
         return self
 
     @model_validator(mode="after")
+    def _curves_repeat(self) -> Self:
+        if self.template is not None:  # a linkage has looked at its own
+            curves = {
+                "drive.torque": getattr(self.drive, "torque", None),
+                "effects.slider_load": self.effects.slider_load,
+            }
+            for key, curve in curves.items():
+                if isinstance(curve, tuple):
+                    check_period(curve, self.drive.turns, key)
+        return self
+
+    @model_validator(mode="after")
     def _effects_fit_joints(self) -> Self:
         clearance = self.clearance_joints()
+        contact = self.effects.contact
+        if contact is not None and contact.has_length:
+            for name in clearance:
+                if length_path(self.clearance_joint(name)) is None:
+                    raise invalid(
+                        f'the contact geometry "{contact.geometry}" needs the length of the bearing',
+                        'Add length = "20 mm" or so to the joint', f"{self.joint_key(name)}.length", None,
+                    )  # fmt: skip
         if clearance and self.effects.contact is None:
             raise invalid(
                 "a clearance joint needs a contact law",
@@ -127,15 +149,8 @@ class SceneTables(Table):
             )
         if not clearance and self.effects.friction.law != "none":
             raise invalid(
-                f"friction acts in joints with clearance, and {'all' if self.is_planar else 'both'} joints are ideal",
+                "friction acts in joints with clearance, but all joints are ideal",
                 'Set effects.friction.law = "none", or give a joint kind = "clearance"',
-                key="effects.friction.law",
-                value=self.effects.friction.law,
-            )
-        if self.bristles and not self.is_planar and self.numerics.formulation == "baumgarte":
-            raise invalid(
-                "the nine coordinates of Baumgarte's slider-crank have no place for bristles",
-                'Set numerics.formulation = "minimal", or write the mechanism with kind = "planar"',
                 key="effects.friction.law",
                 value=self.effects.friction.law,
             )
@@ -151,7 +166,7 @@ class SceneTables(Table):
         oiled = [name for name in self.worn_joints() if name in self.films()]
         if self.wear is not None and self.wear.waves and oiled:
             raise invalid(
-                f"joint {oiled[0]} carries oil, and a film is that of round surfaces",
+                f"joint {oiled[0]} has an oil film, which needs round surfaces",
                 'Set it to "uniform", or remove the film',
                 key="wear.profile",
                 value=self.wear.profile,
@@ -165,22 +180,27 @@ class SceneTables(Table):
         for joint in chosen:
             if joint not in clearance:
                 raise invalid(
-                    f"{joint} is no joint with clearance of this scene",
+                    f"{joint} is not a joint with clearance of this scene",
                     nearest(joint, clearance),
                     key=key,
                 )
         if len(set(chosen)) < len(chosen):
             raise invalid("a joint is named twice", "Name each once", key=key)
-        asked = MEAN_GAP.name if self.study is None else self.study.objective
-        if chosen and OBJECTIVES[asked].by_joint is None:
+        if self.study is not None and self.numerics.objective is not None:
             raise invalid(
-                f'study.objective = "{asked}" is of no joint',
+                "a study names its objective itself",
+                "Write study.objective instead",
+                "numerics.objective",
+            )
+        if chosen and not self.objective.of_joints:
+            raise invalid(
+                f'study.objective = "{self.objective.name}" is of no joint',
                 "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
                 key=key,
             )
         if chosen and self.numerics.target_error is not None:
             raise invalid(
-                "limits of a steady mean are known for the gaps of all joints only",
+                "the confidence interval of a steady mean exists for the gaps of all joints only",
                 "Leave out the joints, or numerics.target_error",
                 key=key,
             )
@@ -207,17 +227,25 @@ class SceneTables(Table):
     @property
     def objective(self) -> Objective:
         """What each sample is judged by: the study's objective, f where there is no study."""
-        return self.objective_named(MEAN_GAP.name if self.study is None else self.study.objective)
+        named = self.numerics.objective if self.study is None else self.study.objective
+        return self.objective_named(named or MEAN_GAP.name)
+
+    @property
+    def objective_key(self) -> str:
+        """The entry that names it."""
+        return "numerics.objective" if self.study is None else "study.objective"
 
     def objective_named(self, name: str) -> Objective:
         """An objective, of the joints that count here."""
-        chosen = self.numerics.objective_joints
-        places = [self.joint_labels.index(joint) for joint in chosen]
-        return of_joints(OBJECTIVES[name], places, chosen) if chosen else OBJECTIVES[name]
+        chosen, labels = self.numerics.objective_joints, self.joint_labels
+        joints, places = (
+            tuple(map(labels.index, names)) for names in (chosen, self.clearance_joints())
+        )
+        return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        return self.numerics.responses or self.objective.name.replace("-", "_") in RESPONSES
+        return self.numerics.responses or self.objective.needs_responses
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""
@@ -284,44 +312,66 @@ class SceneTables(Table):
                 found[surface] = max(found[surface], self.wear.waves)
         return found
 
+    @property
+    def template(self) -> Any:
+        """The module of the template that writes this scene's linkage, `slider_crank`; None where the scene has its tables."""
+        return None if isinstance(self.mechanism, Planar) else slider_crank
+
+    @property
+    def linkage(self) -> Planar:
+        """The mechanism by bodies, joints, drives and loads, as the scene has it or its template writes it."""
+        if isinstance(self.mechanism, Planar):
+            return self.mechanism
+        if self._linkage is None:
+            self._linkage = slider_crank.linkage_of(self)
+        return self._linkage
+
+    def path_in_linkage(self, path: str) -> str:
+        """The entry of `linkage`, below ``mechanism``, that an entry of the scene stands for; itself if it stands for none."""
+        return path if self.template is None else str(self.template.path_in_linkage(path))
+
     def clearance_joints(self) -> tuple[str, ...]:
         """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""
-        if isinstance(self.mechanism, Planar):
-            return tuple(
-                joint.name for joint in self.mechanism.joints if isinstance(joint, PlanarClearance)
-            )
         return tuple(
-            name
-            for name in ("crank_rod", "rod_slider")
-            if isinstance(getattr(self.joints, name), ClearanceJoint)
+            joint.name for joint in self.linkage.joints if isinstance(joint, PlanarClearance)
         )
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
         """Labels along the dimension ``joint`` of this scene's datasets: both of a slider-crank, whether open or not."""
-        return self.clearance_joints() if self.is_planar else ("crank_rod", "rod_slider")
+        return self.clearance_joints() if self.template is None else tuple(self.template.JOINTS)
 
     @property
-    def is_planar(self) -> bool:
-        """Whether the mechanism is given by bodies and joints, and not as a slider-crank."""
-        return isinstance(self.mechanism, Planar)
+    def open_places(self) -> tuple[int, ...]:
+        """Where joints with clearance stand among `joint_labels`, one behind the other."""
+        return tuple(self.joint_labels.index(name) for name in self.clearance_joints())
 
     def joint_key(self, label: str) -> str:
         """Dotted path of a joint's table."""
-        return f"mechanism.joints.{label}" if self.is_planar else f"joints.{label}"
+        return f"mechanism.joints.{label}" if self.template is None else f"joints.{label}"
+
+    def materials_key(self, label: str) -> str:
+        """Dotted path of the table that has the materials of a joint with clearance."""
+        return self.joint_key(label) + (".materials" if self.template is None else "")
+
+    def guide_friction_keys(self) -> tuple[str, ...]:
+        """Dotted paths of the tables of friction in guides."""
+        rubs = [one for one in self.linkage.joints if getattr(one, "friction", None) is not None]
+        if self.template is not None:
+            return ("effects.guide_friction",) * len(rubs)
+        return tuple(f"mechanism.joints.{one.name}.friction" for one in rubs)
 
     def clearance_joint(self, label: str) -> ClearanceJoint | PlanarClearance:
         """The table of a joint with clearance."""
-        if isinstance(self.mechanism, Planar):
-            found = next(joint for joint in self.mechanism.joints if joint.name == label)
-        else:
-            found = getattr(self.joints, label)
+        rows = self.linkage.joints if self.template is None else ()
+        found = next((joint for joint in rows if joint.name == label), None)
+        found = getattr(self.joints, label) if found is None else found
         assert isinstance(found, (ClearanceJoint, PlanarClearance))
         return found
 
     @property
     def slider_crank(self) -> Mechanism:
-        """The mechanism of a scene that has a slider-crank."""
+        """The tables of a scene that has a slider-crank."""
         assert isinstance(self.mechanism, Mechanism)
         return self.mechanism
 

@@ -116,6 +116,10 @@ def _range(value: Any, quantity: Quantity, key: str) -> Range:
     if not lower < upper:
         reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
         raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
+    if quantity.nonzero and lower < 0.0 < upper:
+        raise invalid(
+            "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key=key
+        )
     return lower, upper
 
 
@@ -217,22 +221,23 @@ class RandomInput(NamedInput):
     (`about_design = false`)."""
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {
-        "file": ("files are read where a scene is loaded, and this came another way",
+        "file": ("files are read only where a scene is loaded from a file",
                  "Give values = [...]"),
-        "column": ("says which column of a file is meant, and there is none", "Add file = ..."),
+        "column": ("names a column, but there is no file", "Add file = ..."),
     }  # fmt: skip
 
     distribution: str
-    """Its law; "samples" are measured values, "wear" takes the clearances of the lives of `[wear]`. Besides those of this list
-    any continuous one of scipy.stats, "scipy:weibull_min" say, that of an installed package, or "module:Name" of a file."""
+    """The distribution. "samples" are measured values; "wear" uses the clearances of the service lives of `[wear]`. Further
+    ones: any continuous one of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name" of a
+    file."""
     range: Range | None = None
-    """Bounds of a "uniform" or "beta" distribution; where others are cut off. SI."""
+    """Bounds of a "uniform" or "beta" distribution; truncation of others. SI."""
     mean: float | None = None
-    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; left out, the distribution lies about the value of the
-    design. Of "lognormal" its mean, before it is cut off."""
+    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the
+    design. Of "lognormal" its mean, before truncation."""
     half_width: float | None = None
     """Of "uniform", "truncated-normal" and "beta", SI, or a share such as "3 %" of the number it is about, where the study
-    does not vary that; of "wear", how far new clearances lie about the scene's, uniform."""
+    does not vary that; of "wear", that of the uniform distribution of new clearances about the scene's."""
     deviation: float | None = None
     """Standard deviation of "normal", and of "truncated-normal" and "lognormal" before they are cut, SI."""
     shapes: tuple[float, float] | None = None
@@ -249,9 +254,9 @@ class RandomInput(NamedInput):
     fit: str | None = None
     """Of "fit", the clearance of a bore and a pin that are made apart: a fit by ISO 286; left out, that of the joint."""
     bore: Tolerance | None = None
-    """Of "fit": how the bore is made; left out, normal within the limits of the fit, with cp = 1."""
+    """Of "fit": how the bore is made; left out, normal within the limits of size of the fit, with cp = 1."""
     pin: Tolerance | None = None
-    """Of "fit": how the pin is made; left out, normal within the limits of the fit, with cp = 1."""
+    """Of "fit": how the pin is made; left out, normal within the limits of size of the fit, with cp = 1."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
     """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
     parameters: dict[str, float] | None = None
@@ -306,12 +311,24 @@ class RandomInput(NamedInput):
 
     def _check_cut(self) -> None:
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
-            raise invalid("a lognormal has a mean above 0", "Mend it, or use another", "mean")
+            raise invalid(
+                "a lognormal has a mean above 0", "Correct it, or use another distribution", "mean"
+            )
         if self.distribution == "fit" and any(not p.endswith(".clearance") for p in self.paths):
-            raise invalid("a fit gives clearances of joints only", "Mend its path", "distribution")
+            raise invalid(
+                "a fit gives clearances of joints only", "Correct its path", "distribution"
+            )
         if self.worn:
             return
         law = self.law  # of a plug-in found now, while it is known where its file is
+        if isinstance(law, quantiles.Uniform | quantiles.Normal):
+            low, high = law.span
+            cut = isinstance(law, quantiles.Normal) and law.reach < _LEAST_SHARE * law.deviation
+            if cut or not low < high:
+                reason = "is too narrow for numbers of 16 digits, or holds next to nothing of the distribution"
+                raise invalid(
+                    reason, "Widen it", "range" if self.range is not None else "half_width"
+                )
         if (
             isinstance(law, quantiles.Cut)
             and self.range is not None
@@ -320,8 +337,8 @@ class RandomInput(NamedInput):
             below, above = law.chances
             if above - below < _LEAST_SHARE:
                 raise invalid(
-                    f"holds less than {_LEAST_SHARE:g} of the distribution",
-                    "Choose limits where its values are",
+                    f"contains less than {_LEAST_SHARE:g} of the distribution",
+                    "Choose bounds around its values",
                     "range",
                 )
 
@@ -334,7 +351,7 @@ class RandomInput(NamedInput):
 
     @property
     def worn(self) -> bool:
-        """Whether lives of worn joints have to be followed before its values are known."""
+        """Whether its values are known only after a wear simulation."""
         return self.distribution == "wear"
 
     @cached_property
@@ -344,7 +361,7 @@ class RandomInput(NamedInput):
         Raises
         ------
         InputError
-            Only lives of worn joints can tell.
+            Only a wear simulation gives its values.
         """
         form = form_of(self.distribution, self.parameters or {})
         return form.law(self.model_dump(exclude_none=True))

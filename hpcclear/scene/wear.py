@@ -25,7 +25,7 @@ class WornSurface(Table):
         )  # fmt: skip
         if (self.dimensionless is None) != (self.hardness is None):
             raise invalid(
-                "a dimensionless coefficient goes with a hardness, a coefficient in m2/N without",
+                "a dimensionless coefficient needs a hardness; a coefficient in m2/N must have none",
                 "Give both, or neither",
                 key="hardness",
                 value=self.hardness,
@@ -34,12 +34,12 @@ class WornSurface(Table):
 
 
 class RunningIn(Table):
-    """How much faster a joint wears while it is new."""
+    """Faster wear of a new joint."""
 
     factor: Annotated[float, Quantity("", least=1)]
-    """Of both coefficients at first."""
+    """Initial factor on both wear coefficients."""
     work: Annotated[float, Quantity("J", above=0)]
-    """Sliding work of the joint in which what is too much of it falls to 1/e, J."""
+    """Sliding work after which the excess wear rate has decayed to 1/e, J."""
 
 
 class Wear(Table):
@@ -82,41 +82,41 @@ class Limits(Table):
 
 
 class Lives(Table):
-    """What `hpcclear wear` follows: lives of so many revolutions, each with its own random inputs."""
+    """Service lives for `hpcclear wear`, each with its own random inputs."""
 
     cycles: Annotated[float, Quantity("", above=0)] = 1e6
-    """Revolutions of a life."""
+    """Revolutions of a service life."""
     lives: Annotated[int, Count(1, 10**6)] = 1
-    """Each with values of its own of all random inputs of the study; a single one is the scene as it stands."""
+    """Number of service lives, each with its own random inputs; a single one uses the values of the scene."""
     tolerance: Annotated[float, Quantity("", above=0, most=0.2)] = 0.01
-    """Of a jump in each clearance and in f, relative."""
+    """Relative error of an extrapolation jump, in each clearance and in f."""
     copies: Annotated[int, Count(2, 1024)] = 4
-    """Simulations at a state of wear, kicked by 1e-9 of the clearance: where motion is chaotic they part."""
+    """Replicas at a state of wear, perturbed by 1e-9 of the clearance; they diverge if the motion is chaotic."""
     most_copies: Annotated[int, Count(2, 1024)] = 32
-    """Where the limits of rate and f are wider than the tolerance allows."""
+    """Largest number of replicas, if the confidence intervals of wear rate and f exceed the tolerance."""
     profile: Literal["uniform", "angular"] = "uniform"
-    """Where surfaces wear: evenly, or where they touch."""
+    """Wear around the surfaces: uniform, or where they touch."""
     harmonics: Annotated[int, Count(1, 8)] = 3
-    """Waves around a surface that an angular profile is made of; the more, the narrower what a contact wears at a time."""
+    """Fourier components of an angular profile; more components resolve narrower grooves."""
     bins: Annotated[int, Count(4, 3600)] = 72
-    """Angles that an angular profile is told at."""
+    """Angles at which an angular profile is stored."""
     points: Annotated[int, Count(2, 10**4)] = 41
-    """Revolutions that curves are told at."""
+    """Number of ages at which curves are stored."""
     limit: Limits = Limits()
-    """Values that end a life."""
+    """Values that end a service life."""
     beyond_limit: bool = False
-    """Whether lives go on past their limits to `cycles`, or until a clearance is a quarter of its bearing's radius."""
+    """Whether service lives continue beyond their limit, to `cycles` or to a clearance of a quarter of the bearing radius."""
 
     @property
     def waves(self) -> int:
-        """Waves around a surface that wears; 0 of one that wears evenly."""
+        """Fourier components of the wear profile; 0 for uniform wear."""
         return self.harmonics if self.profile == "angular" else 0
 
     @model_validator(mode="after")
     def _copies_in_order(self) -> "Lives":
         if self.most_copies < self.copies:
             raise invalid(
-                "there are more copies at first than at most",
+                "copies is larger than most_copies",
                 "Raise most_copies, or lower copies",
                 "most_copies",
                 self.most_copies,

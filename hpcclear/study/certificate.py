@@ -1,6 +1,7 @@
 """The certificate of effects as a stage of a study: which effects it could do without."""
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,12 +13,20 @@ from hpcclear.report.figures.effects import statements
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import Result, StudyRun
 
+Extent = Callable[[Scene, int | None], tuple[int, float]]
+"""Samples of each variant at most, and of the whole scene that all come to, of a scene and a number that is asked for."""
 
-def certify(run: StudyRun) -> None:
+
+def certify(run: StudyRun, extent: Extent) -> None:
     """Simulate with effects on and off, each design of it kept by itself; write effects.nc and tell what can be left out.
+
+    Parameters
+    ----------
+    run : StudyRun
+    extent : Extent
+        As `hpcclear.study.extent.certificate_extent`.
 
     Raises
     ------
@@ -27,7 +36,6 @@ def certify(run: StudyRun) -> None:
     asked = run.study.certificate
     assert asked is not None
     trial = Trial(run.scene)
-    samples, budget = certificate_extent(run.scene, asked.samples)
     count = 0
 
     def simulate(scene: Scene, points: Points) -> Records:
@@ -38,7 +46,7 @@ def certify(run: StudyRun) -> None:
 
     run.announce("effects")
     with run.ranks.stage("effects"):
-        plan = trial.plan(Wanted(asked.tolerance, samples, budget, asked.forces))
+        plan = trial.plan(Wanted(asked.tolerance, *extent(run.scene, asked.samples), asked.forces))
         found = trial.certify(plan, simulate)
     content = effects_dataset(trial, found, {})
     run.write(content, "effects.nc")

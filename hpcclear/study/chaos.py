@@ -1,8 +1,7 @@
-"""How much of a verified design's scatter is chaos: the same samples once more, a hair beside.
+"""How much of a verified design's scatter is chaos: the same samples once more, with a relative perturbation of 1e-9.
 
-Where motion is chaotic, or settles on an orbit that the smallest kick decides, a finite average of it is a random number
-whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `KICK` tell how much.
-"""
+Where motion is chaotic, or settles on an orbit that the smallest perturbation decides, a finite average of it is a random
+number whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `KICK` tell how much."""
 
 from collections.abc import Sequence
 
@@ -25,7 +24,8 @@ SAME = 1e-4
 
 
 def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
-    """Deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where all failed.
+    """Standard deviation of pairs, its share of the variance, share of chaotic samples: arrays over the designs, NaN where
+    all failed.
 
     Raises
     ------
@@ -49,7 +49,8 @@ def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
 
 
 def split(pairs: np.ndarray) -> tuple[float, float, float]:
-    """Deviation within pairs, its share of the variance, share of pairs that differ, from values (n, 2), NaN where failed."""
+    """Standard deviation within pairs, its share of the variance, share of pairs that differ, from values (n, 2), NaN where
+    failed."""
     good = pairs[np.isfinite(pairs).all(axis=1)]
     if len(good) < 4:
         return np.nan, np.nan, np.nan

@@ -5,20 +5,7 @@ import math
 from hpcclear.ensemble import effects
 from hpcclear.scene import Scene
 from hpcclear.scene.switches import switches
-from hpcclear.study import (
-    chaos,
-    lives,
-    optimisation,
-    refinement,
-    responses,
-    sensitivities,
-    surrogates,
-    tolerance,
-    truth,
-)
-from hpcclear.study.goals import ends_in_all
-from hpcclear.study.paper import readings
-from hpcclear.study.paper.printed import printed_designs
+from hpcclear.study.stages import STAGES
 
 
 def samples_of(scene: Scene) -> dict[str, int]:
@@ -42,25 +29,7 @@ def samples_of(scene: Scene) -> dict[str, int]:
 
 def _of_stages(scene: Scene) -> dict[str, int]:
     """The same of all stages but the certificate, whose size goes by theirs."""
-    study = scene.required_study
-    extremes, spread = optimisation.chosen_in_all(study)
-    verified = spread + len(study.cases) + len(printed_designs(scene))  # the original, in each case
-    count = truth.expected(study)
-    if study.verification.infill_rounds:
-        verified += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
-    begun, rounds = refinement.simulations(study)
-    return {
-        "wear": lives.simulations(scene),
-        "sensitivity": sensitivities.simulations(study),
-        "kriging": surrogates.simulations(study),
-        "check": begun,
-        "infill": rounds,
-        "verification": (extremes + verified) * count,
-        "pairs": tolerance.simulations(study),
-        "lives": lives.simulations_of_designs(scene),
-        "chaos": (extremes + verified) * 2 * chaos.PAIRS,
-        "readings": readings.simulations(scene)[0],
-    }
+    return {part: count for stage in STAGES for part, count in stage.samples(scene).items()}
 
 
 def responses_of(scene: Scene) -> int:
@@ -71,7 +40,7 @@ def responses_of(scene: Scene) -> int:
     InputError
         If the scene has no study.
     """
-    return responses.simulations(scene.required_study) + readings.simulations(scene)[1]
+    return sum(stage.responses(scene) for stage in STAGES)
 
 
 CERTIFICATE_SHARE = 0.05

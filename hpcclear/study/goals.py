@@ -12,11 +12,15 @@ from hpcclear.scene.formula import value_of
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random import replicates
+from hpcclear.statistics.random import replicates, tail
 from hpcclear.statistics.random.replicates import Estimate, student
 
 SMOOTH = 0.1
 """Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
+
+
+SHARE_OF_MOST = 0.02
+"""Half-width of a probability, over the largest that is allowed, at which it is known well enough though not decided."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,8 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     if goal.statistic == "quantile":
         return accuracy.quantile or accuracy.deviation, True
     if goal.statistic == "exceedance":
-        return accuracy.exceedance or 0.01, False
+        usual = SHARE_OF_MOST * goal.most if isinstance(goal, Constraint) else 0.01
+        return accuracy.exceedance or usual, False
     return 1e-6, True
 
 
@@ -79,6 +84,27 @@ def excess(kept: Sequence[Constraint], values: Array) -> Array:
         return np.full(len(values), -np.inf)
     most = np.array([one.most for one in kept])
     return np.asarray(((values - most) / np.where(most != 0.0, abs(most), 1.0)).max(axis=1))
+
+
+def shortfall(goal: Goal, most: float, values: Array) -> Array:
+    """By how much reliability indices of probabilities of failure fall short of what a constraint needs, f (n, s) to (n,)."""
+    assert goal.limit is not None  # by validation
+    return np.asarray(tail.of_share(most) - tail.index(values, goal.limit))
+
+
+def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, float]) -> float:
+    """What steers a search to the constraints, from values of f of a design, NaN where failed: as `excess`, but of
+    probabilities the shortfall of their index, which is smooth where counts of exceedances are 0 or jump."""
+    known = values[np.isfinite(values)]
+    if kept and len(known) < replicates.FEWEST:
+        return np.nan
+    found = [
+        float(shortfall(one, one.most, known[None])[0])
+        if one.statistic == "exceedance"
+        else float(excess([one], np.array([[told(one, values, design, 0.95).value]]))[0])
+        for one in kept
+    ]
+    return max(found, default=-np.inf)
 
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:

@@ -12,7 +12,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.lives import doubts
-from hpcclear.ensemble.session import Options, Session
+from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.wear import check_worn, run_wear
 from hpcclear.scene import Scene
 from hpcclear.scene.variables import RandomInput
@@ -44,11 +44,6 @@ def check(scene: Scene) -> None:
     """Refuse a study that takes clearances from lives that cannot be followed; raises InputError."""
     if scene.study is not None and scene.study.worn:
         check_worn(scene)
-
-
-def files(scene: Scene) -> list[str]:
-    """Names of the results of this stage."""
-    return [NAME] if scene.required_study.worn else []
 
 
 def simulations(scene: Scene) -> int:
@@ -116,8 +111,8 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     return tuple(told)
 
 
-def known(scene: Scene, session: Session) -> Scene:
-    """The scene with clearances of its lives in the place of inputs that wear; lives followed earlier are taken as they are.
+def known(run: StudyRun) -> Scene:
+    """A run's scene with clearances of its lives in place of inputs that wear; lives followed earlier are taken as they are.
 
     Raises
     ------
@@ -125,23 +120,19 @@ def known(scene: Scene, session: Session) -> Scene:
         Too few lives reach the age asked for, or their clearances leave the variable's range.
     Stopped, StorageError, RankFailed
     """
-    study = scene.required_study
-    if not study.worn:
-        return scene
-    style = session.options.style
-    lives = run_wear(
-        scene, session.place.output / NAME, session.ranks, Options(style=style)
-    ).content  # fmt: skip
+    run.announce("wear")
+    scene, options = run.scene, Options(style=run.simulations.style)
+    lives = run_wear(scene, run.directory / NAME, run.ranks, options).content
     for text in doubts(lives):
-        session.tell(f"Lives: {text}.")
+        run.tell(f"Lives: {text}.")
     changes = {}
-    for row in study.worn:
+    for row in run.study.worn:
         joints = [path.split(".")[-2] for path in row.paths]
         clearance = lives["clearance"].sel(cycle=row.cycles, joint=joints).to_numpy()
         values = _values(scene, row, clearance, lives["ending"].to_numpy())
         left = int(np.isnan(clearance).any(axis=1).sum())
         if left:
-            session.tell(
+            run.tell(
                 f"{row.name}: {left} of {len(clearance)} lives failed or were over before {row.cycles:g} revolutions and "
                 "are left out of its distribution; the others are the better ones."
             )  # fmt: skip
@@ -156,17 +147,17 @@ def _values(scene: Scene, row: RandomInput, clearance: Array, endings: Array) ->
     key = f"study.random.{row.name}"
     if len(found) < LEAST:
         codes, counts = np.unique(endings[endings != Status.OK], return_counts=True)
-        why = Status(int(codes[counts.argmax()])).message if len(codes) else "there are so few"
+        why = Status(int(codes[counts.argmax()])).message if len(codes) else "there are too few"
         raise InputError(
-            f"{key}.cycles", row.cycles, f"{len(found)} clearances of lives are known there: {why}",
-            f"Follow more lives, ask for fewer cycles, or set wear.beyond_limit = true; {NAME} has what became of them",
+            f"{key}.cycles", row.cycles, f"{len(found)} service lives have a clearance at that age: {why}",
+            f"Simulate more service lives, request fewer cycles, or set wear.beyond_limit = true; see {NAME}",
         )  # fmt: skip
     lower, upper = scene.required_study.variable(row.name).bounds
     if found.min() < lower or found.max() > upper:
         raise InputError(
             f"study.variables.{row.name}.range", (lower, upper),
-            f"lives have clearances from {found.min():.6g} to {found.max():.6g} m after {row.cycles:g} revolutions",
-            "Widen it to hold them",
+            f"service lives have clearances from {found.min():.6g} to {found.max():.6g} m after {row.cycles:g} revolutions",
+            "Widen it to contain them",
         )  # fmt: skip
     if len(found) > MOST:  # evenly by rank
         found = np.sort(found)[np.linspace(0, len(found) - 1, MOST).round().astype(int)]

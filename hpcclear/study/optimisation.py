@@ -14,19 +14,10 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
 from hpcclear.plugins import SEARCHES
 from hpcclear.scene import Scene
-from hpcclear.scene import variables as scene_variables
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.distributions import (
-    Distribution,
-    Normal,
-    Samples,
-    Tabled,
-    TruncatedNormal,
-    Uniform,
-)
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import foreign
@@ -34,7 +25,7 @@ from hpcclear.statistics.search.asking import Search, Task, made, minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study.goals import ends_in_all, excess, guessed
+from hpcclear.study.goals import ends_in_all, excess, guessed, shortfall
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate, method_of
 
@@ -85,12 +76,16 @@ class Problem:
             return self.objective(designs)
         drawn = self.objective.sampled(designs, self.draws)
         named = dict(zip(self.names, designs.T, strict=True))
-        asked = (*self.case.goals, *self.case.kept)
-        found = np.column_stack([guessed(goal, drawn, named) for goal in asked])
+        found = np.column_stack([guessed(goal, drawn, named) for goal in self.case.goals])
         if not self.case.kept:
             return found
-        count = len(self.case.goals)
-        return found[:, :count], np.maximum(excess(self.case.kept, found[:, count:]), 0.0)
+        broken = [
+            shortfall(one, one.most, drawn)
+            if one.statistic == "exceedance"
+            else excess([one], guessed(one, drawn, named)[:, None])
+            for one in self.case.kept
+        ]
+        return found, np.maximum(np.max(broken, axis=0), 0.0)
 
     def moments(self, designs: Array) -> Array:
         """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
@@ -125,10 +120,11 @@ def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
     unit = unit_lhs(PROBES, len(names), rng)
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(names))))
     probes = region.lower + np.concatenate([unit, corners]) * (region.upper - region.lower)
-    inputs = [_random_input(study.random_input(name)) for name in random]
+    rows = [study.random_input(name) for name in random]
+    inputs = [RandomVariable(row.name, row.law, about_design=not row.absolute) for row in rows]
     askew = len(model.leaves) > 1 and (
         any(set(one.of) & set(random) for one in derived)
-        or any(isinstance(one.distribution, Tabled) for one in inputs)
+        or any(isinstance(row.law, quantiles.Cut) for row in rows)
     )
     draws: Draws = None
     joint = None
@@ -156,30 +152,13 @@ def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
 
     try:
         objective = averaged(draws)
-    except InputError:  # no rule has nodes enough for a model as short of breath as its noise
+    except InputError:  # length scales too short for a quadrature rule
         if draws is not None:
             raise
         objective = averaged((study.swarm.monte_carlo_samples, rng))
     rng = generator(study.seed, "goals", case)
     points = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
     return Problem(names, region, objective, scene, study.case(case), points)
-
-
-def _random_input(row: scene_variables.RandomInput) -> RandomVariable:
-    law = row.law
-    low, high = law.span
-    distribution: Distribution
-    if isinstance(law, quantiles.Uniform):
-        distribution = Uniform(low, high)
-    elif isinstance(law, quantiles.Normal):
-        distribution = Normal(law.middle, law.deviation)
-        if law.reach < np.inf:
-            distribution = TruncatedNormal(law.middle, law.deviation, low, high)
-    elif isinstance(law, quantiles.Samples):
-        distribution = Samples(law.values)
-    else:
-        distribution = Tabled(law)
-    return RandomVariable(row.name, distribution, about_design=not row.absolute)
 
 
 def _ratio(scene: Scene, inertia: str) -> Derived:

@@ -15,15 +15,14 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import SCRAMBLINGS
 from hpcclear.scene.study import Study
 from hpcclear.statistics.search.infill import believed_ends, eligible, proposals
 from hpcclear.statistics.search.pareto import cut
-from hpcclear.study import truth
-from hpcclear.study.goals import excess, most_of, wanted
+from hpcclear.study import edge, truth
+from hpcclear.study.goals import most_of, wanted
 from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
 
@@ -47,7 +46,7 @@ class Tried:
     values : array, shape (n, goals)
         What its case makes small: mean and deviation, if nothing else is asked for.
     excess : array, shape (n,)
-        By how much its constraints are broken (`hpcclear.study.goals.excess`).
+        By how much its constraints are broken (`hpcclear.study.goals.steered`).
     """
 
     names: tuple[str, ...]
@@ -112,9 +111,12 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
         if not _stands(run, name, its) and (won := _won(run, name, its[-2:]))
     ]
     named = [choice for choice in start if choice.name]
-    return [
-        one for name, its in met.items() for one in _finalists(run, name, its[-1], named)
-    ], remarks
+    finalists = [one for name, its in met.items() for one in _finalists(run, name, its[-1], named)]
+    if edge.cases_of(run.study):
+        last = {name: its[-1] for name, its in met.items()}
+        known = {name: (one.coordinates, one.values, one.excess) for name, one in last.items()}
+        finalists += edge.choices_of(run, run.stage("edge", edge.approach, known))
+    return finalists, remarks
 
 
 def _stands(run: StudyRun, name: str, met: Sequence[Tried]) -> bool:
@@ -189,19 +191,8 @@ def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
         "case": np.array([choice.case for choice in choices]),
         "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),
         "values": found["goal"][:, :most],
-        "excess": np.array(
-            [
-                _broken(run.study.case(c.case), row)
-                for c, row in zip(choices, found["goal"], strict=True)
-            ]
-        ),
+        "excess": found["excess"],
     }
-
-
-def _broken(case: Case, goals: Array) -> float:
-    """By how much a design breaks the constraints of its case, which stand behind what it makes small."""
-    first = len(case.goals)
-    return float(excess(case.kept, goals[None, first : first + len(case.kept)])[0])
 
 
 def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tried:

@@ -13,7 +13,7 @@ from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
 from hpcclear.results.dataset import provenance, variable_name
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import Planar, turns_of
+from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
 from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
@@ -50,6 +50,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
     changes: dict[str, object] = {
         "numerics.averaged_revolutions": revolutions,
         "numerics.responses": run.scene.responses_asked(),
+        "numerics.objective": run.scene.objective.name,
     }
     for name, value in choice.design.items():
         changes |= dict.fromkeys(run.study.variable(name).paths, value)
@@ -93,7 +94,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):
-            response = simulate(scene, run.scene.objective)
+            response = simulate(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
             run.tell(
@@ -108,10 +109,11 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
 
 
 def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
-    """The response after its transient."""
-    turns = turns_of(scene.mechanism) if isinstance(scene.mechanism, Planar) else 1
+    """The response after its transient, all of which is averaged."""
+    turns = turns_of(scene.linkage)
     begin = 2.0 * np.pi * turns * scene.numerics.transient_revolutions
-    return response.isel(time=np.flatnonzero(phase(response) >= begin - 1e-9))
+    kept = response.isel(time=np.flatnonzero(phase(response) >= begin - 1e-9))
+    return kept.assign_attrs(transient_turns=0)
 
 
 def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:

@@ -109,3 +109,21 @@ class StudyRun:
         content.attrs.update(self.checkpoint.attributes | dict(attributes or {}))
         with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, self.directory / name)
+
+    def write_samples(self) -> None:
+        """Write samples.nc: all simulations so far, the points that surfaces and models are made of."""
+        with self.ranks.writing():
+            self.checkpoint.flush()
+        records, values = self.checkpoint.contents()
+        before = records["sample"] < self.simulations.next
+        units = {variable.name: variable.unit for variable in self.study.variables}
+        content = dataset.samples_dataset(
+            self.study.names,
+            values[before],
+            units,
+            records[before],
+            objective=self.scene.objective,
+            words=self.words,
+            joints=self.scene.joint_labels,
+        )
+        self.write(content, "samples.nc")

@@ -22,6 +22,10 @@ from hpcclear.statistics.surrogate.surface_search import (
 from hpcclear.study.run import Result, StudyRun
 
 STAGE = "sensitivity"
+NEARBY = 1e-4
+"""Parts of their ranges that variables are moved by to see chaos: no input makes a difference by so little, and perturbations
+so large have grown within the transient."""
+
 _NORMAL_95 = 1.959963984540054
 
 
@@ -46,7 +50,8 @@ def simulations(study: Study) -> int:
     if not study.groups:
         return 0
     each = sum(one.steps * (one.n_points + one.n_test) for one in _layouts(study))
-    return study.sensitivity.levels * each + _sobol_rows(study) * (len(study.names) + 2)
+    sobol = _sobol_rows(study) * (len(study.names) + 2) + _beside(study)
+    return study.sensitivity.levels * each + sobol
 
 
 def parameter(run: StudyRun) -> str:
@@ -311,11 +316,24 @@ def _sobol_points(run: StudyRun) -> Array:
     rows = _sobol_rows(run.study)
     if rows == 0:
         return np.empty((0, len(run.study.names)))
-    return sensitivity.sobol_design(_bounds(run, run.study.names), rows, run.rng("sobol"))
+    bounds = _bounds(run, run.study.names)
+    points = sensitivity.sobol_design(bounds, rows, run.rng("sobol"))
+    near = points[: _beside(run.study)]
+    steps = (
+        NEARBY
+        * (bounds[:, 1] - bounds[:, 0])
+        * run.rng("sobol noise").uniform(-1.0, 1.0, near.shape)
+    )
+    return np.concatenate([points, np.clip(near + steps, *bounds.T)])
+
+
+def _beside(study: Study) -> int:
+    """How many of the first points are simulated again right beside, for the share of chaos."""
+    return max(_sobol_rows(study) // 4, min(_sobol_rows(study), 16))
 
 
 def _sobol_rows(study: Study) -> int:
-    """Rows of each of the two samples; none where fewer than two were asked for."""
+    """Rows of each of the two samples; none where fewer than two were requested."""
     rows = study.sensitivity.sobol_samples
     return rows if rows >= 2 else 0
 
@@ -326,11 +344,18 @@ def _global(run: StudyRun, values: Array | None) -> Result:
     if values is None:
         nothing = np.full(count, np.nan)
         names = ("sobol_first", "sobol_total", "sobol_first_error", "sobol_total_error")
-        return dict.fromkeys(names, nothing)
+        unknown = {"sobol_noise": np.array(np.nan), "sobol_noise_error": np.array(np.nan)}
+        return dict.fromkeys(names, nothing) | unknown
+    beside = _beside(run.study)
+    values, near = values[:-beside], values[-beside:]
     found = sensitivity.analyse_sobol(values, count, run.rng("sobol bootstrap"))
+    noise, error = sensitivity.noise_share(values[:beside], near, found.variance)
+    total_error = np.ptp(found.total_limits, axis=1) / (2 * _NORMAL_95)
     return {
         "sobol_first": found.first,
-        "sobol_total": found.total,
+        "sobol_total": found.total - np.nan_to_num(noise),
         "sobol_first_error": np.ptp(found.first_limits, axis=1) / (2 * _NORMAL_95),
-        "sobol_total_error": np.ptp(found.total_limits, axis=1) / (2 * _NORMAL_95),
+        "sobol_total_error": np.hypot(total_error, np.nan_to_num(error)),
+        "sobol_noise": np.array(noise),
+        "sobol_noise_error": np.array(error),
     }

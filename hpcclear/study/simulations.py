@@ -84,7 +84,7 @@ class Simulations:
                 raise InputError(
                     f"study.variables.{variable.name}",
                     sorted(numbers),
-                    "a model leaves it out, and what it drives differs in the scene",
+                    "a model leaves it out, but the entries that it drives differ in the scene",
                     "Make these entries equal, or give each a variable of its own",
                 )
             columns.append(np.full(len(values), numbers.pop()))

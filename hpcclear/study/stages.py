@@ -1,55 +1,319 @@
-"""Which stage of how many a study is at, for those who wait."""
+"""The stages of a study in their order: what each needs, does, writes and simulates.
+
+Resuming, announcements, plans and the files of a finished study all go by this one list.
+"""
 
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
-from hpcclear.study import paper
+from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study import (
+    certificate,
+    chaos,
+    contributions,
+    edge,
+    fronts,
+    lives,
+    optimisation,
+    rare,
+    refinement,
+    responses,
+    sensitivities,
+    surrogates,
+    tolerance,
+    truth,
+    verdicts,
+    verification,
+)
+from hpcclear.study.certificate import Extent
+from hpcclear.study.goals import ends_in_all
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.paper import claims, readings
+from hpcclear.study.paper.printed import printed_designs, printed_moments
+from hpcclear.study.paper.recognition import is_the_papers
+from hpcclear.study.run import Result, StudyRun
 
-_WORDS = {
-    "wear": "wear over the service life",
-    "effects": "effect screening",
-    "sensitivity": "sensitivity analysis",
-    "kriging": "surrogate models",
-    "optimisation": "search on the surrogate",
-    "check": "simulation of its designs",
-    "infill": "adaptive refinement of the Pareto front",
-    "verification": "verification of the best designs",
-    "lives": "wear of the baseline and the best designs",
-    "responses": "responses of the baseline and the best designs",
-    "readings": "published designs under alternative interpretations",
-}
-"""What each stage does, by its name without the number of a round."""
 
-_SEARCH = ("optimisation", "check", "infill")
-"""Stages that look for the front, the last one as often as it takes: one of those that are counted."""
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a study."""
+
+    name: str
+    run: Callable[..., Any]
+    """Does it, from the run and the results of `needs`; what it returns is its result."""
+    needs: tuple[str, ...] = ()
+    """Stages, all of them earlier, whose results it takes: None of one that does not apply. Beside them
+    there are "scene", as it was written, and "extent", which counts what the certificate of effects may take."""
+    applies: Callable[[Scene], bool] = lambda scene: True
+    """Whether a study of this scene has it."""
+    words: Mapping[str, str] = field(default_factory=dict)
+    """What to announce of it, by the names of its parts (without the number of a round); nothing: it is not counted."""
+    files: tuple[str, ...] = ()
+    """Results without which it is not finished."""
+    samples: Callable[[Scene], Mapping[str, int]] = lambda scene: {}
+    """Samples on the ranks, by parts; 0 where it does not apply."""
+    responses: Callable[[Scene], int] = lambda scene: 0
+    """Single responses, which root simulates alone."""
 
 
-class Stages:
+class Models(NamedTuple):
+    """Surrogates as they are kept, and the one that is searched."""
+
+    kept: Result
+    searched: Piecewise
+
+
+class Found(NamedTuple):
+    """What a search ends with: designs to be verified, and remarks on how they were found."""
+
+    designs: list[Choice]
+    remarks: list[str]
+
+
+class Verified(NamedTuple):
+    """All designs that were simulated, those that are named among them, their moments, and remarks."""
+
+    designs: list[Choice]
+    table: verification.Table
+    true: Result
+    remarks: list[str]
+
+
+def _sensitivity(run: StudyRun) -> Result:
+    result = run.stage("sensitivity", sensitivities.analyse)
+    sensitivities.write(run, result)
+    return result
+
+
+def _surrogates(run: StudyRun) -> Models:
+    kept = run.stage("kriging", surrogates.fit_all)
+    run.write_samples()
+    models = surrogates.models_of(run.scene, kept)
+    surrogates.write(run, kept, models)
+    return Models(kept, models[-1])
+
+
+def _search(run: StudyRun, models: Models) -> Found:
+    """Fronts by the model, and what simulations of their designs and of others make of them."""
+    found = run.stage("optimisation", optimisation.optimise, models.searched)
+    ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
+    fronts.write(run, found, [*ends, *between], models.searched)
+    better, remarks = refinement.search(run, [*ends, *between])
+    designs = [*ends, *(better or between)]
+    return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
+
+
+def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
+    true = run.stage("verification", _moments, found.designs)
+    table = verification.named(run, found.designs, true)
+    true = {name: values[table.rows] for name, values in true.items()}
+    remarks = list(found.remarks)
+    if run.study.paired:
+        text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
+        run.tell(text)
+        remarks += more
+    remarks += verification.missed(run, table.choices, true, models.searched)
+    for text in remarks:
+        run.tell(text)
+    return Verified(found.designs, table, true, remarks)
+
+
+def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
+    """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
+    if run.study.paired:
+        true = tolerance.verified(run, designs)
+    else:
+        true = truth.simulate(run, designs, "verification")
+    return rare.decided(run, designs, true, "verification")
+
+
+def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
+    table, true = verified.table, verified.true
+    printed = printed_moments(run.scene, table.choices)
+    verification.write(
+        run, table, true, models.searched, verified.remarks, printed, over_life or {}
+    )
+
+
+def _chaos(run: StudyRun, verified: Verified) -> None:
+    scatter = run.stage("chaos", chaos.simulate, verified.designs)
+    rows = verified.table.rows
+    chaos.write(run, verified.table.choices, {name: one[rows] for name, one in scatter.items()})
+
+
+def _responses(run: StudyRun, verified: Verified) -> Result:
+    series = run.stage("responses", responses.simulate_all, verified.table.choices)
+    responses.write(run, verified.table.choices)
+    return series
+
+
+def _claims(run: StudyRun, sensitivity: Result | None, models: Models, series: Result) -> None:
+    claims.write(run, claims.judge(run, sensitivity, models.kept, series))
+
+
+def _of_wear(scene: Scene) -> dict[str, int]:
+    return {"wear": lives.simulations(scene)}
+
+
+def _of_sensitivity(scene: Scene) -> dict[str, int]:
+    return {"sensitivity": sensitivities.simulations(scene.required_study)}
+
+
+def _of_surrogates(scene: Scene) -> dict[str, int]:
+    return {"kriging": surrogates.simulations(scene.required_study)}
+
+
+def _of_search(scene: Scene) -> dict[str, int]:
+    begun, rounds = refinement.simulations(scene.required_study)
+    return {"check": begun, "infill": rounds, "edge": edge.simulations(scene.required_study)}
+
+
+def _designs(scene: Scene) -> int:
+    """How many are verified at most."""
+    study = scene.required_study
+    found = sum(optimisation.chosen_in_all(study))
+    if study.verification.infill_rounds:
+        found += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
+    return found + len(study.cases) + len(printed_designs(scene))  # the original, in each case
+
+
+def _of_verification(scene: Scene) -> dict[str, int]:
+    study = scene.required_study
+    failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
+    each = truth.expected(study) + failing // len(study.cases)
+    return {
+        "verification": _designs(scene) * each,
+        "pairs": tolerance.simulations(study),
+    }
+
+
+def _of_lives(scene: Scene) -> dict[str, int]:
+    return {"lives": lives.simulations_of_designs(scene)}
+
+
+def _of_chaos(scene: Scene) -> dict[str, int]:
+    return {"chaos": _designs(scene) * 2 * chaos.PAIRS}
+
+
+def _of_readings(scene: Scene) -> dict[str, int]:
+    return {"readings": readings.simulations(scene)[0]}
+
+
+def _worn(scene: Scene) -> bool:
+    return bool(scene.required_study.worn)
+
+
+STAGES = (
+    Stage(
+        "wear", lambda run: run.of(lives.known(run)), applies=_worn,
+        words={"wear": "wear over the service life"}, samples=_of_wear,
+    ),
+    Stage(
+        "effects", certificate.certify, needs=("extent",),
+        applies=lambda scene: scene.required_study.certificate is not None,
+        words={"effects": "effect screening"}, files=("effects.nc",),
+    ),
+    Stage(
+        "sensitivity", _sensitivity, applies=lambda scene: bool(scene.required_study.groups),
+        words={"sensitivity": "sensitivity analysis"}, files=("sensitivity.nc",), samples=_of_sensitivity,
+    ),
+    Stage(
+        "surrogates", _surrogates,
+        words={"kriging": "surrogate models"}, files=("samples.nc", "kriging.nc"), samples=_of_surrogates,
+    ),
+    Stage(
+        "search", _search, needs=("surrogates",),
+        words={
+            "optimisation": "search on the surrogate",
+            "check": "simulation of its designs",
+            "infill": "adaptive refinement of the Pareto front",
+            "edge": "search along constraints on rare failures",
+        },
+        files=("front.nc",), samples=_of_search,
+    ),
+    Stage(
+        "verification", _verification, needs=("surrogates", "search"),
+        words={"verification": "verification of the best designs"}, samples=_of_verification,
+    ),
+    Stage(
+        "lives",
+        lambda run, written, verified: run.stage("lives", lives.of_designs, written, verified.table.choices),
+        needs=("scene", "verification"), applies=_worn,
+        words={"lives": "wear of the baseline and the best designs"}, samples=_of_lives,
+    ),
+    Stage("front", _front, needs=("surrogates", "verification", "lives"), files=("verification.nc",)),
+    Stage(
+        "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
+        needs=("verification",), files=("contributions.nc",),
+    ),
+    Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
+    Stage(
+        "responses", _responses, needs=("verification",),
+        words={"responses": "responses of the baseline and the best designs"},
+        responses=lambda scene: responses.simulations(scene.required_study) ,
+    ),
+    Stage(
+        "readings", lambda run: readings.write(run, run.stage("readings", readings.evaluate)), applies=readings.applies,
+        words={"readings": "published designs under alternative interpretations"},
+        files=("readings.nc",), samples=_of_readings, responses=lambda scene: readings.simulations(scene)[1],
+    ),
+    Stage(
+        "claims", _claims, needs=("sensitivity", "surrogates", "responses"), applies=is_the_papers, files=("claims.nc",),
+    ),
+)  # fmt: skip
+"""In their order."""
+
+
+def stages_of(scene: Scene) -> list[Stage]:
+    """The stages that a study of this scene has."""
+    return [stage for stage in STAGES if stage.applies(scene)]
+
+
+def files_of(scene: Scene) -> list[str]:
+    """Results without which a study of this scene is not finished; service lives are looked at by themselves."""
+    return [name for stage in stages_of(scene) for name in stage.files]
+
+
+def carry_out(run: StudyRun, extent: Extent) -> None:
+    """All stages, in their order.
+
+    Parameters
+    ----------
+    run : StudyRun
+        Of the scene as written.
+    extent : function
+        How much the certificate of effects simulates (`hpcclear.study.extent.certificate_extent`).
+    """
+    results: dict[str, Any] = {"scene": run.scene, "extent": extent}
+    for stage in stages_of(run.scene):
+        arguments = [results.get(name) for name in stage.needs]
+        results[stage.name] = stage.run(results.get("wear", run), *arguments)
+
+
+class Announcer:
     """Tells each stage of a study of this scene as it begins, on standard error."""
 
     def __init__(self, scene: Scene) -> None:
-        steps = ["kriging", "optimisation", "verification", "responses"]
-        steps = (["sensitivity"] if scene.required_study.groups else []) + steps
-        steps = (["effects"] if scene.required_study.certificate is not None else []) + steps
-        if scene.required_study.worn:
-            steps = ["wear", *steps[:-1], "lives", steps[-1]]
-        self._steps = steps + (["readings"] if "readings.nc" in paper.files(scene) else [])
+        self._counted = [stage.words for stage in stages_of(scene) if stage.words]
         self._began = time.monotonic()
 
     def announced(self, name: str) -> None:
         """Write which stage begins, and how long the study has taken so far."""
         kind, _, round_ = name.partition("-")
-        step = "optimisation" if kind in _SEARCH else kind
-        if step not in self._steps:
-            return
-        number = self._steps.index(step) + 1
-        again = f", round {int(round_) + 1}" if kind == "infill" else ""
-        spent = duration(time.monotonic() - self._began)
-        text = f"stage {number} of {len(self._steps)}: {_WORDS[kind]}{again} ({spent} so far)"
-        print(plain(text), file=sys.stderr, flush=True)
+        for number, words in enumerate(self._counted, 1):
+            if kind in words:
+                again = f", round {int(round_) + 1}" if kind == "infill" else ""
+                spent = duration(time.monotonic() - self._began)
+                text = (
+                    f"stage {number} of {len(self._counted)}: {words[kind]}{again} ({spent} so far)"
+                )
+                print(plain(text), file=sys.stderr, flush=True)
 
     @staticmethod
     def silent(name: str) -> None:

@@ -15,7 +15,7 @@ from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Piecewise, stored_fields
+from hpcclear.statistics.surrogate.piecewise import Piecewise, beginning
 from hpcclear.statistics.surrogate.regression import RegressionMethod, made
 from hpcclear.statistics.surrogate.stored import rows_of
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
@@ -37,7 +37,7 @@ def domain(run: StudyRun, names: Sequence[str]) -> Box:
 
 
 def method_of(scene: Scene) -> Method:
-    """The kind of surrogate that a study asks for.
+    """The kind of surrogate that a study requests.
 
     Raises
     ------
@@ -104,9 +104,7 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
     """
     found: list[Piecewise] = []
     method = method_of(scene)
-    while f"model{len(found)}_names" in result:
-        start = f"model{len(found)}_"
-        arrays = {name: result[start + name] for name in stored_fields(method)}
+    while arrays := beginning(result, f"model{len(found)}_"):
         found.append(Piecewise.from_arrays(arrays, method))
     return found
 

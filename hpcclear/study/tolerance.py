@@ -17,7 +17,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import spread
-from hpcclear.study import goals, truth, verification
+from hpcclear.study import goals, truth, verdicts, verification
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -86,7 +86,8 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
             _left(run.study.wanted, list(taken.values())),
         )  # fmt: skip
         made = truth.contested(run, designs, made, "verification", "verification")
-    return _widened(run, designs, truth.told_of(run, designs, made), taken)
+    true = _widened(run, designs, truth.told_of(run, designs, made), taken)
+    return true | truth.explained(run, designs, made)
 
 
 def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:
@@ -166,7 +167,7 @@ def _widened(
             continue
         share, error = (np.max([one[part] for one in ends], axis=0) for part in (0, 1))
         true["tolerance"][k], true["tolerance_error"][k] = share[:2], error[:2]
-        count = len(share) - 3
+        count, first = len(share) - 3, len(run.study.case(choice.case).goals)
         values = np.array(
             [true[name][k] for name in ("mean", "deviation", "percentile")]
             + true["goal"][k, :count].tolist()
@@ -177,11 +178,12 @@ def _widened(
         for lower, upper, value, more in (
             (true["percentile_lower"][k:], true["percentile_upper"][k:], values[2:3], wider[2:3]),
             (true["goal_lower"][k], true["goal_upper"][k], values[3:], wider[3:]),
+            (true["sure_lower"][k], true["sure_upper"][k], values[3 + first :], wider[3 + first :]),
         ):
             number = len(value)
             lower[:number] = value - np.hypot(value - lower[:number], more)
             upper[:number] = value + np.hypot(upper[:number] - value, more)
-    return true
+    return verdicts.decided(run, designs, true)
 
 
 def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, list[str]]:

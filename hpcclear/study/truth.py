@@ -12,7 +12,7 @@ from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import goals
+from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -69,7 +69,9 @@ def simulate(
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
         ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``samples``, ``failed``, ``beyond_hertz``.
+        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
+        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
 
     Raises
     ------
@@ -78,9 +80,24 @@ def simulate(
     """
     settings = run.study.verification
     if settings.draws is not None:
-        return told_of(run, choices, _values(run, choices, stage, purpose, settings.draws, None))
-    made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-    return told_of(run, choices, contested(run, choices, made, stage, purpose))
+        made = _values(run, choices, stage, purpose, settings.draws, None)
+    else:
+        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
+        made = contested(run, choices, made, stage, purpose)
+    return told_of(run, choices, made) | explained(run, choices, made, purpose)
+
+
+def explained(
+    run: StudyRun, choices: Sequence[Choice], made: Sequence[Array], purpose: str = "verification"
+) -> Result:
+    """What makes the scatter of designs (`hpcclear.study.contributions.of_designs`), from f of each, (rows, n) or (n,)."""
+
+    def drawn(choice: Choice, f: Array) -> Points:
+        if run.study.verification.draws is not None:
+            return samples_of(run, choice, f.size, purpose)
+        return scattered(run, choice, f.shape[1], purpose)
+
+    return contributions.of_designs(run, choices, made, drawn)
 
 
 def scrambled_length(simulations: int) -> int:
@@ -101,6 +118,8 @@ def expected(study: Study) -> int:
     if settings.draws is not None:
         return settings.draws
     needed = FIRST * max(0.014 / study.wanted.deviation, 1.0) ** 1.7
+    kept = [goal for case in study.cases for goal in case.kept if not verdicts.rare(goal, settings)]
+    needed = max([needed, *(verdicts.usual(goal, settings) for goal in kept)])
     return int(np.clip(needed, first_length(settings) * SCRAMBLINGS, settings.most_samples))
 
 
@@ -126,10 +145,11 @@ def doubled(
     from."""
     wanted = wanted or run.study.wanted
     made = list(before) or [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
+    many = verdicts.rivals(choices)
     while True:
         rows = [
             k for k, one in enumerate(made)
-            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one[0], wanted))
+            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one[0], wanted, many[k]))
         ]  # fmt: skip
         if not rows:
             return made
@@ -230,8 +250,11 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
     )  # type: ignore[return-value]
 
 
-def _accurate(run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is."""
+def _accurate(
+    run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
+) -> bool:
+    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is a probability or
+    quantile that surely keeps or breaks its threshold, as one of `many` designs."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))
     reach = _reaches(settings, values)
@@ -240,10 +263,12 @@ def _accurate(run: StudyRun, choice: Choice, values: Array, wanted: MomentAccura
     if good and not case.plain:
         good = all(
             goals.accurate(goal, one, wanted)
+            or (goal in case.kept and verdicts.settled(goal, values, choice, settings, many))
             for goal, one in zip(
                 (*case.goals, *case.kept), _goals(run, choice, values), strict=True
             )
             if goal.statistic in ("quantile", "exceedance")
+            and not (goal in case.kept and verdicts.rare(goal, settings))
         )
     return bool(good)
 
@@ -265,8 +290,9 @@ def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> 
     """All that is told of designs from what was made of them, shape (2, replicates, values) each; as `simulate` returns it."""
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
+    held = max(len(case.kept) for case in run.study.cases)
     rows: list[dict[str, object]] = []
-    for choice, (values, beyond) in zip(choices, made, strict=True):
+    for choice, (values, beyond), many in zip(choices, made, verdicts.rivals(choices), strict=True):
         row: dict[str, object] = {
             "samples": values.size,
             "failed": int(np.isnan(values).sum()),
@@ -286,5 +312,15 @@ def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> 
         row["goal_upper"] = [one.upper for one in told] + missing
         nothing = np.full(len(values), np.nan)
         row["goal_shifts"] = [one.shifts for one in told] + [nothing] * len(missing)
+        sure = verdicts.level(settings, many, values.size)
+        kept = run.study.case(choice.case).kept
+        certain = [goals.told(goal, values, choice.design, sure) for goal in kept]
+        missing = [np.nan] * (held - len(kept))
+        row["counted"] = [float(values.size)] * len(certain) + missing
+        row["excess"] = goals.steered(kept, values, choice.design)
+        row["sure_lower"] = [one.lower for one in certain] + missing
+        row["sure_upper"] = [one.upper for one in certain] + missing
         rows.append(row)
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return verdicts.decided(
+        run, choices, {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    )

@@ -12,9 +12,11 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study import verdicts
 from hpcclear.study.goals import excess, most_of, names_of
 from hpcclear.study.optimisation import Choice, problem_of
 from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.verdicts import Standing
 
 ON_BOUND = 5e-3
 """Share of a variable's range within which a design sits on its bound."""
@@ -87,7 +89,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
     nothing else is asked for; gamma, delta and epsilon of further ones. Of those that cannot be told from it at the
     study's confidence it is the best in the others. Each design of the front is surely better than each
-    other in one of them. Designs that break a constraint are none of these, unless all do.
+    other in one of them. They are chosen among the designs that surely satisfy all constraints, if there are any.
     """
     table = Table([], [], [], [])
     for case in run.study.cases:
@@ -108,9 +110,10 @@ def _name_case(
     values = true["goal"][rows, :count]
     shifts = np.moveaxis(true["goal_shifts"][rows, :count], 1, 0)
     everything = Compared(values, shifts, run.study.verification.confidence)
-    keeps = excess(kept, true["goal"][rows, count : count + len(kept)]) <= 0.0
     ours = [k for k, row in enumerate(rows) if choices[row].origin == "search"]
-    ours = [k for k in ours if keeps[k]] or ours
+    if kept:
+        broken = excess(kept, true["goal"][rows, count : count + len(kept)])
+        ours = _nearest(ours, true["standing"][rows, : len(kept)].max(axis=1), broken)
     mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
     known = mine.known.any()
     ends = [ours[mine.best(k)] for k in range(count)] if known else ours[:1] * count
@@ -133,6 +136,17 @@ def _name_case(
         table.same_as.append(next((label for j, label in seen if everything.one[j, k]), ""))
         table.dominated.append(bool(everything.beaten[k]))
         seen.append((k, name))
+
+
+def _nearest(rows: Sequence[int], standing: Array, broken: Array) -> list[int]:
+    """Of some designs those that surely satisfy all constraints; if none does, those that may, first those whose estimates do;
+    else the one that comes nearest. `standing`, `broken`: the worst standing and excess of all designs, (n,)."""
+    best = min((standing[k] for k in rows), default=np.nan)
+    level = [k for k in rows if standing[k] == best]
+    if best == Standing.KEPT or not level:
+        return level or list(rows)
+    within = [k for k in level if broken[k] <= 0.0]
+    return within or [min(level, key=lambda k: float(broken[k]))]
 
 
 def _on_bounds(run: StudyRun, choice: Choice) -> str:
@@ -164,23 +178,25 @@ def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
             values = true[f"goal{end}"][:, column]
             data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
     table_of_limits = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
-    data["constraints"] = np.array(
-        [_kept(case, unit, *rows) for case, *rows in zip(cases, *table_of_limits, strict=True)]
+    rows = zip(
+        cases, zip(*table_of_limits, strict=True), true["standing"], true["price"], strict=True
     )
+    data["constraints"] = np.array([verdicts.words(case, unit, *row) for case, *row in rows])
+    if any(case.kept for case in cases):
+        data["constraint_excess"] = _excess(cases, true)
     return data
 
 
-def _kept(case: Case, unit: str, *told: Array) -> str:
-    """How a design stands to its constraints: "share with f above 0.0003 m 0.012 at most 0.05: kept".
-
-    `told`: values, lower and upper limits of what its case makes small and, behind these, of its constraints.
-    """
-    texts = []
-    rows = (one[len(case.goals) :] for one in told)
-    for goal, value, low, high in zip(case.kept, *rows, strict=False):
-        surely = "kept" if high <= goal.most else "broken" if low > goal.most else "cannot be told"
-        texts.append(f"{goal.words(unit)} {value:.4g} at most {goal.most:g}: {surely}")
-    return "; ".join(texts)
+def _excess(cases: Sequence[Case], true: Result) -> Array:
+    """By how much each design breaks the constraints of its case by its estimates, NaN where it has none."""
+    rows = zip(cases, true["goal"], strict=True)
+    found = np.array(
+        [
+            excess(case.kept, row[None, len(case.goals) :][:, : len(case.kept)])[0]
+            for case, row in rows
+        ]
+    )
+    return np.where(np.isneginf(found), np.nan, found)
 
 
 def write(
@@ -235,6 +251,8 @@ def write(
         data[name] = true[name]
     for name in ("samples", "failed", "beyond_hertz"):
         data[name] = true[name].astype(np.int64)
+    if true["rare_samples"].any():
+        data["rare_samples"] = true["rare_samples"].astype(np.int64)
     data["same_as"] = np.array(table.same_as)
     data["dominated"] = np.array(table.dominated, np.int8)
     data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])
@@ -248,9 +266,9 @@ def write(
     if "first_goal" in content:
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}"
-        asked = "what its case makes small" if len(study.cases) > 1 else asked
+        asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
-            words = content[name].attrs["long_name"].replace("mean and deviation", asked)
+            words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"

@@ -78,7 +78,7 @@ fi
 
 [ -w "$root" ] || give_up "$root is not writable: clone the repository where you may write"
 exec 9<"$root" # two commands at once: the second waits here until the first has installed
-flock 9
+if command -v flock >/dev/null; then flock 9; fi # macOS has none
 clear=()
 if [ -f "$venv/.place" ] && [ "$(cat "$venv/.place")" != "$root" ]; then
     clear=(--clear) # the checkout was moved or copied: programs in the environment name the old place

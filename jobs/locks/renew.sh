@@ -3,6 +3,7 @@
 # and the oldest that it allows, for the oldest Python. Then run the tests with them, and commit.
 #   bash jobs/locks/renew.sh              all
 #   bash jobs/locks/renew.sh --lowest     only the oldest: after a change of a lower bound
+#   bash jobs/locks/renew.sh --keep       all, with the versions they have: after a package was added or removed
 # Needs Python and pip; nothing but the lists is changed. Names no registry: pip's own settings say where from.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -24,6 +25,7 @@ with open(sys.argv[1], "rb") as file:
 PYTHON
     { echo "Python 3.11 or newer is needed" >&2 && exit 2; }
 cp pyproject.toml "$place"
+if [ "${1:-}" = --keep ]; then cp -r jobs/locks/3.* jobs/locks/lowest-* "$place"; fi
 
 # Compiled in a folder of its own, so that the comments of the lists name no path: compile PYTHON TARGET OPTIONS...
 compile() {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.objectives import MEAN_GAP, OBJECTIVES, Objective, asked
+from hpcclear.base.objectives import asked
 from hpcclear.base.outcome import OUTCOME, Status, failed
 from hpcclear.ensemble import compiling, simulate, single
 from hpcclear.ranks.stopping import Stopped
@@ -118,8 +118,8 @@ class FormulaWorker:
     lanes = 4
 
     def __init__(self, payload: dict[str, Any]) -> None:
-        self._objective = OBJECTIVES[payload["objective"]]
         self._scene = load_scene(payload["scene"], trust=True)  # as the evaluators of the package
+        self._objective = self._scene.objective
         self._paths = payload["paths"]
         self._queue: list[tuple[int, np.ndarray]] = []
 
@@ -168,7 +168,7 @@ def compile_nothing(payload: dict[str, Any], ranks: Ranks) -> None:
     """Takes the place of the compilers."""
 
 
-def respond(scene: Scene, judged_by: Objective = MEAN_GAP, copy: int = 0, *, checked: bool = True):
+def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     """A response whose forces and accelerations are the objective times a wave."""
     turns = scene.numerics.transient_revolutions + int(scene.numerics.averaged_revolutions)
     angle = np.linspace(0.0, 2 * np.pi * turns, 40 * turns + 1)
@@ -180,7 +180,7 @@ def respond(scene: Scene, judged_by: Objective = MEAN_GAP, copy: int = 0, *, che
     data = {**series, "crank_angle": angle, "contact_force": pair}
     data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
     scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
-    return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=judged_by)
+    return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=scene.objective)
 
 
 def replace_dynamics(set_attribute: Callable[[object, str, object], None] = setattr) -> None:

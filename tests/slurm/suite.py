@@ -79,7 +79,7 @@ def finished() -> tuple[Path, float]:
     end = wait(job, *ENDS)
     whole = end["JobState"] == "COMPLETED" and end["ExitCode"] == "0:0"
     expect("srun --mpi=pmi2: a job finishes", whole, "finished.log")
-    timing = dataset.read(output.parent / "timing.nc", "timing")
+    timing = dataset.read(output.with_suffix(".timing.nc"), "timing")
     ranks = timing.sizes["rank"]
     expect("srun --mpi=pmi2: its two ranks are one run", ranks == 2, "finished.log")
     readable("finished.log", "srun")

@@ -21,7 +21,7 @@ def written_once(functions: list[Function]) -> list[Function]:
     Parameters
     ----------
     functions : list of (ast.FunctionDef, str)
-        With their kinds, "lane" or "scalar"; no two share a name of a variable. The last is the one that is asked for, and
+        With their kinds, "lane" or "scalar"; no two share a name of a variable. The last is the one that is requested, and
         stays as it is called. Functions of kind "scalar" are merged where they are equal, as they need not be inlined.
     """
     functions = [(_own_nodes(function), kind) for function, kind in functions]

@@ -7,9 +7,8 @@ its whole state in the arrays it was given, and goes on from there bit for bit.
 from functools import cache
 from typing import Any, NamedTuple
 
-from numba import njit
-
 from hpcclear.base.bits import call_at
+from hpcclear.base.cached import cached
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
@@ -119,4 +118,4 @@ def make_stepper(W: int, *, implicit: bool = False) -> Any:
     if not implicit:
         known["memory"] = None
     text = one_text(advance, f"stepper_{W}", **known)
-    return njit(error_model="numpy", fastmath=FASTMATH, cache=True)(text)  # type: ignore[no-any-return]
+    return cached(text, fastmath=FASTMATH)

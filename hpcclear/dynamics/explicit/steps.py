@@ -3,9 +3,10 @@
 from functools import cache
 from typing import Any
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from hpcclear.base.bits import beyond
+from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
@@ -171,4 +172,4 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 4, _COUNTS)
 def explicit_code(W: int, stages: int) -> Any:
     """The compiled steps of W lanes by pairs of so many stages; their ``address`` is what steppers take."""
     text = one_text(explicit_steps, f"explicit_{W}_{stages}", W=W, stages=stages)
-    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+    return c_function(SIGNATURE, text, fastmath=FASTMATH)

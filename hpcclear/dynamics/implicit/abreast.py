@@ -8,9 +8,10 @@ step would. A sample keeps its column of the eight for as long as it is stiff, a
 from functools import cache
 from typing import Any
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from hpcclear.base.bits import call_at
+from hpcclear.base.cached import c_function
 from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.one_text import one_text
@@ -359,7 +360,7 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
 def abreast_code() -> Any:
     """The compiled implicit steps of any lanes, joints and coordinates; steppers take their ``address``."""
     text = one_text(steps_abreast, "abreast")
-    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+    return c_function(SIGNATURE, text, fastmath=FASTMATH)
 
 
 @lane_function

@@ -87,7 +87,7 @@ def fit_to_ramp(par, lane, W, m, i, settings):
         slope = max(slope, par[(block + at.STEEPNESS) * W + lane])
         film = max(film, par[(block + at.FILM_STEEPNESS) * W + lane])
     ramp = 1.0 / steepest
-    speed = par[at.SPEED * W + lane] * par[at.CRANK_LENGTH * W + lane]
+    speed = par[at.SPEED * W + lane] * par[at.DRIVEN_LENGTH * W + lane]
     strictness = par[at.STRICTNESS * W + lane]
     asked = min(settings[RTOL] / (FILM_AT * math.sqrt(strictness)), 1.0) ** 0.9
     squeezed = max(ERROR_IN_FILM / film * asked / (1.0 + speed), LEAST_IN_FILM)

@@ -1,4 +1,4 @@
-"""Checks of a law that nobody here wrote, before anything runs: what it asks for, its units, its numbers, its energy."""
+"""Checks of a law that nobody here wrote, before anything runs: what it uses, its units, its numbers, its energy."""
 
 from collections.abc import Callable, Mapping
 from functools import lru_cache
@@ -13,7 +13,15 @@ from hpcclear.dynamics.laws.declared import (
     FrictionLaw,
     Law,
 )
-from hpcclear.dynamics.laws.numbers import elastic_at, evaluate, sample_numbers, stored, with_words
+from hpcclear.dynamics.laws.lanes import text_of
+from hpcclear.dynamics.laws.numbers import (
+    elastic_at,
+    evaluate,
+    force_of,
+    sample_numbers,
+    stored,
+    with_words,
+)
 from hpcclear.dynamics.laws.translate import LawError
 from hpcclear.dynamics.layout import LAW_NUMBERS
 
@@ -23,6 +31,9 @@ TYPICAL = {
     "bearing_radius": 0.02,
     "journal_radius": 0.0197,
     "clearance": 3e-4,
+    "length": 0.02,
+    "dundurs_alpha": 0.0,
+    "dundurs_beta": 0.0,
 }
 """A joint of the paper's: what laws are tried on."""
 
@@ -40,40 +51,40 @@ SAME = 1e-4
 
 def check_shape(law: Law) -> None:
     """LawError unless the law's functions ask for what there is, are arithmetic, and fit their rows."""
-    from hpcclear.dynamics.laws.lanes import text_of
-
     own = {one.name for one in law.parameters}
     given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
     for name in own & (JOINT.keys() | VARYING[law.kind].keys()):
         raise LawError(
-            f"has a parameter {name!r}, a name that the joint's numbers have", "Call it otherwise"
+            f"has a parameter {name!r}, a name reserved for numbers of the joint",
+            "Give it another name",
         )
     functions = {**law.functions(), **{f.__name__: f for f in law.afterwards()}}
     for title, function in functions.items():
         for name in law.arguments(function):
             if name not in given:
                 raise LawError(
-                    f"{title} asks for {name!r}, which nobody gives",
-                    f"Declare it as a parameter, or in numbers; there are {', '.join(sorted(given))}",
+                    f"{title} uses {name!r}, which is not defined",
+                    f"Declare it as a parameter, or in numbers. Known are {', '.join(sorted(given))}",
                 )
     if len(law.read) > LAW_NUMBERS:
         raise LawError(
-            f"reads {len(law.read)} numbers, and there is room for {LAW_NUMBERS}",
-            "Work more of them out in once",
+            f"reads {len(law.read)} numbers, more than {LAW_NUMBERS}",
+            "Compute more of them in once",
         )
     if isinstance(law, ContactLaw) and law.elastic is not None:
         for name in {"rate", "impact_speed", "inverse_impact_speed"} & {
             *law.arguments(law.elastic)
         }:
-            raise LawError(f"elastic asks for {name!r}, and stored energy goes by the depth alone")
+            raise LawError(f"elastic uses {name!r}, but stored energy depends on the depth alone")
     if isinstance(law, FrictionLaw) and law.bristled and law.largest is None:
-        raise LawError("has bristles and does not say how far they bend", "Declare largest, m")
+        raise LawError("has bristles without a largest deflection", "Declare largest, m")
     text_of(law)
 
 
 # ---- units ----------------------------------------------------------------------------------------
 @lru_cache(maxsize=1)
-def _registry() -> Any:
+def registry() -> Any:
+    """Pint's units."""
     from pint import UnitRegistry
 
     return UnitRegistry()
@@ -89,10 +100,10 @@ def _size_and_sign(x: Any, y: Any) -> Any:
 
 
 def _of_pure(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: _registry().Quantity(float(function(_pure(x))), "")
+    return lambda x: registry().Quantity(float(function(_pure(x))), "")
 
 
-_WORDS = {
+WORDS = {
     "sqrt": lambda x: x**0.5,
     "fabs": abs,
     "absolute": abs,
@@ -110,7 +121,7 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
     """LawError unless each function, run on quantities, returns one of its own unit; `values` of the parameters, SI."""
     import pint
 
-    made = _registry().Quantity
+    made = registry().Quantity
     given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
     given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
     given["depth"] = made(1e-5, "m")
@@ -135,26 +146,28 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
 
     def run(title: str, function: Callable[..., Any], unit: str) -> Any:
         try:
-            found = with_words(function, _WORDS, {})(
+            found = with_words(function, WORDS, {})(
                 *(given[name] for name in law.arguments(function))
             )
             return _expected(found, title, unit)
         except (ZeroDivisionError, OverflowError):
             raise LawError(
-                f"{title} is not finite", "Mend the formula, or the parameters"
+                f"{title} is not finite", "Correct the formula, or the parameters"
             ) from None
         except (pint.DimensionalityError, pint.OffsetUnitCalculusError) as error:
             raise LawError(
                 f"{title} does not fit its units: {error}",
-                "Mend the formula, or the unit of a parameter",
+                "Correct the formula, or the unit of a parameter",
             ) from None
 
     def _expected(found: Any, title: str, unit: str) -> Any:
         if isinstance(found, Mapping):
-            missing = law.numbers.keys() ^ found.keys()
+            missing = found.keys() - law.numbers.keys()
+            if len(law.worked_out()) == 1:
+                missing |= law.numbers.keys() - found.keys()
             if missing:
                 raise LawError(
-                    f"once gives {', '.join(found)}, and numbers declares {', '.join(law.numbers) or 'none'}",
+                    f"once returns {', '.join(found)}, but numbers declares {', '.join(law.numbers) or 'none'}",
                     "Declare each with its unit: numbers={...}",
                 )
             return {
@@ -165,8 +178,8 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
             found = made(found, unit) if found == 0 else made(found, "")
         return found.to(unit or "dimensionless")
 
-    if law.once is not None:
-        given |= run("once", law.once, "")
+    for made_once in law.worked_out():
+        given |= run("once", made_once, "")
     wanted = {"force": "N", "elastic": "N", "ratio": "", "deflection": "m/s"}
     for title, function in law.functions().items():
         run(title, function, wanted.get(title, ""))
@@ -181,7 +194,7 @@ def check_numbers(law: Law, values: Mapping[str, Any]) -> None:
     for name in law.numbers:
         if not np.isfinite(np.asarray(given[name], float)).all():
             raise LawError(
-                f"{name}, worked out once, is not finite", "Mend once, or the parameters"
+                f"{name}, computed once, is not finite", "Correct once, or the parameters"
             )
     if isinstance(law, ContactLaw):
         _check_contact(law, given)
@@ -199,7 +212,7 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
         "inverse_impact_speed": 1.0 / impact,
     }
     shape = (len(DEPTHS), len(RATES), len(IMPACT_SPEEDS))
-    force = np.broadcast_to(evaluate(law.force, {**given, **varying}), shape)
+    force = np.broadcast_to(force_of(law, {**given, **varying}), shape)
 
     def where(bad: Any) -> str:
         i, j, k = np.argwhere(np.broadcast_to(bad, shape))[0]
@@ -209,37 +222,38 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
     bad = ~np.isfinite(force)
     if bad.any():
         raise LawError(
-            f"its force is not finite {where(bad)}", "Mend the formula, or the parameters"
+            f"the force is not finite {where(bad)}", "Correct the formula, or the parameters"
         )
     pulls = (force < 0.0) & (rate >= 0.0)
     if pulls.any():
         raise LawError(
-            f"it pulls, F = {force[pulls][0]:.3g} N, {where(pulls)}",
-            "A contact that deepens only pushes",
+            f"the contact force pulls, F =  {force[pulls][0]:.3g} N, {where(pulls)}",
+            "A contact under compression must not pull",
         )
     at_rest = np.broadcast_to(
         force[:, [list(RATES).index(0.0)]], (len(DEPTHS), 1, len(IMPACT_SPEEDS))
     )
     if np.ptp(at_rest, axis=2).max() > SAME * at_rest.max():
         raise LawError(
-            "its force at rest goes by the impact speed, and stored energy by the depth alone",
+            "the force at rest depends on the impact speed, but stored energy depends on the depth alone",
             "Let the impact speed scale the damping only",
         )
     elastic = np.broadcast_to(elastic_at(law, DEPTHS, given), DEPTHS.shape)
     if not np.allclose(elastic, at_rest[:, 0, 0], rtol=SAME, atol=0.0):
         raise LawError(
-            "elastic is not the force at a rate of 0", "Mend one of the two, or leave elastic out"
+            "elastic differs from the force at a rate of 0",
+            "Correct one of the two, or leave elastic out",
         )
     if not (elastic > 0.0).all() or not (np.diff(elastic) > 0.0).all():
         raise LawError(
-            "its elastic part does not grow with the depth", "A stiffness has to be above 0"
+            "the elastic part does not increase with the depth", "The stiffness must be above 0"
         )
     nothing = {**given, **varying, "depth": 0.0 * depth[:1]}
-    touching = np.abs(np.broadcast_to(evaluate(law.force, nothing), (1, *shape[1:])))
+    touching = np.abs(np.broadcast_to(force_of(law, nothing), (1, *shape[1:])))
     if not law.latched and not touching.max() <= TOUCHING * elastic.max():
         raise LawError(
-            f"its force is {touching.max():.3g} N where nothing touches (depth 0)",
-            "Let it vanish with the depth: multiply the damping by the elastic part",
+            f"its force is {touching.max():.3g} N without contact (depth 0)",
+            "Make it vanish with the depth: multiply the damping by the elastic part",
         )
     step = 1e-4 * DEPTHS
     slope = (stored(law, DEPTHS + step, given) - stored(law, DEPTHS - step, given)) / (2.0 * step)
@@ -247,9 +261,9 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
     if off.any():
         k = int(np.argmax(off))
         raise LawError(
-            f"its energy does not match: at depth {DEPTHS[k]:.3g} m the energy's slope is {slope[k]:.6g} N "
+            f"the energy does not match the force: at depth {DEPTHS[k]:.3g} m the energy's slope is {slope[k]:.6g} N "
             f"and the force at rest {elastic[k]:.6g} N",
-            "Mend energy, or leave it out: it is then integrated",
+            "Correct energy, or leave it out; it is then integrated",
         )
 
 
@@ -264,20 +278,20 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, Any]) -> None:
     bad = ~np.isfinite(ratio)
     if bad.any():
         raise LawError(
-            f"its ratio is not finite at {SPEEDS[bad][0]:.3g} m/s",
-            "Mend the formula, or the parameters",
+            f"the ratio is not finite at {SPEEDS[bad][0]:.3g} m/s",
+            "Correct the formula, or the parameters",
         )
     drives = ratio * SPEEDS < -1e-12 * np.abs(ratio * SPEEDS).max()
     if drives.any():
         raise LawError(
-            f"it drives sliding on: ratio {ratio[drives][0]:.3g} at {SPEEDS[drives][0]:.3g} m/s",
+            f"friction drives sliding on: ratio {ratio[drives][0]:.3g} at {SPEEDS[drives][0]:.3g} m/s",
             "Give the ratio the sign of the sliding speed",
         )
     if law.deflection is not None:
         rate = np.broadcast_to(evaluate(law.deflection, {**given, **varying}), SPEEDS.shape)
         if not np.isfinite(rate).all():
             raise LawError(
-                "its rate of deflection is not finite", "Mend the formula, or the parameters"
+                "the rate of deflection is not finite", "Correct the formula, or the parameters"
             )
 
 

@@ -6,7 +6,7 @@ are arithmetic, so that one and the same source is compiled into the lanes, runs
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any
 
@@ -18,8 +18,12 @@ JOINT = {
     "bearing_radius": "m",
     "journal_radius": "m",
     "clearance": "m",
+    "length": "m",
+    "dundurs_alpha": "",
+    "dundurs_beta": "",
 }
-"""A joint's numbers and their units: Hertz's stiffness, (1 - nu^2)/E of both surfaces together, radii, radial clearance."""
+"""A joint's numbers and their units: Hertz's stiffness of a sphere, (1 - nu^2)/E of both surfaces together, radii, radial
+clearance, length of the bearing (NaN where the scene gives none), and Dundurs' parameters of journal against bearing."""
 
 VARYING = {
     "contact": {
@@ -89,8 +93,8 @@ class Law:
     valid: str = ""
     """The range it was made for, in words."""
     parameters: tuple[Parameter, ...] = ()
-    once: Function | None = None
-    """From parameters and the joint's numbers to a mapping of further numbers, worked out once a sample."""
+    once: Function | tuple[Function, ...] | None = None
+    """From parameters and the joint's numbers to a mapping of further numbers, worked out once a sample; or several."""
     numbers: Mapping[str, str] = field(default_factory=dict)
     """Names and units of what `once` gives."""
     check: Function | None = None
@@ -106,6 +110,12 @@ class Law:
     def arguments(self, function: Function) -> tuple[str, ...]:
         """Names of what a function asks for."""
         return tuple(signature(function).parameters)
+
+    def worked_out(self) -> tuple[Function, ...]:
+        """The functions of ``once``."""
+        if self.once is None:
+            return ()
+        return self.once if isinstance(self.once, tuple) else (self.once,)
 
     def functions(self) -> dict[str, Function]:
         """Those that run in the lanes, by name."""
@@ -134,11 +144,42 @@ class Law:
 
 
 @dataclass(frozen=True, eq=False)
+class Geometry:
+    """The elastic part of a normal force by the shapes that touch; laws that damp by a `ContactLaw.factor` go with any."""
+
+    words: str
+    elastic: Function
+    """N, of depth."""
+    source: str = ""
+    formula: str = ""
+    valid: str = ""
+    parameters: tuple[Parameter, ...] = ()
+    once: Function | None = None
+    numbers: Mapping[str, str] = field(default_factory=dict)
+    energy: Function | None = None
+    swing: Function | None = None
+    exponent: Function | None = None
+    deepest: Function | None = None
+    """These as of `ContactLaw`."""
+    pressure: Function | None = None
+    """Peak pressure, Pa, of depth and force."""
+    half_angle: Function | None = None
+    """Half of the angle over which the surfaces touch, rad, of depth and force."""
+    has_length: bool = False
+    """Whether the bearing's length is needed."""
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class ContactLaw(Law):
     """A normal force of a joint, of depth, its rate and perhaps the impact speed. It never pulls: what is negative is cut."""
 
     force: Function = lambda depth: 0.0 * depth
     """N."""
+    factor: Function | None = None
+    """Instead of ``force``: 1 + damping, by which ``elastic`` is multiplied, so that the law goes with any `Geometry`."""
+    geometry: Geometry | None = None
+    """That of ``elastic``, where it is not the law's own."""
     elastic: Function | None = None
     """Its part that stores energy, N; by default the force at a rate of 0."""
     energy: Function | None = None
@@ -162,8 +203,20 @@ class ContactLaw(Law):
 
     def functions(self) -> dict[str, Function]:
         """Those that run in the lanes."""
-        found = {"force": self.force, "elastic": self.elastic, "kink": self.kink}
+        product = self.factor is not None
+        found = {"force": None if product else self.force, "factor": self.factor}
+        found |= {"elastic": self.elastic, "kink": self.kink}
         return {name: one for name, one in found.items() if one is not None}
+
+    def on(self, geometry: Geometry) -> "ContactLaw":
+        """This law, which has a ``factor``, on the elastic part of other shapes."""
+        g = geometry
+        return replace(
+            self, geometry=g, elastic=g.elastic, energy=g.energy, swing=g.swing, exponent=g.exponent,
+            deepest=g.deepest, parameters=self.parameters + g.parameters,
+            numbers={**self.numbers, **g.numbers},
+            once=self.worked_out() + (() if g.once is None else (g.once,)),
+        )  # fmt: skip
 
     def afterwards(self) -> list[Function]:
         """The stored energy."""

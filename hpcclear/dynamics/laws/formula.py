@@ -46,7 +46,7 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     used: list[str] = []
     for node in ast.walk(tree):
         if not isinstance(node, _LET_THROUGH):
-            raise LawError(f"has more in it than arithmetic: {ast.unparse(node)!r}")
+            raise LawError(f"contains more than arithmetic: {ast.unparse(node)!r}")
         if isinstance(node, ast.Call):
             if not (isinstance(node.func, ast.Name) and node.func.id in WORDS) or node.keywords:
                 raise LawError(
@@ -56,7 +56,7 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
             if node.id not in known:
                 others = ", ".join(sorted({*short, *JOINT}))
                 raise LawError(
-                    f"has {node.id!r}, which is no parameter",
+                    f"contains {node.id!r}, which is not a parameter",
                     f'Give it a unit, units = {{ {node.id} = "m" }}, and a value; known are {others}',
                 )
             node.id = known[node.id]

@@ -16,6 +16,19 @@ def reduced_compliance(youngs_modulus: Number, poisson_ratio: Number) -> Number:
     return (1.0 - poisson_ratio**2) / youngs_modulus
 
 
+def dundurs(moduli: Any, ratios: Any) -> tuple[Any, Any]:
+    """Dundurs' parameters alpha, beta of journal against bearing, in plane strain; (bearing's, journal's) moduli and ratios.
+
+    Dundurs 1969, doi:10.1115/1.3564739.
+    """
+    h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
+    g_bearing, g_journal = (
+        (1.0 - 2.0 * nu) * (1.0 + nu) / modulus for modulus, nu in zip(moduli, ratios, strict=True)
+    )
+    total = h_bearing + h_journal
+    return (h_bearing - h_journal) / total, 0.5 * (g_bearing - g_journal) / total
+
+
 def contact_stiffness(
     h_bearing: Number, h_journal: Number, bearing_radius: Number, clearance: Number
 ) -> Number:
@@ -65,13 +78,8 @@ HERTZIAN: dict[str, Any] = {
 """What all laws have whose elastic part is Hertz's."""
 
 
-def latched_force(depth, rate, inverse_impact_speed, stiffness, damping):
-    """K d^1.5 (1 + a d'/d'_0)."""
-    return stiffness * (depth * math.sqrt(depth)) * (1.0 + damping * rate * inverse_impact_speed)
-
-
-def latched_kink(rate, inverse_impact_speed, damping):
-    """Where damping stops the force."""
+def latched_factor(rate, inverse_impact_speed, damping):
+    """1 + a d'/d'_0."""
     return 1.0 + damping * rate * inverse_impact_speed
 
 
@@ -108,8 +116,7 @@ def by_restitution(
         ),
         once=lambda restitution: {"damping": factor(restitution)},
         numbers={"damping": ""},
-        force=latched_force,
-        kink=latched_kink,
+        factor=latched_factor,
         check=_nothing_at_rest(name) if divides else None,
         lossless=lambda values: values["restitution"] >= 1,
         **HERTZIAN,

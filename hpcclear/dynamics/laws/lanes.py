@@ -13,7 +13,7 @@ from hpcclear.base.one_text import module_of
 from hpcclear.dynamics.laws.declared import ContactLaw, Law
 from hpcclear.dynamics.laws.translate import written
 
-_HEAD = '''"""{title}, written by hpcclear.dynamics.laws.lanes."""
+HEAD = '''"""{title}, written by hpcclear.dynamics.laws.lanes."""
 
 import math
 
@@ -48,25 +48,32 @@ class InLanes:
     contact: ``force`` (N, cut at 0), ``elastic`` (N), ``kink``; friction: ``ratio``, ``deflection`` (m/s), ``low``, ``high``.
     """
 
-    def __init__(self, text: str, title: str, latched: bool, bristled: bool) -> None:
-        self._made_of = text, title, latched, bristled
-        self.title = title
+    def __init__(self, text: str, title: str, facts: tuple[str, ...]) -> None:
+        self._made_of = text, title, facts
+        self.title, self.facts = title, facts
         self.name = f"law_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-        self.latched = 1 if latched else None
-        self.bristled = 1 if bristled else None
         module: ModuleType = module_of(self.name, lambda: text)
         for entry, function in vars(module).items():
             if entry.startswith("joint_"):
                 setattr(self, entry.removeprefix("joint_"), function)
 
+    latched = property(lambda self: self._is("latched"))
+    bristled = property(lambda self: self._is("bristled"))
+    whole = property(lambda self: self._is("whole"))
+    largest = property(lambda self: self._is("largest"))
+    of = property(lambda self: "whole" if self.whole else "joints")
+
+    def _is(self, fact: str) -> int | None:
+        return 1 if fact in self.facts else None
+
     def __repr__(self) -> str:
         return f"<{self.title} {self.name}>"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, InLanes) and self.name == other.name
+        return isinstance(other, InLanes) and self._made_of == other._made_of
 
     def __hash__(self) -> int:
-        return hash(self.name)
+        return hash(self._made_of)
 
     def __reduce__(self) -> Any:
         return InLanes, self._made_of
@@ -81,13 +88,13 @@ def in_lanes(law: Law) -> InLanes:
     LawError
         If a function has more in it than arithmetic.
     """
-    bristled = bool(getattr(law, "bristled", False))
-    return InLanes(text_of(law), law.name, bool(getattr(law, "latched", False)), bristled)
+    facts = tuple(one for one in ("latched", "bristled") if getattr(law, one, False))
+    return InLanes(text_of(law), law.name, facts)
 
 
 def text_of(law: Law) -> str:
     """The text of a law; raises LawError as `in_lanes`."""
-    parts = [_HEAD.format(title=f"The {law.kind} law {law.name}")]
+    parts = [HEAD.format(title=f"The {law.kind} law {law.name}")]
     functions = law.functions()
     for name, function in functions.items():
         parts += written(function, f"own_{name}", f"{law.name}.{name}")
@@ -108,6 +115,9 @@ def _call(law: Law, name: str, **others: str) -> str:
 
 def _contact(law: Law) -> dict[str, str]:
     functions = law.functions()
+    if "factor" in functions:
+        elastic, kink = _call(law, "elastic"), _call(law, "factor")
+        return {"force": f"no_less({elastic} * {kink}, 0.0)", "elastic": elastic, "kink": kink}
     at_rest = _call(law, "force", rate="0.0")
     elastic = _call(law, "elastic") if "elastic" in functions else at_rest
     kink = f"{_call(law, 'force')} / ({elastic} + 1e-300)"

@@ -85,9 +85,17 @@ def _safely(function: Callable[..., Any], row: list[float]) -> Any:
 def sample_numbers(law: Law, given: Mapping[str, Any]) -> dict[str, Any]:
     """All numbers of samples, (m,) each: the joint's, the parameters, and what the law works out once."""
     found = dict(given)
-    if law.once is not None:
-        found |= evaluate(law.once, given)
+    for one in law.worked_out():
+        found |= evaluate(one, given)
     return found
+
+
+def force_of(law: ContactLaw, given: Mapping[str, Any]) -> Any:
+    """Normal force before the cut, N; arrays that broadcast, of any shape."""
+    if law.factor is None:
+        return evaluate(law.force, given)
+    assert law.elastic is not None
+    return evaluate(law.elastic, given) * evaluate(law.factor, given)
 
 
 def rows_of(law: Law, given: Mapping[str, Any], size: int) -> Array:
@@ -109,7 +117,7 @@ def elastic_at(law: ContactLaw, depth: Any, numbers: Mapping[str, Any]) -> Any:
     if law.elastic is not None:
         return evaluate(law.elastic, at_rest)
     one = np.ones_like(np.asarray(depth, float))
-    return evaluate(law.force, {**at_rest, "impact_speed": one, "inverse_impact_speed": one})
+    return force_of(law, {**at_rest, "impact_speed": one, "inverse_impact_speed": one})
 
 
 def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, Any]) -> Any:
@@ -158,7 +166,7 @@ def shape_near(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> tup
     one = np.ones_like(depth)
     exponent = _slope(law, depth, numbers) * depth / elastic
     rates = {**numbers, "depth": depth, "impact_speed": one, "inverse_impact_speed": one}
-    low, high = (evaluate(law.force, {**rates, "rate": rate * one}) for rate in (-1e-4, 1e-4))
+    low, high = (force_of(law, {**rates, "rate": rate * one}) for rate in (-1e-4, 1e-4))
     return exponent, (high - low) / (2e-4 * elastic)
 
 

@@ -43,7 +43,7 @@ def definition_of(function: Callable[..., Any]) -> ast.FunctionDef:
         raise LawError("its source cannot be read", "Write it with def in a file") from None
     if not isinstance(tree, ast.FunctionDef):
         raise LawError(
-            "is no function written with def", "Write it with def, at the top of the file"
+            "is not a function written with def", "Write it with def, at the top of the file"
         )
     return tree
 
@@ -149,7 +149,7 @@ class _Writer:
                     return
                 case _:
                     raise LawError(
-                        f"{self.title} has more in it than arithmetic: {ast.unparse(one)!r}"
+                        f"{self.title} contains more than arithmetic: {ast.unparse(one)!r}"
                     )
 
     def branches(
@@ -202,7 +202,7 @@ class _Writer:
                 return f"((1.0 if {self.text(operand)} else 0.0) == 0.0)"
             case ast.Call(func=called, args=arguments, keywords=[]):
                 return self.call(called, arguments)
-        raise LawError(f"{self.title} has more in it than arithmetic: {ast.unparse(node)!r}")
+        raise LawError(f"{self.title} contains more than arithmetic: {ast.unparse(node)!r}")
 
     def compared(self, parts: list[ast.expr], ops: list[ast.cmpop]) -> str:
         signs = {
@@ -214,7 +214,7 @@ class _Writer:
             ast.NotEq: "!=",
         }
         if any(type(op) not in signs for op in ops):
-            raise LawError(f"{self.title} compares otherwise than by size")
+            raise LawError(f"{self.title} compares in another way than by size")
         texts = [self.text(one) for one in parts]
         pairs = zip(texts[:-1], ops, texts[1:], strict=True)
         found = [f"({a} {signs[type(op)]} {b})" for a, op, b in pairs]
@@ -222,7 +222,7 @@ class _Writer:
 
     def number(self, value: Any) -> str:
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-            raise LawError(f"{self.title} uses {value!r}, which is no number")
+            raise LawError(f"{self.title} uses {value!r}, which is not a number")
         if not math.isfinite(value):
             raise LawError(f"{self.title} has a number that is not finite")
         return repr(float(value)) if value >= 0 else f"({float(value)!r})"
@@ -243,7 +243,7 @@ class _Writer:
                 module = self.value(owner)
                 if isinstance(module, ModuleType) and hasattr(module, attribute):
                     return getattr(module, attribute)
-        raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which it does not know")
+        raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which is not defined")
 
     def power(self, base: ast.expr, power: ast.expr) -> str:
         inside = self.text(base)
@@ -277,13 +277,13 @@ class _Writer:
         if known and name in WORDS:
             if WORDS[name] in ("no_more", "no_less") and len(texts) != 2:
                 raise LawError(
-                    f"{self.title} takes {name} of more or less than two numbers", "Nest it"
+                    f"{self.title} calls {name} with more or fewer than two numbers", "Nest it"
                 )
             return self.let(f"{WORDS[name]}({', '.join(texts)})")
         if isinstance(function, FunctionType):
             return self.let(f"{self.helper(function)}({', '.join(texts)})")
         raise LawError(
-            f"{self.title} calls {ast.unparse(called)!r}, which the lanes do not have",
+            f"{self.title} calls {ast.unparse(called)!r}, which the kernel does not provide",
             f"Use one of: {', '.join(WORDS)}",
         )
 

@@ -2,14 +2,17 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Clearance, Fixed, Slide, split
+from hpcclear.dynamics.linkage.loops import Loops, typical_length
+from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
+from hpcclear.dynamics.linkage.numbers import values
+from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Slide, as_complex, split
+from hpcclear.dynamics.linkage.trees import forest
 
 MOST_STEPS = 40
 MOST_TRIES = 12
@@ -21,7 +24,7 @@ SINGULAR = 1e-9  # smallest singular value, of rows scaled to 1, from which a po
 
 @dataclass(frozen=True)
 class Assembly:
-    """A mechanism put together."""
+    """A mechanism put together, or samples of one: then with a last axis (m,)."""
 
     loops: Loops
     """Its coordinates are those of `q` and `v`."""
@@ -59,14 +62,66 @@ def assemble(mechanism: Mechanism) -> Assembly:
         If a loop cannot close, a joint is held twice, or the mechanism stands in a dead centre: the joint is named.
     """
     loops = Loops(mechanism, closed=True)
-    wanted = _eccentricities(loops)
-    q, steps = _closed(loops, rough_pose(loops), wanted)
-    zero = np.zeros(loops.size)
-    state = loops.at(q, zero, 0.0)
-    ideal = np.array([not is_open(mechanism, owner) for owner in loops.owners], bool)
-    check_rank(loops, state.jacobian, ideal, 0.0)
-    v, *_ = np.linalg.lstsq(state.jacobian * loops.scales, -state.rate, rcond=1e-12)
-    return Assembly(loops, q, v * loops.scales, steps)
+    q, steps = _closed(loops, rough_pose(loops)[:, None], _eccentricities(loops)[:, None])
+    jacobian = loops.at(q, np.zeros_like(q), np.zeros(1)).jacobian[0]
+    check_rank(loops, jacobian, _ideal(mechanism, loops), 0.0)
+    return Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0], steps)
+
+
+def assemble_samples(
+    structure: Mechanism, sample: Mechanism, count: int
+) -> tuple[Assembly, Booleans]:
+    """`assemble` for so many samples at once, and which of them it succeeds with (m,): others may close from other angles.
+
+    Parameters
+    ----------
+    structure : Mechanism
+        What the samples have in common.
+    sample : Mechanism
+        With numbers of samples (m,), or single ones.
+    count : int
+    """
+    loops = Loops(structure, closed=True)
+    loops.mechanism = sample = straight(sample)
+    loops.forest = forest(sample, cartesian=True, closed=True)
+    loops.take(values(sample, cartesian=True))
+    lengths = np.broadcast_to(typical_length(sample), count)
+    angles = np.array([one.kind == "angle" for one in loops.forest.coordinates])
+    loops.scales = np.where(angles[:, None], 1.0, lengths)
+    rough = np.broadcast_to(rough_pose(loops).T, (count, loops.size)).T.copy()
+    wanted = np.broadcast_to(_eccentricities(loops).T, (count, len(loops.owners))).T
+    with np.errstate(invalid="ignore"):
+        q, steps, left, _ = _newton(loops, rough, wanted)
+        good = left <= NEARLY * lengths
+        q[:, ~good] = rough[:, ~good]
+        jacobian = loops.at(q, np.zeros_like(q), np.zeros(count)).jacobian
+        rows = (jacobian * _columns(loops))[:, _ideal(structure, loops)]
+        good &= _smallest(rows, loops.size) > SINGULAR
+        return Assembly(loops, q, _velocities(loops, q), steps), good
+
+
+def _columns(loops: Loops) -> Array:
+    """Scales of the Jacobian's columns, (n,) or (m, 1, n)."""
+    return loops.scales if loops.scales.ndim == 1 else loops.scales.T[:, None]
+
+
+def _ideal(mechanism: Mechanism, loops: Loops) -> Booleans:
+    """Which constraints are no clearance and no torque."""
+    return np.array([not is_open(mechanism, owner) for owner in loops.owners], bool)
+
+
+def _least_change(loops: Loops, jacobian: Array, asked: Array, rcond: float) -> Array:
+    """The smallest scaled change (n, m) that gives constraints what is asked of them (rows, m)."""
+    inverse = np.linalg.pinv(jacobian * _columns(loops), rcond=rcond)
+    change: Array = (inverse @ asked.T[..., None])[..., 0].T
+    return change
+
+
+def _velocities(loops: Loops, q: Array) -> Array:
+    """Velocities (n, m) at poses (n, m)."""
+    state = loops.at(q, np.zeros_like(q), np.zeros(q.shape[1]))
+    scales = loops.scales if loops.scales.ndim > 1 else loops.scales[:, None]
+    return _least_change(loops, state.jacobian, -state.rate, 1e-12) * scales
 
 
 def is_open(mechanism: Mechanism, owner: str) -> bool:
@@ -79,11 +134,12 @@ def is_open(mechanism: Mechanism, owner: str) -> bool:
 
 def _eccentricities(loops: Loops) -> Array:
     """What each constraint is to be at the start."""
-    wanted = np.zeros(len(loops.owners))
+    wanted: list[Any] = [0.0] * len(loops.owners)
     for joint in loops.mechanism.clearances:
         rows = [r for r, owner in enumerate(loops.owners) if owner == f"joints.{joint.name}"]
-        wanted[rows] = joint.start_eccentricity
-    return wanted
+        for r, apart in zip(rows, joint.start_eccentricity, strict=True):
+            wanted[r] = apart
+    return np.array(np.broadcast_arrays(*wanted), float)
 
 
 def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
@@ -96,54 +152,68 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
     nearest: tuple[float, int] = (math.inf, 0)
     taken = 0
     for reach in (0.0, *np.linspace(0.2, 1.5, MOST_TRIES)):
-        q, steps, left, worst = _newton(
-            loops, rough + reach * angles * rng.normal(size=loops.size), wanted
-        )
+        turned = reach * angles * rng.normal(size=loops.size)
+        q, steps, left, worst = _newton(loops, rough + turned[:, None], wanted)
         taken += steps
-        if left <= NEARLY * loops.scales.max():
+        if left[0] <= NEARLY * loops.scales.max():
             return q, taken
-        nearest = min(nearest, (left, worst))
+        nearest = min(nearest, (float(left[0]), int(worst[0])))
     raise InputError(
         loops.owners[nearest[1]], nearest[0],
-        "the mechanism does not close here: so far apart, in m or rad, were the two sides left",
-        "Check the lengths, or give start_angle of its bodies near the assembly that is meant",
+        "the mechanism cannot be assembled here: the value is the remaining distance of the two sides, in m or rad",
+        "Check the lengths, or give start_angle of its bodies near the intended assembly",
     )  # fmt: skip
 
 
-def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, float, int]:
-    """Newton's method by least changes, shortened until the error falls: pose, steps, error left, its row."""
-    zero, length = np.zeros(loops.size), loops.scales.max()
-    state = loops.at(q, zero, 0.0)
-    error = state.error - wanted
+def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, Array]:
+    """Newton's method by least changes, shortened until the error falls, of poses (n, m): poses, steps, errors left (m,), and
+    their rows."""
+    zero, times = np.zeros_like(q), np.zeros(q.shape[1])
+    scales = loops.scales if loops.scales.ndim > 1 else loops.scales[:, None]
+    length = scales.max(axis=0)
+
+    def found(q: Array) -> tuple[Array, Array, Array]:
+        state = loops.at(q, zero, times)
+        error = state.error - wanted
+        return error, np.linalg.norm(error, axis=0), state.jacobian
+
+    error, left, jacobian = found(q)
+    going = np.isfinite(left)
     steps = 0
     while steps < MOST_STEPS:
-        left = np.linalg.norm(error)
-        if left <= CLOSED * length:
+        going &= left > CLOSED * length
+        if not going.any():
             break
-        change, *_ = np.linalg.lstsq(state.jacobian * loops.scales, -error, rcond=1e-9)
-        share = min(1.0, LARGEST_TURN / max(float(np.abs(change).max()), 1e-9))
+        jacobian[~going] = 0.0
+        change = scales * _least_change(loops, jacobian, -error, 1e-9)
+        most = np.abs(change / scales).max(axis=0, initial=0.0)
+        share = np.minimum(1.0, LARGEST_TURN / np.maximum(most, 1e-9))
         while True:
-            new = q + loops.scales * change * share
-            state = loops.at(new, zero, 0.0)
-            if np.linalg.norm(state.error - wanted) < left or share < 1e-3:
+            new = q + change * share
+            shown = found(new)
+            worse = going & ~(shown[1] < left)
+            if not (worse & (share >= 1e-3)).any():
                 break
-            share *= 0.5
-        if np.linalg.norm(state.error - wanted) >= left:
-            break  # round-off, or a corner
-        q, error, steps = new, state.error - wanted, steps + 1
-    return q, steps, float(np.abs(error).max(initial=0.0)), int(np.abs(error).argmax())
+            share = np.where(worse & (share >= 1e-3), 0.5 * share, share)
+        going &= ~worse  # round-off, or a corner
+        if not going.any():
+            break
+        q = np.where(going, new, q)
+        error, left, jacobian = found(q)
+        steps += 1
+    return q, steps, np.abs(error).max(axis=0, initial=0.0), np.abs(error).argmax(axis=0)
 
 
 def rough_pose(loops: Loops) -> Array:
-    """Coordinates (n,) of the bodies at their start angles, hung one after the other on what stands already."""
+    """Coordinates (n,) or (n, m) of the bodies at their start angles, hung one after the other on what stands already."""
     mechanism = loops.mechanism
-    placed: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
+    placed: dict[str, tuple[Any, Any]] = {GROUND: (0j, 0.0)}
     bodies = {body.name: body for body in mechanism.bodies}
 
-    def at(place: str) -> complex:
+    def at(place: str) -> Any:
         name, _ = split(place)
         origin, angle = placed[name]
-        return origin + complex(*mechanism.at(place)) * complex(math.cos(angle), math.sin(angle))
+        return origin + as_complex(mechanism.at(place)) * np.exp(1j * angle)
 
     while len(placed) <= len(bodies):
         for joint in mechanism.joints:
@@ -155,19 +225,17 @@ def rough_pose(loops: Loops) -> Array:
                 if isinstance(joint, (Slide, Fixed)):
                     turned = joint.angle if own == joint.point else -joint.angle
                     angle = placed[carrier][1] + turned
-                turn = complex(math.cos(angle), math.sin(angle))
-                placed[body] = (at(other) - complex(*mechanism.at(own)) * turn, angle)
-    q = np.zeros(loops.size)
-    for k, one in enumerate(loops.forest.coordinates):
+                turn = np.exp(1j * np.asarray(angle))
+                placed[body] = (at(other) - as_complex(mechanism.at(own)) * turn, angle)
+    found = []
+    for one in loops.forest.coordinates:
         origin, angle = placed[one.body]
-        centre = origin + complex(*bodies[one.body].center) * complex(
-            math.cos(angle), math.sin(angle)
-        )
-        q[k] = {"x": centre.real, "y": centre.imag, "angle": angle}[one.kind]
-    return q
+        centre = origin + as_complex(bodies[one.body].center) * np.exp(1j * np.asarray(angle))
+        found.append({"x": centre.real, "y": centre.imag, "angle": angle}[one.kind])
+    return np.array(np.broadcast_arrays(*found), float)
 
 
-def check_rank(loops: Loops, jacobian: Array, rows: Array, time: float) -> float:
+def check_rank(loops: Loops, jacobian: Array, rows: Booleans, time: float) -> float:
     """Smallest singular value of the constraints' Jacobian (rows, n), rows scaled to 1, of those that `rows` picks.
 
     Raises
@@ -176,34 +244,36 @@ def check_rank(loops: Loops, jacobian: Array, rows: Array, time: float) -> float
         If they depend on one another.
     """
     scaled = (jacobian * loops.scales)[rows]
-    if not len(scaled):
-        return 1.0
-    scaled = scaled / np.linalg.norm(scaled, axis=1)[:, None].clip(1e-300)
-    left, sizes, _ = np.linalg.svd(scaled, full_matrices=True)
-    smallest = float(sizes[-1]) if len(scaled) <= loops.size else 0.0
+    smallest = float(_smallest(scaled, loops.size))
     if smallest > SINGULAR:
         return smallest
-    share = np.abs(left[:, -1])
+    share = np.abs(np.linalg.svd(scaled / _sizes(scaled))[0][:, -1])
     owners = [owner for owner, taken in zip(loops.owners, rows, strict=True) if taken]
     named = [owner for owner, part in zip(owners, share, strict=True) if part > 0.1 * share.max()]
     joint = next((owner for owner in reversed(named) if owner.startswith("joints")), named[-1])
     raise InputError(
-        joint, smallest, f"holds nothing at {time:.4g} s that the others do not hold already: a dead centre "
-        "that the drives cannot pass, or a joint too many",
-        "Move the start angles away from it, change a length, or remove the joint that is too many",
+        joint, smallest, f"constrains nothing at {time:.4g} s that other joints do not constrain. It is a dead "
+        "centre that the drives cannot pass, or the joint is redundant",
+        "Move the start angles away from it, change a length, or remove the redundant joint",
     )  # fmt: skip
 
 
-def open_gaps(assembly: Assembly) -> dict[str, float]:
-    """How far journals stand off their bearings' centres at the start, m, by joint."""
-    state = assembly.loops.at(assembly.q, assembly.v, 0.0)
-    found: dict[str, float] = {}
-    for joint in assembly.loops.mechanism.joints:
-        if isinstance(joint, Clearance):
-            rows = [
-                r
-                for r, owner in enumerate(assembly.loops.owners)
-                if owner == f"joints.{joint.name}"
-            ]
-            found[joint.name] = float(np.hypot(*state.error[rows]))
+def check_ranks(loops: Loops, q: Array, v: Array, times: Array) -> Array:
+    """Smallest singular values (t,) of all constraints, as of `check_rank`, along a motion (n, t); errors as there."""
+    jacobians = loops.at(q, v, times).jacobian
+    found: Array = _smallest(jacobians * loops.scales, loops.size)
+    for k in np.flatnonzero(found <= SINGULAR)[:1]:
+        check_rank(loops, jacobians[k], np.ones(len(loops.owners), bool), float(times[k]))
+    return found
+
+
+def _sizes(rows: Array) -> Array:
+    return np.linalg.norm(rows, axis=-1)[..., None].clip(1e-300)
+
+
+def _smallest(rows: Array, n: int) -> Array:
+    """Smallest singular values (...) of constraints (..., rows, n), rows scaled to 1; 1 without any, 0 of too many."""
+    if not rows.shape[-2] or rows.shape[-2] > n:
+        return np.full(rows.shape[:-2], float(not rows.shape[-2]))
+    found: Array = np.asarray(np.linalg.svd(rows / _sizes(rows), compute_uv=False)[..., -1], float)
     return found

@@ -1,4 +1,4 @@
-"""A generated text as a module: a motion of all lanes that `rhs.motion_of` can compile and steppers call by its address.
+"""A generated text as a module: a motion of all lanes that `rhs.compiled_motion` can compile and steppers call by its address.
 
 The file stands beside Numba's cache, to be read; it is named by its content.
 """
@@ -9,7 +9,6 @@ from types import ModuleType
 from hpcclear.base.one_text import module_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.generator import Motion
-from hpcclear.dynamics.linkage.parts import Force, Torque, TorqueDrive
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
@@ -80,19 +79,10 @@ def _curves(motion: Motion) -> list[tuple[int, int, Angle]]:
 
     Tables that move bodies come first: the angle of loads may be theirs.
     """
-    if motion.curves:
-        return [
-            (row, 4 * at.CELLS * (row - at.CURVES), _looked_up_at(motion, name))
-            for name, row in motion.curves.items()
-        ]
-    mechanism = motion.forest.mechanism
-    tabulated = [
-        load for load in mechanism.loads if isinstance(load, (Force, Torque)) and load.table
+    return [
+        (row, 4 * at.CELLS * (row - at.CURVES), _looked_up_at(motion, name))
+        for name, row in motion.curves.items()
     ]
-    found = [(at.LOAD_VALUE, at.LOAD_TABLE)] if tabulated else []
-    if any(isinstance(drive, TorqueDrive) and drive.table for drive in mechanism.drives):
-        found.append((at.TORQUE_VALUE, at.TORQUE_TABLE))
-    return [(*one, motion.turned) for one in found]
 
 
 def _looked_up_at(motion: Motion, name: str) -> Angle:

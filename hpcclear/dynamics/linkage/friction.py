@@ -13,8 +13,7 @@ def ratio_of(effects, work, par, joint, sliding, normal, i, W):
     """
     row = joint.block + at.FRICTION_NUMBERS
     if effects.bristled is not None:
-        only_second = effects.crank_rod is None and effects.rod_slider is not None
-        number = joint.place - (1 if only_second else 0)
+        number = joint.place - effects.first
         deflection = work[(at.VS + number) * W + i]
         rate = effects.friction.deflection(par, row, sliding, normal, deflection, 0.0, i, W)
         work[(at.ACC + number) * W + i] = rate

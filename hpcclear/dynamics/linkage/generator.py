@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
-from hpcclear.dynamics.linkage.closing import Closing
+from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.guides import Guide, coupled
@@ -41,6 +41,7 @@ class On(NamedTuple):
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
     follow: str = ""  # a guided body, or body.point
+    objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
 
 
@@ -53,8 +54,6 @@ class Rows:
     accelerations: int = at.ACC
     rates: int = at.RATE_NOW
     time: int = at.STAGE_TIME
-    torque_value: int = at.TORQUE_VALUE
-    load_value: int = at.LOAD_VALUE
     holds: int | None = None  # first of the multipliers, where they are asked for
     parameters: Mapping[str, int] = field(default_factory=dict)
     free: int = 0
@@ -218,7 +217,7 @@ class _Generator:
         if isinstance(load, Spring):
             self._spring(load)
             return
-        turned = self._turned(load.name, self.rows.load_value) if load.table else ONE
+        turned = self._turned(load.name) if load.table else ONE
         if isinstance(load, Torque):
             moment = write.let(load.name, write.parameter(f"{load.name}_torque") * turned)
             self.balance.twists.append(Twist(load.body, moment))
@@ -234,11 +233,10 @@ class _Generator:
                 power = power + part * speed
         self.load_power = self.load_power + power
 
-    def _turned(self, name: str, row: int) -> Term:
-        """What the curve of a drive or load says at the stage; `row`: where it does not have one of its own."""
+    def _turned(self, name: str) -> Term:
+        """What the curve of a drive or load says at the stage."""
         turned = f"turned_{name}"
-        row = self.rows.curves.get(name, row)
-        self.writer.when_needed((turned,), f"{turned} = work[{row} * W + i]")
+        self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
 
     def _force(self, load: Force, axis: str, value: float) -> Term:
@@ -263,9 +261,7 @@ class _Generator:
         write = self.writer
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
-            torque = write.let(
-                drive.name, torque * self._turned(drive.name, self.rows.torque_value)
-            )
+            torque = write.let(drive.name, torque * self._turned(drive.name))
         if drive.no_load_speed is not None:
             speed = self.kinematics.spin(self.forest.frames[drive.body])
             fall = write.parameter(f"{drive.name}_fall") * speed
@@ -370,9 +366,9 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
-        if on.ledger or on.series or on.responses:
+        if on.ledger or on.series or on.responses or on.objective:
             moments = [self._moment(drive, found, torques) for drive in self._drives()]
-            if on.series or on.responses:
+            if on.series or on.responses or on.objective:
                 self._rate(at.DRIVE_MOMENT, moments[0])
         if on.ledger:
             power = ZERO
@@ -392,17 +388,27 @@ class _Generator:
                 loss = loss + bend.loss()
             self._rate(at.DISSIPATION, loss)
             self._rate(at.LOAD_POWER, self.load_power)
-        if "." in on.follow:
-            self._follow_point(found)
-        elif on.responses and on.follow:
-            k = self.number[Column("slide", on.follow)]
-            self._rate(at.FOLLOWED_ACCELERATION, found[k])
-            self._rate(at.FOLLOWED_SQUARE, found[k] * found[k])
+        if on.follow and (on.series or on.responses or on.objective):
+            self._follow(found)
+        if on.objective:
+            self._objective()
 
-    def _follow_point(self, found: dict[int, Term]) -> None:
-        """Acceleration of the followed point along both axes, and its square."""
-        if not (self.on.series or self.on.responses):
-            return
+    def _objective(self) -> None:
+        """Calls of the objective's rate, which reads the rates that were written before."""
+        kin, body = self.kinematics, self.mechanism.period.body
+        frame = self.forest.frames[body]
+        terms = (*kin.rotated(frame, kin.offset(body)), kin.spin(frame))
+        drive = ", ".join(map(self.writer.text, terms))
+        whole = self.on.objective == "whole"
+        for k in range(1 if whole else len(self.mechanism.clearances)):
+            row = self.rows.rates + at.OBJECTIVE_RATES
+            joint = "None" if whole else f"joints[{k}]"
+            where = f"{row}" if whole else f"({self.rows.rates} + joints[{k}].objective_rate)"
+            call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
+            self.writer.line(f"work[{where} * W + i] = {call}")
+
+    def _follow(self, found: dict[int, Term]) -> None:
+        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
 
         def second(column: Column) -> Term:
             term = found[self.number[column]] if column in self.number else ZERO
@@ -410,12 +416,21 @@ class _Generator:
                 return term - self.writer.parameter("gravity")
             return term
 
-        kin = self.kinematics
+        kin, follow = self.kinematics, self.on.follow
+        if "." not in follow:
+            if (k := self.number.get(Column("slide", follow))) is not None:
+                along = found[k]
+            else:
+                guide = _guide_of(self.mechanism, follow)
+                moved = kin.acceleration(kin.point(guide.point), second)
+                along = self.writer.let("followed", dot(moved, self.closing.direction(guide)))
+            self._rate(at.FOLLOWED_ACCELERATION, along)
+            if self.on.responses:
+                self._rate(at.FOLLOWED_SQUARE, along * along)
+            return
         x, y = (
             self.writer.let(f"followed_{axis}", term)
-            for axis, term in zip(
-                "xy", kin.acceleration(kin.point(self.on.follow), second), strict=True
-            )
+            for axis, term in zip("xy", kin.acceleration(kin.point(follow), second), strict=True)
         )
         self._rate(at.FOLLOWED_ACCELERATION, x)
         self._rate(at.FOLLOWED_ACROSS, y)
@@ -451,3 +466,9 @@ class _Generator:
 
 def _rubbing(mechanism: Mechanism) -> list[Slide]:
     return [j for j in mechanism.joints if isinstance(j, Slide) and j.friction is not None]
+
+
+def _guide_of(mechanism: Mechanism, body: str) -> Slide:
+    """The guide that a body's place moves along."""
+    guides = [joint for joint in mechanism.joints if isinstance(joint, Slide)]
+    return next(joint for joint in guides if split(joint.point)[0] == body)

@@ -1,6 +1,6 @@
 """A linkage as the kernel takes it: where its parameters stand, its texts in these rows, and their values."""
 
-import dataclasses
+from collections.abc import Mapping
 from functools import cached_property
 from types import ModuleType
 from typing import Any
@@ -13,6 +13,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
+from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import TableDrive
@@ -36,8 +37,12 @@ class Linkage:
         Whether surfaces of joints with clearance are out of round.
     follow : str
         A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
+    objective : str
+        The objective's own rate: "joints", or "whole" of the mechanism; "" for none.
     bristled : bool
         Whether friction in the joints with clearance has bristles, whose coordinates come before the mechanism's.
+    places : tuple of int, optional
+        Places of the joints with clearance among the kernel's, one behind the other; from the first on by default.
 
     Raises
     ------
@@ -47,12 +52,15 @@ class Linkage:
 
     def __init__(
         self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = "",
-        bristled: bool = False, waves: bool = False,
+        objective: str = "", bristled: bool = False, waves: bool = False, places: tuple[int, ...] | None = None,
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
         self._bristles = len(mechanism.clearances) if bristled else 0
         self.cartesian, self.follow = cartesian, follow
-        self._on = On(friction=friction, gravity=gravity, follow=follow, waves=waves)
+        self.places = tuple(range(len(mechanism.clearances))) if places is None else places
+        self._on = On(
+            friction=friction, gravity=gravity, follow=follow, objective=objective, waves=waves
+        )
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
@@ -77,8 +85,8 @@ class Linkage:
         if self._free > at.WAVES:
             raise InputError(
                 "mechanism.bodies", len(mechanism.bodies),
-                f"need {self._free - at.OWN} parameters, and there is room for {at.WAVES - at.OWN}",
-                "Take fewer bodies or points",
+                f"need {self._free - at.OWN} parameters, more than {at.WAVES - at.OWN}",
+                "Use fewer bodies or points",
             )  # fmt: skip
 
     def _text(self, on: On) -> Motion:
@@ -100,10 +108,20 @@ class Linkage:
         """Its trees and coordinates."""
         return forest(self.mechanism, self.cartesian)
 
+    @cached_property
+    def loops(self) -> Loops:
+        """The constraints of its Cartesian bodies."""
+        return Loops(self.mechanism)
+
     @property
     def follows_a_point(self) -> bool:
         """Whether it is a point that responses tell of."""
         return "." in self.follow
+
+    @property
+    def rows(self) -> Mapping[str, int]:
+        """Rows of the parameters of its own, by their names in its texts."""
+        return self._given
 
     @property
     def parameter_rows(self) -> int:
@@ -130,7 +148,7 @@ class Linkage:
         on = self._on._replace(
             ledger=bool(effects.ledger), series=bool(effects.series), responses=bool(effects.responses)
         )  # fmt: skip
-        return module_with(self._text(on), at.JOINTS[: len(self.mechanism.clearances)])
+        return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
 
     def fill(
         self, par: Array, sample: Mechanism, gravity: Any, feedback: tuple[float, float]
@@ -202,11 +220,3 @@ def _curves_of(part: object) -> list[str]:
     if isinstance(part, TableDrive):
         return [f"{part.name}.{one}" for one in PARTS]
     return [part.name] if getattr(part, "table", False) else []  # type: ignore[attr-defined]
-
-
-def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
-    """A mechanism with other numbers, arrays among them, which its checks are not made for."""
-    made = object.__new__(Mechanism)
-    for field in dataclasses.fields(Mechanism):
-        object.__setattr__(made, field.name, tables.get(field.name, getattr(mechanism, field.name)))
-    return made

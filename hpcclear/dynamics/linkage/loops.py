@@ -3,8 +3,8 @@
 The terms are those of `closing.Closing`, evaluated by Python or, for many instants at once, by numpy.
 """
 
-import math
 from collections.abc import Callable
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,7 +98,7 @@ class Loops:
         self._evaluate = names["closed"]
         self._rows = {name: writer.rows[name] for name in writer.read}
         self.take(values(mechanism, cartesian=not trees))
-        self.length = length = typical_length(mechanism)
+        self.length = length = float(typical_length(mechanism))
         self.scales = np.array([1.0 if c.kind == "angle" else length for c in columns])
         self.row_scales = np.where(angles, 1.0, length)
 
@@ -117,11 +117,12 @@ class Loops:
         return State(error, rate, jacobian)
 
 
-def typical_length(mechanism: Mechanism) -> float:
-    """The largest distance between points of a body, or of the ground, m."""
+def typical_length(mechanism: Mechanism) -> Any:
+    """The largest distance between points of a body, or of the ground, m; of samples, (m,)."""
     groups = [list(mechanism.ground.values())]
     groups += [[*body.points.values(), body.center] for body in mechanism.bodies]
-    return (
-        max((math.dist(a, b) for points in groups for a in points for b in points), default=0.0)
-        or 1.0
-    )
+    largest: Any = 0.0
+    for points in groups:
+        for a, b in combinations(points, 2):
+            largest = np.maximum(largest, np.hypot(a[0] - b[0], a[1] - b[1]))
+    return np.where(largest > 0.0, largest, 1.0)[()]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from hpcclear.base.errors import InputError
@@ -82,12 +82,20 @@ class Mechanism:
         return next((drive for drive in self.drives if drive.body == body), None)
 
 
+def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
+    """A mechanism with other numbers, arrays among them, which its checks are not made for."""
+    made = object.__new__(Mechanism)
+    for one in fields(Mechanism):
+        object.__setattr__(made, one.name, tables.get(one.name, getattr(mechanism, one.name)))
+    return made
+
+
 def straight(mechanism: Mechanism) -> Mechanism:
     """The same of rigid bodies alone."""
     if all(body.bending is None for body in mechanism.bodies):
         return mechanism
     bodies = tuple(replace(body, bending=None) for body in mechanism.bodies)
-    return replace(mechanism, bodies=bodies)
+    return with_numbers(mechanism, bodies=bodies)
 
 
 def modes_of(mechanism: Mechanism) -> int:
@@ -118,14 +126,14 @@ def _names(m: Mechanism) -> None:
     for key, one in _records(m):
         if not _NAME.fullmatch(one.name) or one.name == GROUND:
             raise InputError(
-                key, one.name, "is no name here", "Use letters, digits and _, and not 'ground'"
+                key, one.name, "is not a valid name", "Use letters, digits and _, and not 'ground'"
             )
         if key in seen:
-            raise InputError(key, one.name, "stands there twice", "Give each a name of its own")
+            raise InputError(key, one.name, "is used twice", "Give each a name of its own")
         seen.add(key)
         if "center" in getattr(one, "points", ()):
             raise InputError(
-                f"{key}.points.center", one.points["center"], "is the mass centre's name",
+                f"{key}.points.center", one.points["center"], "is reserved for the mass centre",
                 "Give the point another name",
             )  # fmt: skip
     if not m.bodies:
@@ -152,7 +160,7 @@ def _places(m: Mechanism) -> None:
         acted_on = getattr(one, "body", None)
         if acted_on is not None and acted_on not in known.keys() - {GROUND}:
             raise InputError(
-                f"{key}.body", acted_on, "there is no such body to act on",
+                f"{key}.body", acted_on, "there is no such moving body",
                 f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
             )  # fmt: skip
     for joint in m.joints:
@@ -163,12 +171,12 @@ def _places(m: Mechanism) -> None:
             )
         if isinstance(joint, Fixed) and second != GROUND:
             raise InputError(
-                f"joints.{joint.name}.line", joint.line, "a body is held on the ground only",
+                f"joints.{joint.name}.line", joint.line, "a body can be fixed to the ground only",
                 "Name a point of the ground, or make one body of the two",
             )  # fmt: skip
         if isinstance(joint, Slide) and first == GROUND:
             raise InputError(
-                f"joints.{joint.name}.point", joint.point, "the ground does not slide",
+                f"joints.{joint.name}.point", joint.point, "the ground cannot be the sliding body",
                 "Swap point and line",
             )  # fmt: skip
 
@@ -179,12 +187,12 @@ def _numbers(m: Mechanism) -> None:
     for body in m.bodies:
         if not body.mass > 0:
             raise InputError(
-                f"bodies.{body.name}.mass", body.mass, "a body that moves has a mass",
+                f"bodies.{body.name}.mass", body.mass, "a moving body needs a mass",
                 "Write its mass in kg",
             )  # fmt: skip
         if body.inertia < 0 or (body.inertia == 0 and body.name in turns):
             raise InputError(
-                f"bodies.{body.name}.inertia", body.inertia, "a body that turns has an inertia",
+                f"bodies.{body.name}.inertia", body.inertia, "a rotating body needs an inertia",
                 "Write the moment of inertia about its mass centre in kg m2",
             )  # fmt: skip
     positive = {
@@ -201,7 +209,7 @@ def _numbers(m: Mechanism) -> None:
         for entry in ("speed", "initial_speed", "amplitude"):
             if getattr(one, entry, 1.0) == 0 and expected is None:
                 raise InputError(
-                    f"{key}.{entry}", 0.0, "nothing would turn", "Write a speed or amplitude"
+                    f"{key}.{entry}", 0.0, "there would be no motion", "Write a speed or amplitude"
                 )
     for joint in m.clearances:
         if joint.clearance >= joint.bearing_radius:
@@ -246,8 +254,8 @@ def _drives(m: Mechanism) -> None:
         group = next(k for k, names in enumerate(groups) if drive.body in names)
         if GROUND in groups[group]:
             raise InputError(
-                f"drives.{drive.name}.body", drive.body, "this body cannot turn, its guide holds it",
-                "Drive a body on a pin",
+                f"drives.{drive.name}.body", drive.body, "this body cannot rotate, since it is on a prismatic joint",
+                "Drive a body on a revolute joint",
             )  # fmt: skip
         if group in driven:
             raise InputError(
@@ -263,15 +271,15 @@ def _one_period(m: Mechanism) -> None:
     named = [drive for drive in m.drives if drive.period]
     if len(named) > 1:
         raise InputError(
-            f"drives.{named[1].name}.period", True, f"{named[0].name!r} gives the period already",
+            f"drives.{named[1].name}.period", True, f"{named[0].name!r} defines the period already",
             "Leave period = true with one drive",
         )  # fmt: skip
     main = m.period
     for drive in m.drives:
         if drive is not main and isinstance(drive, TableDrive) and drive.advance:
             raise InputError(
-                f"drives.{drive.name}.angle", drive.advance, "goes round, and another drive gives the period",
-                "Let it end at the angle where it began, or set period = true here",
+                f"drives.{drive.name}.angle", drive.advance, "goes round by full turns, but another drive defines the period",
+                "End it at the angle where it began, or set period = true here",
             )  # fmt: skip
         if drive is main or not (drive.prescribed and main.prescribed):
             continue
@@ -280,7 +288,7 @@ def _one_period(m: Mechanism) -> None:
             raise InputError(
                 f"drives.{drive.name}", drive.seconds,
                 f"does not repeat within the period of {main.name!r} ({main.seconds:g} s)",
-                "Make the longest one the period, and the others whole parts of it",
+                "Make the longest one the period, and the others whole fractions of it",
             )  # fmt: skip
 
 
@@ -296,7 +304,7 @@ def _sizes(m: Mechanism) -> None:
     if free < 0:
         last = m.ideal[-1].name if m.ideal else m.drives[-1].name
         raise InputError(
-            f"joints.{last}", -free, "more is held than can move: ideal joints and drives take away "
+            f"joints.{last}", -free, "the mechanism is overconstrained: ideal joints and drives remove "
             f"{-free} too many degrees of freedom",
             "Give a joint clearance, remove one, or remove a drive",
         )  # fmt: skip

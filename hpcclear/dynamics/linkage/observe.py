@@ -17,7 +17,7 @@ def observe(
 ) -> None:  # fmt: skip
     """Fill `out` (instants, n + RATES) with accelerations and rates.
 
-    `motion`: address of a motion of so many lanes (`rhs.motion_of`); `states` (instants, 2 n): coordinates, then velocities;
+    `motion`: address of a motion of so many lanes; `states` (instants, 2 n): coordinates, then velocities;
     `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times` (instants,): since the start of the revolution;
     `tables`: as `Problem.tables`.
     """

@@ -252,3 +252,9 @@ def split(place: str) -> tuple[str, str]:
     """Body and point of a place."""
     body, _, point = place.partition(".")
     return body, point
+
+
+def as_complex(pair: Any) -> Any:
+    """x + iy of a pair, of numbers or of arrays of samples."""
+    x, y = pair
+    return x + 1j * y

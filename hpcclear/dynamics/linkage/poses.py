@@ -1,6 +1,5 @@
 """Where all bodies of a linkage are, and how fast they move, from the coordinates that are integrated; and the way back."""
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import WORDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Pair, Slide, split
+from hpcclear.dynamics.linkage.parts import GROUND, Slide, as_complex, split
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -101,11 +100,11 @@ def _needed(kin: Kinematics, frame: str) -> Term:
 
 
 def coordinates(forest: Forest, assembly: Assembly) -> tuple[Array, Array]:
-    """Coordinates and velocities (n,) of a forest, of a linkage put together.
+    """Coordinates and velocities (n,) of a forest, of a linkage put together; (n, m) of samples.
 
     Journals stand where the assembly has them; a coordinate along a guide is read off the poses of both bodies.
     """
-    q, v = np.zeros((2, len(forest.coordinates)))
+    q, v = np.zeros((2, len(forest.coordinates), *assembly.q.shape[1:]))
     for k, one in enumerate(forest.coordinates):
         if one.kind == "slide":
             q[k], v[k] = _along(forest, assembly, one.body)
@@ -114,14 +113,14 @@ def coordinates(forest: Forest, assembly: Assembly) -> tuple[Array, Array]:
     return q, v
 
 
-def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[float, float]:
+def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Any, Any]:
     """How far a body has come along its guide, m, and how fast it moves."""
     hang = forest.hangs[body]
     assert isinstance(hang.joint, Slide)
     own, own_speed, _, _ = placed(assembly, hang.own)
     base, base_speed, _, _ = placed(assembly, hang.parent)
     _, _, angle, spin = placed(assembly, hang.joint.point)
-    along = complex(math.cos(angle), math.sin(angle))
+    along = np.exp(1j * np.asarray(angle))
     if hang.own != hang.joint.point:
         along = -along
     offset, rate = own - base, own_speed - base_speed
@@ -132,29 +131,23 @@ def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[float, float]
     )
 
 
-def placed(assembly: Assembly, place: str) -> tuple[complex, complex, float, float]:
-    """Position and velocity of a place of an assembly, angle and angular velocity of its body."""
+def placed(assembly: Assembly, place: str) -> tuple[Any, Any, Any, Any]:
+    """Position and velocity (complex) of a place of an assembly, angle and angular velocity of its body."""
     mechanism: Mechanism = assembly.loops.mechanism
     name, point = split(place)
     if name == GROUND:
-        return complex(*mechanism.ground[point]), 0j, 0.0, 0.0
+        return as_complex(mechanism.ground[point]), 0j, 0.0, 0.0
     body, forest = mechanism.body(name), assembly.loops.forest
+    places = {**body.points, CENTER: body.center}
+    here = as_complex(places[point])
     hang = forest.hangs[name]
     if hang.joint is not None:  # held on the ground
         angle = forest.offsets[name]
-        turn = complex(math.cos(angle), math.sin(angle))
         at_rest = placed(assembly, hang.parent)[0]
-        own = split(hang.own)[1]
-        return at_rest + turn * (_arm(body.points, point) - _arm(body.points, own)), 0j, angle, 0.0
-    x, y, angle_index = (forest.index(kind, name) for kind in ("x", "y", "angle"))
+        own = as_complex(places[split(hang.own)[1]])
+        return at_rest + np.exp(1j * np.asarray(angle)) * (here - own), 0j, angle, 0.0
+    x, y, turns = (forest.index(kind, name) for kind in ("x", "y", "angle"))
     q, v = assembly.q, assembly.v
-    angle = 0.0 if angle_index is None else float(q[angle_index])
-    spin = 0.0 if angle_index is None else float(v[angle_index])
-    centre = complex(*body.center)
-    offset = 0j if point == CENTER else _arm(body.points, point) - centre
-    turned = offset * complex(math.cos(angle), math.sin(angle))
-    return complex(q[x], q[y]) + turned, complex(v[x], v[y]) + 1j * spin * turned, angle, spin
-
-
-def _arm(points: Mapping[str, Pair], name: str) -> complex:
-    return complex(*points[name])
+    angle, spin = (0.0, 0.0) if turns is None else (q[turns], v[turns])
+    turned = (here - as_complex(body.center)) * np.exp(1j * np.asarray(angle))
+    return q[x] + 1j * q[y] + turned, v[x] + 1j * v[y] + 1j * spin * turned, angle, spin

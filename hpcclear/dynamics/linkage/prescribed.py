@@ -15,7 +15,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_rank
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import WORDS, Loops
@@ -53,6 +53,12 @@ class Prescribed:
     margin: Array
     """Shape (t,): smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
 
+    def taken(self, which: slice) -> "Prescribed":
+        """The same at some of the instants."""
+        parts = ("times", "q", "v", "a", "power", "loss", "load_power", "margin")
+        holds = {name: values[which] for name, values in self.holds.items()}
+        return replace(self, holds=holds, **{name: getattr(self, name)[which] for name in parts})
+
 
 def prescribed_motion(
     mechanism: Mechanism,
@@ -61,7 +67,7 @@ def prescribed_motion(
     curves: Mapping[str, Callable[[Array], Array]] | None = None,
 ) -> Prescribed:
     """Motion and reactions at instants (t,), s, which rise from 0; `curves`: tabulated loads by name, each as a function of the
-    angle (t,) of the body that gives the period, rad.
+    angle (t,) of the body that gives the period, rad; 1 for those left out.
 
     Raises
     ------
@@ -70,8 +76,8 @@ def prescribed_motion(
     """
     if mechanism.clearances or freedom(mechanism):
         raise InputError(
-            "drives", freedom(mechanism), "something is left free: the drives do not prescribe the motion",
-            "Prescribe the angle of one body a degree of freedom, and give no joint clearance",
+            "drives", freedom(mechanism), "the motion is not prescribed: degrees of freedom are left free",
+            "Prescribe one angle for each degree of freedom, and make all joints ideal",
         )  # fmt: skip
     assembly, times = assemble(mechanism), np.asarray(times, float)
     rounds = math.ceil(times.max(initial=0.0) / mechanism.period.seconds)
@@ -103,10 +109,8 @@ def _diverges(assembly: Assembly, passage: Passage, change: Node, gravity: float
     far = np.linspace(0.1, 1.0, 10) * min(change.time, passage.unit)
     sides = change.time + np.concatenate([-near, near])
     times = np.concatenate([sides, change.time - far])
-    tables = [load.name for load in assembly.loops.mechanism.loads if getattr(load, "table", False)]
     rows = cartesian(assembly, passage, *passage.at(times), times)
-    ones = dict.fromkeys(tables, np.ones_like)
-    held = _reactions(assembly, times, rows, gravity, np.zeros(len(times)), ones).holds
+    held = _reactions(assembly, times, rows, gravity, np.zeros(len(times)), {}).holds
     sizes = [assembly.loops.length if name.endswith("_angle") else 1.0 for name in held]
     force = np.array(list(held.values())) / np.array(sizes)[:, None]
     wide, close = 0.5 * (force[:, 2:4] - force[:, :2]).T
@@ -234,11 +238,8 @@ def _motion(
     """Motion and reactions at instants (t,)."""
     shown, filled = _beside(passage, times)
     rows = cartesian(assembly, passage, *passage.at(shown), shown)
-    everything = np.ones(len(assembly.loops.owners), bool)
-    margin = np.array([
-        check_rank(assembly.loops, assembly.loops.at(q, v, time).jacobian, everything, time)
-        for (q, v), time in zip(rows, shown, strict=True)
-    ])  # fmt: skip
+    q, v = np.moveaxis(rows, 0, -1)
+    margin = check_ranks(assembly.loops, q, v, shown)
     found = _reactions(assembly, shown, rows, gravity, margin, curves)
     holds = {name: filled(value) for name, value in found.holds.items()}
     parts = (found.q, found.v, found.a, found.power, found.loss, found.load_power, found.margin)
@@ -258,21 +259,19 @@ def _reactions(
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
     holds = 3 * n + 1
     rates = holds + len(assembly.loops.owners)
-    curves = {name: rates + at.RATES + 2 + k for k, name in enumerate(tabulated)}
-    rows = Rows(
-        0, n, 2 * n, rates, 3 * n, rates + at.RATES, rates + at.RATES + 1, holds, curves=curves
-    )
+    tabled = [load.name for load in mechanism.loads if getattr(load, "table", False)]
+    curves = {name: rates + at.RATES + k for k, name in enumerate(tabled)}
+    rows = Rows(0, n, 2 * n, rates, 3 * n, holds, curves=curves)
     on = On(gravity=gravity != 0.0, ledger=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
     names: dict[str, Any] = WORDS | words_of(mechanism)
     exec(text.source, names)
-    work = np.zeros((rates + at.RATES + 2 + len(curves), len(times)))
+    work = np.zeros((rates + at.RATES + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times
-    work[rates + at.RATES :] = 1.0
     turned = assembly.loops.forest.index("angle", mechanism.period.body)
     assert turned is not None  # every body turns by itself here
     for name, row in curves.items():
-        work[row] = tabulated[name](work[turned])
+        work[row] = tabulated.get(name, np.ones_like)(work[turned])
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     names["lane"](None, (), work, par, 0, 1)
     from_row = {name: work[holds + r] for r, name in enumerate(text.constraints)}

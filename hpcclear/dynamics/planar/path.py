@@ -14,7 +14,7 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.linkage.poses import placed
 from hpcclear.dynamics.linkage.prescribed import passed_through
-from hpcclear.dynamics.planar.problem import linkage_of, tables_of
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.turning import without_play
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -42,7 +42,7 @@ def followed(
     play : bool
         Whether there is any, or no path is off.
     """
-    place, mechanism = tables_of(scene).followed, linkage_of(scene).mechanism
+    place, mechanism = scene.linkage.followed, linkage_of(scene).mechanism
     if place is None:
         return {}
     names = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
@@ -55,7 +55,7 @@ def followed(
     }
     path = _path_of(scene) if play else None
     if path is not None:
-        cycle = at.TURN * turns_of(tables_of(scene))
+        cycle = at.TURN * turns_of(scene.linkage)
         ideal = path(np.mod(phase, cycle) / cycle)
         found["path_error"] = np.abs(x + 1j * y - ideal)
     return found
@@ -63,7 +63,7 @@ def followed(
 
 @lru_cache(maxsize=16)
 def _path_of(scene: Scene) -> Path | None:
-    place = tables_of(scene).followed
+    place = scene.linkage.followed
     return None if place is None else ideal_path(linkage_of(scene).mechanism, place)
 
 

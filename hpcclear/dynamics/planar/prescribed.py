@@ -1,67 +1,115 @@
-"""Linkages without clearance whose drives prescribe everything: time series and outcomes, nothing integrated."""
+"""Linkages without clearance whose drives prescribe everything: time series and extremes, nothing integrated."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.curves import curve_at
+from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Revolute, split
+from hpcclear.dynamics.linkage.parts import Revolute, Slide, split
 from hpcclear.dynamics.linkage.poses import Poses
-from hpcclear.dynamics.linkage.prescribed import prescribed_motion
-from hpcclear.dynamics.planar.path import followed, rigid_acceleration
-from hpcclear.dynamics.planar.problem import linkage_of, period_of, tables_of
-from hpcclear.dynamics.planar.response import bodies_and_points, driven
-from hpcclear.dynamics.planar.tables import curves_of
+from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
+from hpcclear.dynamics.planar.path import rigid_acceleration
+from hpcclear.dynamics.planar.problem import linkage_of, period_of, scene_of
+from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved
+from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.planar.turning import passage
-from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
+from hpcclear.scene.points import Points
+
+PER_REVOLUTION = 720
+"""Instants of a revolution, where no number of them is asked for."""
+
+_NODES, _WEIGHTS = (
+    0.5 * (np.polynomial.legendre.leggauss(5)[0] + 1.0),
+    0.5 * np.polynomial.legendre.leggauss(5)[1],
+)  # on [0, 1]
+
+OF_CONTACTS = (
+    "eccentricity_x", "eccentricity_y", "penetration", "contact_force", "friction_force"
+)  # fmt: skip
+"""Series of joints with clearance."""
 
 
-def outcomes(problem: Problem, par: Array) -> Array:
-    """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, no contact; what only a motion tells is NaN."""
-    rows = np.zeros((len(par), at.OUT))
-    revolutions = problem.transient + problem.averaged
-    rows[:, at.OUT_SPREAD] = 0.0 if problem.averaged > 1 else np.nan
-    rows[:, at.OUT_REVOLUTIONS] = revolutions
-    rows[:, at.OUT_TIME] = revolutions * par[:, at.PERIOD]
-    rows[:, [at.OUT_MOMENT, at.OUT_ACCELERATION]] = np.nan
-    return rows
+def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
+    """Largest moment of the drive (N m), deviation of the followed acceleration (m/s2) and its largest size, of samples (m, 3).
+
+    NaN of those that do not turn, and where nothing is followed.
+    """
+    found = np.full((count, 3), np.nan)
+    for row in range(count):
+        one = scene if points is None else scene_of(scene, points, row)
+        try:
+            mechanism = mechanism_of(one.linkage)
+            times = np.linspace(0.0, mechanism.period.seconds, PER_REVOLUTION, endpoint=False)
+            held = prescribed_motion(mechanism, times, one.effects.gravity, _curves(one))
+        except InputError:
+            continue
+        moment = held.holds[f"{mechanism.period.name}_angle"]
+        acceleration = _followed_acceleration(linkage_of(one), held)
+        deviation = float(np.std(acceleration))
+        found[row] = np.abs(moment).max(), deviation, np.abs(acceleration).max()
+    return found
 
 
-def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
+def _curves(scene: Scene) -> dict[str, Any]:
+    """Tabulated loads by name, each as a function of the angle of the body that gives the period."""
+    turns, interpolation = turns_of(scene.linkage), scene.numerics.interpolation
+    return {
+        name: partial(curve_at, curve, turns=turns, interpolation=interpolation)
+        for name, curve in curves_of(scene.linkage).items()
+    }
+
+
+def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
+    """Acceleration of the followed point, x + iy, or of the guided body along its guide, (t,); NaN where none is followed."""
+    follow, mechanism, forest = (
+        linkage.follow,
+        held.assembly.loops.mechanism,
+        held.assembly.loops.forest,
+    )
+    if not follow:
+        return np.full(len(held.times), np.nan)
+    guides = [j for j in mechanism.joints if isinstance(j, Slide) and split(j.point)[0] == follow]
+    place = follow if "." in follow else guides[0].point
+    body = split(place)[0]
+    columns = [forest.index(kind, body) for kind in ("x", "y", "angle")]
+    still = np.zeros(len(held.times))
+    q, v, rows = (
+        np.array([still if column is None else motion[:, column] for column in columns])
+        for motion in (held.q, held.v, held.a)
+    )
+    found = rigid_acceleration(mechanism, place, rows, q[2] + forest.offsets[body], v[2])
+    return found if "." in follow else (found * np.exp(-1j * guides[0].angle)).real
+
+
+def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, Array]]:
     """Instants (t,) and the time series of a response; 720 a revolution where every step is asked for.
 
     ``pin_force_x`` and ``pin_force_y`` (t, pins) are the forces of the ideal pins on their journals' bodies. Works are
-    sums over the instants.
+    sums by Gauss's rule between the instants: with links nearly in line the powers peak sharply.
 
     They end before a dead centre, and before a change point at which the motion or the forces are not determined.
     """
-    mechanism, tables = linkage_of(scene).mechanism, tables_of(scene)
-    problem = problem_of(scene)
-    revolutions = problem.transient + problem.averaged
-    count = scene.output.instants_per_revolution or 720
-    from scipy.integrate import (
-        cumulative_simpson,
-    )  # a third of a second, for linkages without play only
-
+    mechanism, tables = mechanism_of(scene.linkage), scene.linkage
+    count = scene.output.instants_per_revolution or PER_REVOLUTION
     period, cycle = float(period_of(mechanism)), at.TURN * turns_of(tables)
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)
-    walk = passage(mechanism, scene.effects.gravity, revolutions)
+    gravity = scene.effects.gravity
+    walk = passage(mechanism, gravity, revolutions)
     times = times if walk is None else walk[1].passed(times)
     phase = cycle * times / period
-    gravity = scene.effects.gravity
-    turns, interpolation = turns_of(tables), scene.numerics.interpolation
-    curves = {
-        name: partial(curve_at, curve, turns=turns, interpolation=interpolation)
-        for name, curve in curves_of(tables).items()
-    }
-    found = prescribed_motion(mechanism, times, gravity, curves)
-    forest = found.assembly.loops.forest
-    poses = Poses(forest, {}, 0)
+    inside = (times[:-1, None] + np.diff(times)[:, None] * _NODES).ravel()
+    every = np.sort(np.concatenate([times, inside]))
+    dense = prescribed_motion(mechanism, every, gravity, _curves(scene))
+    found = dense.taken(slice(None, None, 1 + len(_NODES)))
+    poses = Poses(found.assembly.loops.forest, {}, 0)
     base = values(mechanism, cartesian=True, gravity=gravity)
     par = np.zeros(max(poses.rows.values(), default=0) + 1)
     for name, row in poses.rows.items():
@@ -74,26 +122,14 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
     kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
     potential = gravity * (mass * pose.y).sum(axis=0)
     driving, lost, load = (
-        cumulative_simpson(power, x=times, initial=0.0)
-        for power in (found.power, found.loss, found.load_power)
+        _work(power, times) for power in (dense.power, dense.loss, dense.load_power)
     )
     total = kinetic + potential
-    pins, places = pins_of(scene), bodies_and_points(mechanism, pose)
-    acceleration = np.zeros(len(times), complex)
-    if tables.followed is not None:
-        k = [body.name for body in mechanism.bodies].index(split(tables.followed)[0])
-        columns = [forest.index(kind, mechanism.bodies[k].name) for kind in ("x", "y", "angle")]
-        still = np.zeros(len(times))
-        rows = np.array([still if column is None else found.a[:, column] for column in columns])
-        acceleration = rigid_acceleration(
-            mechanism, tables.followed, rows, pose.angle[k], pose.spin[k]
-        )
+    places = bodies_and_points(mechanism, pose)
+    acceleration = np.nan_to_num(_followed_acceleration(linkage_of(scene), found))
     return times, {
-        **driven(mechanism, places, phase),
-        **places,
-        **followed(scene, phase, places, acceleration, play=False),
-        "pin_force_x": np.array([found.holds[f"{pin}_x"] for pin in pins]).T,
-        "pin_force_y": np.array([found.holds[f"{pin}_y"] for pin in pins]).T,
+        **moved(scene, mechanism, places, phase, acceleration, play=False),
+        **_reactions(scene, found),
         "crank_moment": found.holds[f"{mechanism.period.name}_angle"],
         "kinetic_energy": kinetic,
         "elastic_energy": np.zeros_like(times),
@@ -103,6 +139,29 @@ def prescribed_series(scene: Scene) -> tuple[Array, dict[str, Array]]:
         "dissipated_energy": lost,
         "energy_residual": total - total[0] - driving - load + lost,
     }
+
+
+def _work(power: Array, times: Array) -> Array:
+    """Work (t,) since the first of the instants (t,), of a power at these and at the nodes between them."""
+    between = np.append(power, np.zeros(len(_NODES))).reshape(len(times), -1)[:-1, 1:]
+    return np.concatenate([[0.0], np.cumsum(between @ _WEIGHTS * np.diff(times))])
+
+
+def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
+    """Forces of the pins (t, pins), or by the names of a template, which has columns of joints with clearance besides."""
+    holds = found.holds
+    if scene.template is None:
+        return {
+            f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins_of(scene)]).T
+            for axis in "xy"
+        }
+    parts = {
+        name: np.array([sign * holds[one] for one, sign in ones]).T
+        for name, ones in scene.template.HOLDS.items()
+    }
+    none = at_places(scene, np.zeros((len(found.times), 0)))
+    single = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
+    return dict.fromkeys(OF_CONTACTS, none) | single
 
 
 def pins_of(scene: Scene) -> tuple[str, ...]:

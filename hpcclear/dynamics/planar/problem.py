@@ -1,7 +1,8 @@
 """A scene's linkage as the kernel takes it: its texts and rows, parameters and starts of its samples."""
 
-import math
-from functools import lru_cache
+from dataclasses import replace
+from functools import lru_cache, reduce
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,13 @@ from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, TableDrive, TorqueDrive, split
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS
-from hpcclear.dynamics.linkage.poses import coordinates
+from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
-from hpcclear.dynamics.planar.turning import loops_of, refused, statuses
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.planar.turning import refused
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import Planar, turns_of
+from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
 
 PLACEHOLDER = 1e-3
@@ -35,12 +32,6 @@ NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius
 """Entries that no sample's start depends on."""
 
 
-def tables_of(scene: Scene) -> Planar:
-    """The tables of a scene that has a linkage."""
-    assert isinstance(scene.mechanism, Planar)
-    return scene.mechanism
-
-
 @lru_cache(maxsize=16)
 def linkage_of(scene: Scene) -> Linkage:
     """The structure of a scene's linkage.
@@ -50,12 +41,12 @@ def linkage_of(scene: Scene) -> Linkage:
     InputError
         If the tables make no mechanism, or its drives no period.
     """
-    zeros = [path for path in _varied(scene) if scene.number(path) == 0.0]
+    zeros = [path for path in _may_vary(scene) if scene.number(path) == 0.0]
     shown = scene.with_(dict.fromkeys(zeros, PLACEHOLDER)) if zeros else scene
-    mechanism = mechanism_of(tables_of(shown))
+    mechanism = mechanism_of(shown.linkage)
     check_drives(mechanism)
     cartesian = scene.numerics.formulation == "baumgarte"
-    follow = tables_of(scene).followed or guided(mechanism, cartesian)
+    follow = scene.linkage.followed or guided(mechanism)
     _check_followed(scene, follow)
     linkage = Linkage(
         mechanism,
@@ -63,8 +54,10 @@ def linkage_of(scene: Scene) -> Linkage:
         gravity=scene.effects.gravity > 0.0,
         friction=scene.effects.friction.law != "none" or bool(scene.films()),
         cartesian=cartesian,
+        objective=scene.objective.rate_of,
         bristled=scene.bristles > 0,
         waves=any(scene.waves().values()),
+        places=scene.open_places,
     )
     bristles.check_room(scene, len(linkage.forest.coordinates))
     return linkage
@@ -72,28 +65,34 @@ def linkage_of(scene: Scene) -> Linkage:
 
 def _check_followed(scene: Scene, follow: str) -> None:
     """InputError where the objective is of something that is not followed."""
-    name, point = scene.objective.name, "." in follow
-    if name == "slider-acceleration-deviation" and (point or not follow):
+    name, asks, point = scene.objective.name, scene.objective.asks, "." in follow
+    if "slider_acceleration_deviation" in asks and (point or not follow):
         raise InputError(
-            "study.objective", name,
-            "a point is followed here" if point else "no body slides along a line of the ground here",
-            'Take "point-acceleration-deviation"' if point else 'Take another one, say "peak-contact-force"',
+            scene.objective_key, name,
+            "this linkage has a followed point" if point else "no body of this linkage slides along a line of the ground",
+            'Use "point-acceleration-deviation"' if point else 'Use another one, such as "peak-contact-force"',
         )  # fmt: skip
-    if name in ("point-acceleration-deviation", "peak-point-acceleration") and not point:
+    if "acceleration_x" in asks and not follow:
         raise InputError(
-            "study.objective", name, "no point is followed",
+            scene.objective_key, name, "no body or point is followed, so there is no acceleration",
+            'Name a point: mechanism.followed = "body.point"',
+        )  # fmt: skip
+    of_points = {"point_acceleration_deviation", "peak_point_acceleration", "acceleration_y"}
+    if asks & of_points and not point:
+        raise InputError(
+            scene.objective_key, name, "no point is followed",
             'Name it: mechanism.followed = "body.point"',
         )  # fmt: skip
 
 
-def guided(mechanism: Mechanism, cartesian: bool) -> str:
-    """The first body whose place along a line of the ground is a coordinate: what stands for the slider; "" for none."""
-    for one in forest(mechanism, cartesian).coordinates:
-        if one.kind == "slide":
-            joint = next(joint for joint in mechanism.joints if joint.name == one.joint)
-            if split(joint.places[1])[0] == GROUND:
-                return one.body
-    return ""
+def guided(mechanism: Mechanism) -> str:
+    """The first body that a guide on the ground holds: what stands for the slider; "" for none."""
+    held = [
+        split(joint.point)[0]
+        for joint in mechanism.joints
+        if isinstance(joint, Slide) and split(joint.line)[0] == GROUND
+    ]
+    return next((body.name for body in mechanism.bodies if body.name in held), "")
 
 
 def check_drives(mechanism: Mechanism) -> None:
@@ -105,7 +104,7 @@ def check_drives(mechanism: Mechanism) -> None:
         if drive.prescribed:
             raise InputError(
                 f"mechanism.drives.{drive.name}.period", False,
-                f"prescribes an angle by time, while {main.name!r}, whose speed is free, gives the period",
+                f"prescribes an angle by time, but {main.name!r}, whose speed is free, defines the period",
                 "Set period = true here",
             )  # fmt: skip
 
@@ -114,7 +113,19 @@ def _varied(scene: Scene) -> set[str]:
     if scene.study is None:
         return set()
     rows = (*scene.study.variables, *scene.study.random)
-    return {path for row in rows for path in row.paths if path.startswith("mechanism.")}
+    return {path for row in rows for path in row.paths if _in_tables(scene, path)}
+
+
+def _in_tables(scene: Scene, path: str) -> bool:
+    return scene.path_in_linkage(path).startswith("mechanism.")
+
+
+def _may_vary(scene: Scene) -> set[str]:
+    """Entries that may be nought in the scene and not in a sample: what the study varies, and all that a template reads."""
+    if scene.template is None:
+        return _varied(scene)
+    found = {path for path in scene.numeric_paths() if _in_tables(scene, path)}
+    return {path for path in found if ".out_of_round." not in path}
 
 
 def is_prescribed(scene: Scene) -> bool:
@@ -127,14 +138,14 @@ def check_columns(scene: Scene, points: Points | None) -> None:
     """InputError where a column drives a number that is nought in the scene and not of its study."""
     if points is None:
         return
-    known = _varied(scene)
+    known = _may_vary(scene)
     for name, paths in zip(points.names, points.paths, strict=True):
         for path in paths:
             if ".out_of_round." in path:
                 continue  # noughts of a round surface may be varied
-            if path.startswith("mechanism.") and path not in known and scene.number(path) == 0.0:
+            if path not in known and _in_tables(scene, path) and scene.number(path) == 0.0:
                 raise InputError(
-                    name, 0.0, f"drives {path}, which is nought in this scene: nothing is there to be varied",
+                    name, 0.0, f"drives {path}, which is zero in this scene and cannot be varied",
                     "Give it a small value in the scene, or make it a variable of the study",
                 )  # fmt: skip
 
@@ -154,23 +165,25 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
     """Kernel parameters of each sample but for those of the joints, shape (samples, PARAMETERS)."""
     check_columns(scene, points)
     linkage = linkage_of(scene)
-    sample = linkage.mechanism
-    if points is not None or _varied(scene):
-        sample = with_columns(
-            tables_of(scene), sample, Points((), np.empty((1, 0)), ()) if points is None else points
-        )
+    sample = sample_of(scene, points)
     p = np.ones((get.size, linkage.parameter_rows))
     p[:, at.JOINT_BLOCKS : at.OWN] = 0.0
     period = period_of(sample)
-    turns = turns_of(tables_of(scene))
+    turns = turns_of(scene.linkage)
     p[:, at.PERIOD] = period
     p[:, at.SPEED] = at.TURN * turns / period
     p[:, at.FIRST_STEP] = 1e-3 * period / turns
     p[:, at.TURN_END] = start_of_turns(sample, linkage.cartesian) + at.TURN * turns
-    p[:, at.CRANK_LENGTH] = driven_length(linkage.mechanism)
+    p[:, at.DRIVEN_LENGTH] = driven_length(sample)
     n = scene.numerics
     linkage.fill(p, sample, get("effects.gravity"), (n.alpha, n.beta))
     return p
+
+
+def sample_of(scene: Scene, points: Points | None) -> Mechanism:
+    """The mechanisms of samples with the scene's structure; of the scene itself without points."""
+    points = Points((), np.empty((1, 0)), ()) if points is None else points
+    return with_columns(scene, linkage_of(scene).mechanism, points)
 
 
 def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
@@ -179,21 +192,28 @@ def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
     return mechanism.body(body).start_angle - forest(mechanism, cartesian).offsets[body]
 
 
-def driven_length(mechanism: Mechanism) -> float:
-    """The largest distance between points of the body that gives the period, m: how fast the mechanism is goes by it."""
+def driven_length(mechanism: Mechanism) -> Any:
+    """The largest distance between points of the body that gives the period, m, of samples (m,): how fast the mechanism is
+    goes by it."""
     body = mechanism.body(mechanism.period.body)
     places = [*body.points.values(), body.center]
-    return max((math.dist(a, b) for a in places for b in places), default=0.0) or 1.0
+    apart = (np.hypot(a[0] - b[0], a[1] - b[1]) for a, b in combinations(places, 2))
+    longest: Any = reduce(np.maximum, apart, np.float64(0.0))
+    return np.where(longest > 0.0, longest, 1.0)
 
 
 def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
-    """Absolute tolerances of coordinates, then velocities, as `problem.absolute_tolerances` has them."""
+    """Absolute tolerances of coordinates, then velocities: a, 10 a/m, 1000 a/s, 50000 a/(m s) with a for lengths.
+
+    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the driven body's points move
+    slower than 25 m/s the velocities' are less in proportion: what is small is set by the mechanism's own speed.
+    """
     if is_prescribed(scene):
         return ()
     linkage = linkage_of(scene)
     a = scene.numerics.absolute_tolerance
     angles = [one.kind == "angle" for one in linkage.forest.coordinates[scene.modes :]]
-    speed = at.TURN / float(period_of(linkage.mechanism)) * driven_length(linkage.mechanism)
+    speed = at.TURN / float(period_of(linkage.mechanism)) * float(driven_length(linkage.mechanism))
     rate = 1e3 * min(1.0, speed / 25.0)
     first, second = bristles.tolerances(scene, float(period_of(linkage.mechanism)))
     bent = bending.tolerances(linkage.mechanism, a, rate * a)
@@ -216,71 +236,16 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
     InputError
         If it cannot be put together.
     """
-    return refused(mechanism_of(tables_of(scene)), scene.effects.gravity, _rounds(scene))
+    return refused(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
 
 
-def _rounds(scene: Scene) -> int:
+def rounds_of(scene: Scene) -> int:
     """Revolutions that a linkage without clearance goes through."""
-    averaged = scene.numerics.averaged_revolutions
-    most: int = MOST_ROUNDS if averaged == "auto" else averaged  # type: ignore[assignment]
-    return scene.numerics.transient_revolutions + most
+    return scene.numerics.transient_revolutions + scene.numerics.averaged_revolutions
 
 
-def start_states_of(scene: Scene, par: Array, points: Points | None, walk: bool = True) -> Start:
-    """Start of each sample: put together with journals at their `start_eccentricity`, velocities of ideal joints.
-
-    Unless `walk` is off, a sample that does not close or cannot turn fails at the start (`Start.fail`).
-
-    Raises
-    ------
-    InputError
-        If the scene itself does not close.
-    """
-    linkage = linkage_of(scene)
-    trees = linkage.forest
-    first = scene.bristles  # which begin undeflected
-    n = len(trees.coordinates)
-    start = Start.at_rest(len(par))
-    places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
-    if points is None or not any(_moves_start(path) for paths in points.paths for path in paths):
-        made: Any = coordinates(trees, put_together(mechanism_of(tables_of(scene))))
-        places[:], speeds[:] = made
-        told = refused_of(scene) if walk else None
-        found = np.full(len(par), int(Status.OK if told is None else told[0]))
-    else:
-        bare = _without_study(scene)
-        samples = [_sample(bare, points, row) for row in range(len(par))]
-        for row, sample in enumerate(samples):
-            if sample is not None:
-                places[row], speeds[row] = coordinates(trees, sample[1])
-        numbers = with_columns(tables_of(scene), linkage.mechanism, points)
-        found = statuses(_twins(scene), numbers, samples, scene.effects.gravity, _rounds(scene))
-    _start_contacts(scene, linkage, par, start)
-    start.fail(found)
-    return start
-
-
-@lru_cache(maxsize=16)
-def _twins(scene: Scene) -> Loops | None:
-    return loops_of(linkage_of(scene).mechanism)
-
-
-@lru_cache(maxsize=16)
-def _without_study(scene: Scene) -> Scene:
-    """The scene of which those of samples are made in less than half the time."""
-    return scene if scene.study is None else scene.with_({"study": None})
-
-
-def _sample(scene: Scene, points: Points, row: int) -> tuple[Mechanism, Assembly] | None:
-    """One sample's mechanism, and it put together; None if it does not close."""
-    try:
-        mechanism = mechanism_of(tables_of(scene_of(scene, points, row)))
-        return mechanism, put_together(mechanism)
-    except InputError:
-        return None
-
-
-def _moves_start(path: str) -> bool:
+def moves_start(path: str) -> bool:
+    """Whether samples' starts may depend on an entry of the linkage's tables."""
     entry = path.split(".")[-1]
     shaped = path.startswith("mechanism.") and ".out_of_round." not in path
     return shaped and entry not in NOT_GEOMETRY
@@ -288,7 +253,7 @@ def _moves_start(path: str) -> bool:
 
 def varies_geometry(scene: Scene) -> bool:
     """Whether a study varies what samples' starts and passages depend on."""
-    return any(map(_moves_start, _varied(scene)))
+    return any(moves_start(scene.path_in_linkage(path)) for path in _varied(scene))
 
 
 def scene_of(scene: Scene, points: Points, row: int) -> Scene:
@@ -309,9 +274,18 @@ def put_together(mechanism: Mechanism) -> Assembly:
         ) from None
 
 
-def poses_at_start(scene: Scene) -> dict[str, tuple[float, float, float]]:
-    """Mass centre (x, y in m) and angle (rad) of each body of a linkage as it was put together."""
-    made = put_together(mechanism_of(tables_of(scene)))
+def poses_at_start(scene: Scene, turned: float = 0.0) -> dict[str, tuple[float, float, float]]:
+    """Mass centre (x, y in m) and angle (rad) of each body of a linkage as it was put together, its driven body `turned` by an
+    angle (rad)."""
+    mechanism = mechanism_of(scene.linkage)
+    if turned:
+        driven = mechanism.period.body
+        bodies = tuple(
+            replace(one, start_angle=one.start_angle + turned) if one.name == driven else one
+            for one in mechanism.bodies
+        )
+        mechanism = replace(mechanism, bodies=bodies)
+    made = put_together(mechanism)
     forest = made.loops.forest
     found = {}
     for body in made.loops.mechanism.bodies:
@@ -319,16 +293,3 @@ def poses_at_start(scene: Scene) -> dict[str, tuple[float, float, float]]:
         x, y, angle = (0.0 if row is None else float(made.q[row]) for row in rows)
         found[body.name] = (x, y, angle)
     return found
-
-
-def _start_contacts(scene: Scene, linkage: Linkage, par: Array, start: Start) -> None:
-    """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
-    law = scene.effects.contact
-    if law is None or not law.latched:
-        return
-    for k, joint in enumerate(linkage.mechanism.clearances):
-        table = next(row for row in tables_of(scene).joints if row.name == joint.name)
-        offset = table.start_eccentricity  # type: ignore[union-attr]
-        touching = np.hypot(offset.x, offset.y) >= Parameters(par).clearance[:, k]
-        start.active[:, k] = touching
-        start.inverse_impact[:, k] = touching / law.minimum_impact_speed

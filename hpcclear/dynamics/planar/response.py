@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.path import followed
-from hpcclear.dynamics.planar.problem import linkage_of, tables_of
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -39,10 +39,10 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     pose, eccentricity = linkage.poses.at(par, seen.q.T, seen.v.T, seen.turn_time)
     gravity = scene.effects.gravity
     kinetic, potential, _ = linkage.energies(par, seen.q.T, seen.v.T, seen.turn_time, gravity)
-    count = len(mechanism.clearances)
-    active = contacts_on(scene, seen.contacts, count)
-    gaps = seen.rates.gap[:, :count]
-    elastic = stored_energy(scene, par, gaps, active, range(count))
+    joints = list(scene.open_places)
+    active = contacts_on(scene, seen.contacts)
+    gaps = seen.rates.gap[:, joints]
+    elastic = stored_energy(scene, par, gaps, active, joints)
     bent = linkage.bent(par, seen.q.T, seen.v.T, pose)
     strain = sum((one.strain for one in bent.values()), np.zeros(len(seen.turn_time)))
     stored = (kinetic, elastic, potential - strain, strain)
@@ -51,19 +51,73 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
     gained = np.array([linkage.gained(body.name) for body in mechanism.bodies])
     places["body_angle"] = places["body_angle"] + gained * seen.revolution[:, None]
     acceleration = seen.rates.followed_x + 1j * seen.rates.followed_y
-    return {
-        **driven(mechanism, places, phase),
-        **places,
-        **followed(scene, phase, places, acceleration),
+    of_joints = {
         "eccentricity_x": eccentricity[:, 0].T,
         "eccentricity_y": eccentricity[:, 1].T,
         "penetration": np.maximum(gaps, 0.0) * active,
-        "contact_force": seen.rates.force[:, :count],
-        "friction_force": seen.rates.friction[:, :count],
+        "contact_force": seen.rates.force[:, joints],
+        "friction_force": seen.rates.friction[:, joints],
+    }
+    held = {}
+    if linkage.cartesian:
+        held["constraint_violation"] = violation(linkage, seen.q.T, seen.v.T, seen.turn_time)
+    return {
+        **moved(scene, mechanism, places, phase, acceleration),
+        **{name: at_places(scene, columns) for name, columns in of_joints.items()},
         "crank_moment": seen.rates.drive_moment,
         **balance_series(stored, seen.works),
         **mode_series(scene.modes, seen.q, seen.v, strain),
+        **held,
     }
+
+
+def at_places(scene: Scene, columns: Array) -> Array:
+    """Columns (t, open joints) at their places (t, joints), 0 at those of ideal ones."""
+    found = np.zeros((len(columns), len(scene.joint_labels)))
+    found[:, list(scene.open_places)] = columns
+    return found
+
+
+def moved(
+    scene: Scene, mechanism: Mechanism, places: Mapping[str, Array], phase: Array, acceleration: Array,
+    play: bool = True,
+) -> dict[str, Array]:  # fmt: skip
+    """Series of the drive, the bodies and the followed point; of a template's parts by the names that it has for them.
+
+    Parameters
+    ----------
+    scene : Scene
+    mechanism : Mechanism
+    places : dict
+        As `bodies_and_points` has them.
+    phase, acceleration : ndarray, shape (t,)
+        rad and m/s2, as `path.followed` takes them; the acceleration of a guided body is that along its guide.
+    play : bool
+        As `path.followed` takes it.
+    """
+    drive = driven(mechanism, places, phase)
+    if scene.template is None:
+        return {**drive, **places, **followed(scene, phase, places, acceleration, play)}
+    names = [body.name for body in mechanism.bodies]
+    return {
+        **{name: drive[name] for name in ("crank_angle", "crank_speed")},
+        **{
+            name: acceleration.real
+            if kind == "acceleration"
+            else places[kind][:, names.index(body)]
+            for name, (kind, body) in scene.template.SERIES.items()
+        },
+    }
+
+
+def violation(linkage: Linkage, q: Array, v: Array, time: Array) -> Array:
+    """What the constraints of Cartesian coordinates (n, t) are off by at most (t,), m: angles by the arc that they make at the
+    linkage's typical length; those of the drives are a matter of angles and left out."""
+    loops = linkage.loops
+    joints = [owner.startswith("joints.") for owner in loops.owners]
+    error = loops.at(q, v, time).error * (loops.length / loops.row_scales)[:, None]
+    found: Array = np.abs(error[joints]).max(axis=0, initial=0.0)
+    return found
 
 
 def balance_series(
@@ -99,10 +153,11 @@ def mode_series(modes: int, q: Array, v: Array, strain: Array) -> dict[str, Arra
     }
 
 
-def contacts_on(scene: Scene, contacts: Array, count: int) -> Array:
-    """Whether a penetration of each joint counts, (t, joints): under latched laws only while in contact."""
+def contacts_on(scene: Scene, contacts: Array) -> Array:
+    """Whether a penetration of each open joint counts, (t, joints): under latched laws only while in contact."""
     latched = scene.effects.contact is not None and scene.effects.contact.latched
-    return contacts[:, :count] if latched else np.ones((len(contacts), count))
+    joints = list(scene.open_places)
+    return contacts[:, joints] if latched else np.ones((len(contacts), len(joints)))
 
 
 def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> dict[str, Array]:
@@ -118,7 +173,7 @@ def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> d
 def _phase(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> Array:
     """Progress of the drive since the start (t,), 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
     named = Parameters(par)
-    cycle = at.TURN * turns_of(tables_of(scene))
+    cycle = at.TURN * turns_of(scene.linkage)
     if linkage.mechanism.period.prescribed:
         return cycle * (seen.revolution + seen.turn_time / named.period)
     return seen.q[:, -1] - (named.turn_end - cycle) + cycle * seen.revolution
@@ -150,8 +205,10 @@ def bodies_and_points(
     return found
 
 
-def labels(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
-    """Labels along the dimensions ``body`` and ``point``."""
+def labels(scene: Scene, mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """Labels along the dimensions ``body`` and ``point``; none where a template names the series."""
+    if scene.template is not None:
+        return {}
     return {
         "body": tuple(body.name for body in mechanism.bodies),
         "point": tuple(

@@ -1,6 +1,5 @@
-"""From tables of a planar linkage, or a scene's slider-crank, to the mechanism as data."""
+"""From the tables of a linkage to the mechanism as data."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,8 +9,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.curves import angle_cells
 from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, reduced_compliance
 from hpcclear.dynamics.linkage import parts
-from hpcclear.dynamics.linkage.linkage import with_numbers
-from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,
@@ -21,7 +19,7 @@ from hpcclear.scene.driving import (
     PlanarTorque,
     SpringLoad,
 )
-from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed, Material
+from hpcclear.scene.mechanism import Material
 from hpcclear.scene.planar import (
     Planar,
     PlanarBody,
@@ -30,22 +28,10 @@ from hpcclear.scene.planar import (
     PlanarSlide,
 )
 from hpcclear.scene.points import Points
-from hpcclear.scene.validation import validated
-
-
-def planar_mechanism(content: Mapping[str, Any]) -> Mechanism:
-    """The mechanism of the tables ``bodies``, ``ground``, ``joints``, ``drives`` and ``loads``.
-
-    Raises
-    ------
-    InputError
-        If an entry is wrong, or they make no mechanism; it names the entry, the joint, the body or the drive.
-    """
-    return Mechanism(**_tables(validated(Planar, content)))
 
 
 def mechanism_of(planar: Planar) -> Mechanism:
-    """The mechanism of a scene's tables; raises InputError as `planar_mechanism`, below ``mechanism``."""
+    """The mechanism of a scene's tables; InputError names the entry below ``mechanism``."""
     try:
         return Mechanism(**_tables(planar))
     except InputError as error:
@@ -54,11 +40,11 @@ def mechanism_of(planar: Planar) -> Mechanism:
         ) from None
 
 
-def with_columns(planar: Planar, structure: Mechanism, points: Points) -> Mechanism:
+def with_columns(scene: Scene, structure: Mechanism, points: Points) -> Mechanism:
     """The mechanisms of samples: numbers that columns of the points drive are arrays (m,)."""
-    tables: Any = planar
+    tables: Any = scene.linkage
     for k, paths in enumerate(points.paths):
-        for path in paths:
+        for path in map(scene.path_in_linkage, paths):
             if path.startswith("mechanism.") and ".out_of_round." not in path:
                 tables = _put(tables, path.split(".")[1:], points.values[:, k])
     return with_numbers(structure, **_tables(tables))
@@ -180,55 +166,3 @@ def curves_of(planar: Planar) -> dict[str, Any]:
         if isinstance(curve, tuple):
             found[row.name] = curve
     return found
-
-
-def slider_crank_mechanism(scene: Scene) -> Mechanism:
-    """A scene's slider-crank written out as bodies, joints, drive and loads; a table stands for a factor of 1."""
-    m, effects = scene.slider_crank, scene.effects
-    bodies = [
-        parts.Body(
-            name, link.mass, link.inertia, (link.mass_center, 0.0),
-            {"a": (0.0, 0.0), "b": (link.length, 0.0)}, bending=_bending(link.bending),
-        )
-        for name, link in (("crank", m.crank), ("rod", m.rod))
-    ]  # fmt: skip
-    rubs = effects.guide_friction
-    friction = None if rubs is None else parts.GuideFriction(rubs.coefficient, rubs.ramp_speed)
-    joints: list[parts.Joint] = [
-        parts.Revolute("crank_frame", "crank.a", "ground.o"),
-        parts.Slide("guide", "slider.pin", "ground.o", friction=friction),
-    ]
-    for name, journal, bearing in (
-        ("crank_rod", "crank.b", "rod.a"),
-        ("rod_slider", "slider.pin", "rod.b"),
-    ):
-        joint = getattr(scene.joints, name)
-        if isinstance(joint, ClearanceJoint):
-            radius, clearance = joint.bearing_radius, joint.clearance
-            stiffness = _stiffness(joint.bearing, joint.journal, radius, clearance)
-            joints.append(
-                parts.Clearance(
-                    name, journal, bearing, clearance, radius, stiffness, joint.start_eccentricity
-                )
-            )
-        else:
-            joints.append(parts.Revolute(name, journal, bearing))
-    loads: tuple[parts.Load, ...] = ()
-    if effects.slider_load:
-        table = isinstance(effects.slider_load, tuple)
-        force = 1.0 if table else float(effects.slider_load)  # type: ignore[arg-type]
-        loads = (parts.Force("load", "slider.pin", (force, 0.0), table),)
-    slider = parts.Body("slider", m.slider.mass, points={"pin": (0.0, 0.0)})
-    return Mechanism(
-        (*bodies, slider), tuple(joints), (_slider_crank_drive(scene.drive),), loads=loads
-    )
-
-
-def _slider_crank_drive(drive: Any) -> parts.Drive:
-    if isinstance(drive, ConstantSpeed):
-        return parts.ConstantSpeed("drive", "crank", drive.speed, True)
-    table = isinstance(drive.torque, tuple)
-    return parts.TorqueDrive(
-        "drive", "crank", 1.0 if table else drive.torque, drive.initial_speed,
-        drive.flywheel_inertia, table, True, 1, drive.expected_speed, drive.no_load_speed,
-    )  # fmt: skip

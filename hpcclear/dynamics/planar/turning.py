@@ -1,13 +1,12 @@
 """Whether linkages can turn as their drives prescribe, found out before anything is simulated.
 
-What is walked is the ideal twin, with pins in place of clearances. One that a torque drives is not judged: it may swing. With
-clearance a change point is for the dynamics to decide, unless the constraints of the ideal joints alone depend on one another
-there.
+What is walked is the ideal twin, with pins in place of clearances. One that a torque drives may swing; without clearance it is
+near singular where it hardly passes. With clearance a change point is for the dynamics to decide, unless the constraints of the
+ideal joints alone depend on one another there.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,9 +14,8 @@ from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
-from hpcclear.dynamics.linkage.linkage import with_numbers
 from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, with_numbers
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import (
     Clearance,
@@ -26,13 +24,21 @@ from hpcclear.dynamics.linkage.parts import (
     Revolute,
     TorqueDrive,
 )
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, Node, Passage, clear
-from hpcclear.dynamics.linkage.poses import coordinates
+from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Node, Passage, clear
 from hpcclear.dynamics.linkage.prescribed import cartesian, passage_of, refusal
+from hpcclear.dynamics.linkage.trees import Forest
 
 DEPENDENT = 1e-3
 """Smallest singular value of the ideal joints' constraints, rows scaled to 1, at which they depend on one another at a change
 point, which is known to a few digits less than other poses."""
+
+NARROW = 5e-3
+"""Smallest singular value over the largest, below which a linkage without play that passes is near singular: what it feels
+changes within so small a part of a turn that steps, or the nodes that works are summed over, pass over it. For a slider-crank
+it is the cosine of the rod's steepest angle: at 6e-3 works at a given speed close to 1e-5."""
+
+NEAR_CHANGE = 0.1
+"""Of a change point, rad of the drive: poses nearer to it are on its way."""
 
 
 def without_play(mechanism: Mechanism) -> Mechanism:
@@ -57,12 +63,17 @@ def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     )
 
 
+def _by_torque(mechanism: Mechanism) -> bool:
+    return any(isinstance(drive, TorqueDrive) for drive in mechanism.drives)
+
+
 def twin_of(mechanism: Mechanism) -> Mechanism | None:
-    """The mechanism without clearance, if its drives prescribe all of its motion."""
-    if any(isinstance(drive, TorqueDrive) for drive in mechanism.drives):
+    """The mechanism without clearance, if its drives prescribe all of its motion, or would at constant speeds."""
+    by_torque = _by_torque(mechanism)
+    if by_torque and mechanism.clearances:
         return None
     try:
-        twin = without_play(mechanism) if mechanism.clearances else mechanism
+        twin = without_play(mechanism) if mechanism.clearances or by_torque else mechanism
     except InputError:  # a joint holds what others hold already, once it has no clearance
         return None
     return None if freedom(twin) else twin
@@ -86,7 +97,14 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Assembly
             return None  # it starts at a change point: the dynamics decide
         raise
     if not mechanism.clearances:
-        return assembly, passage_of(assembly, rounds, gravity)
+        found = passage_of(assembly, rounds, gravity)
+        end = found.ended
+        if _by_torque(mechanism) and not any(end and end.node is one for one in found.changes):
+            found.ended = None  # it may swing
+        narrow = _narrowest(found)
+        if narrow is not None and (found.ended is None or found.ended.node.time > narrow.time):
+            found.end(Status.NEAR_SINGULAR, narrow)
+        return assembly, found
     found = passage_of(assembly, MOST_ROUNDS)
     singular = list(found.changes)
     if found.ended is not None and found.ended.status is Status.NEAR_SINGULAR:
@@ -97,6 +115,21 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Assembly
             found.end(Status.NEAR_SINGULAR, node)
             break
     return assembly, found
+
+
+def _narrowest(walk: Passage) -> Node | None:
+    """The first pose of a walk that links nearly lock at, `NARROW`, and are past later on; None without one."""
+    margins, times = np.array([(node.margin, node.time) for node in walk.nodes]).T
+    best = margins.max(initial=0.0)
+    past = np.flatnonzero(margins > POOR * best)
+    near = np.zeros(len(times), bool)
+    near[0] = not np.isfinite(walk.recurs)  # it may start just behind a change point
+    for change in walk.changes:  # which are passed, however near they are
+        apart = np.abs(times - change.time)
+        near |= np.minimum(apart, np.abs(apart - walk.recurs)) < NEAR_CHANGE * walk.unit
+    tight = np.flatnonzero((margins < NARROW * best) & ~near)
+    tight = tight[tight < past.max(initial=0)]
+    return walk.nodes[int(tight[0])] if len(tight) else None
 
 
 def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: Node) -> bool:
@@ -126,53 +159,54 @@ def loops_of(structure: Mechanism) -> Loops | None:
     return None if twin is None else Loops(twin, trees=True)
 
 
-def statuses(
-    loops: Loops | None, sample: Mechanism, made: Sequence[tuple[Mechanism, Assembly] | None],
-    gravity: float, rounds: int,
-) -> Integers:  # fmt: skip
+class Made(Protocol):
+    """Samples (m) put together, as `hpcclear.dynamics.start.Samples` has them."""
+
+    numbers: Mechanism
+    closed: Booleans
+
+    def mechanism(self, row: int) -> Mechanism:
+        """One sample by itself."""
+
+    def coordinates(self, forest: Forest) -> tuple[Array, Array]:
+        """Coordinates and velocities (n, m) of a forest; NaN of samples that do not close."""
+
+
+def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) -> Integers:
     """Statuses (m,) of samples: whether each can turn.
 
     Parameters
     ----------
     loops : Loops or None
         Of `loops_of`; they take the samples' numbers.
-    sample : Mechanism
-        With numbers of samples (m,).
-    made : sequence of Mechanism and Assembly, or None
-        Each sample by itself, put together; None of one that does not close.
+    samples : Made
     gravity : float
     rounds : int
         Revolutions that one without clearance is walked through.
     """
-    found = np.full(len(made), int(Status.CANNOT_TURN))
-    closed = np.array([one is not None for one in made], bool)
-    found[closed] = int(Status.OK)
+    closed = samples.closed
+    found = np.where(closed, int(Status.OK), int(Status.CANNOT_TURN))
     if loops is None or not closed.any():
         return found
-    doubtful = closed & ~_clear(loops, sample, made)
-    for row in np.flatnonzero(doubtful).tolist():
-        one = made[row]
-        assert one is not None
+    for row in np.flatnonzero(closed & ~_clear(loops, samples)).tolist():
         try:
-            told = refused(one[0], gravity, rounds)
+            told = refused(samples.mechanism(row), gravity, rounds)
         except InputError:
             told = None
         found[row] = int(Status.OK if told is None else told[0])
     return found
 
 
-def _clear(
-    loops: Loops, sample: Mechanism, made: Sequence[tuple[Mechanism, Assembly] | None]
-) -> Booleans:
+def _clear(loops: Loops, samples: Made) -> Booleans:
     """Which samples (m,) surely turn."""
+    sample = samples.numbers
     tables: dict[str, Any] = {
         "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,
         "ground": sample.ground, "loads": (),
     }  # fmt: skip
     numbers = with_numbers(loops.mechanism, **tables)
     loops.take(values(numbers))
-    nowhere = np.full(loops.size, np.nan)
-    start = [nowhere if one is None else coordinates(loops.forest, one[1])[0] for one in made]
     main = numbers.period
-    seconds: Array = np.broadcast_to(np.asarray(main.seconds, float), len(made))
-    return clear(loops, np.array(start).T, seconds, getattr(main, "turns", 1))
+    seconds: Array = np.broadcast_to(np.asarray(main.seconds, float), len(samples.closed))
+    start, _ = samples.coordinates(loops.forest)
+    return clear(loops, start, seconds, getattr(main, "turns", 1))

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.problem import absolute_tolerances
+from hpcclear.dynamics.planar.problem import absolute_tolerances
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 

@@ -38,10 +38,10 @@ POOLED = 2.0
 """Standard errors (and `SHIFT`) up to which the rest of a difference between the tolerances is chance."""
 
 LEFT = 0.3
-"""Of a difference that is none, what the stricter tolerance is still off by, at most."""
+"""Assumed residual bias of the tighter tolerance, as a fraction of an insignificant difference."""
 
 DOUBTED = 3.5
-"""Those from which on the looser tolerance is given up: at 2.5 more of them did so by chance, at twice the price."""
+"""Standard errors above which the looser tolerance is rejected; at 2.5 chance rejects more of them, at twice the cost."""
 
 COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""

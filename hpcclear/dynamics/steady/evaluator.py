@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_told
 from hpcclear.dynamics.lanes import Lanes
@@ -95,7 +96,7 @@ class SteadyEvaluator:
         self.lanes = lanes
         self._columns = columns
         self._scale = scales(scene)
-        self._plain = scene.with_({"numerics.target_error": None, "numerics.uncertainty": False})
+        self._plain = scene.with_({"numerics.target_error": None})
         self._sets: dict[tuple[float, int], Lanes] = {}
         self._asks: dict[int, _Ask] = {}
         contact = scene.effects.contact
@@ -172,7 +173,7 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                yield record_of(sample, ask.par, mean, self._told, self._worn)
+                yield record_of(sample, ask.par, mean, self._told, self._worn, self.scene.objective)
             elif ask.asks_anew:
                 going.append(ask)
         self._queue(going)
@@ -186,8 +187,9 @@ def _labels(ask: _Ask) -> Integers:
 
 
 def record_of(
-    sample: int, par: Array, mean: Mean, told: Sequence[str] = (), worn: bool = False
-) -> Records:
+    sample: int, par: Array, mean: Mean, told: Sequence[str] = (), worn: bool = False,
+    judged: Objective = MEAN_GAP,
+) -> Records:  # fmt: skip
     """What was found as a record (1,): means over stretches and copies, of the peaks too unless the motion is regular.
 
     Parameters
@@ -199,6 +201,8 @@ def record_of(
         Further responses, as of `responses_told`.
     worn : bool
         Whether a joint wears.
+    judged : Objective
+        By what.
     """
     rows = mean.outcomes.rows.reshape(-1, Outcome.size)
     if mean.status != Status.OK:
@@ -209,6 +213,7 @@ def record_of(
         np.repeat(par, len(rows), axis=0),
         told,
         worn,
+        judged,
     )
     record = each[:1].copy()
     for name in (
@@ -222,6 +227,10 @@ def record_of(
         "sliding_waves",
     ):
         record[name] = each[name].mean(axis=0)
+    power = 2.0 if judged.made == "rms" else 1.0
+    record[RATE] = (each[RATE] ** power).mean(axis=0) ** (1.0 / power)
+    if judged.made == "peak":
+        record[RATE] = each[RATE].max(axis=0)
     if mean.stretch == 1:
         record["peak_contact_force"] = each["peak_contact_force"].max(axis=0)
         for name in ("peak_crank_moment", "peak_point_acceleration"):
@@ -230,7 +239,7 @@ def record_of(
     record["mean_gap"] = mean.gaps
     record["objective"] = objective(mean.gaps)
     record["objective_spread"] = np.std(objective(mean.outcomes.mean_gap), ddof=1)
-    record["objective_limit"] = mean.limit
+    record["objective_limit"] = record["objective_uncertainty"] = mean.limit
     record["regime"] = mean.regime
     record["period"] = np.nan if mean.period is None else mean.period
     record["kick_growth"] = mean.growth

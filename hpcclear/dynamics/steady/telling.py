@@ -23,13 +23,13 @@ def why_missed(record: Any, target: float | None) -> str:
     """Why the target of one record, or of a dataset of it, is missed, in one sentence."""
     regime, spent = Regime(int(record["regime"])), int(record["steady_revolutions"])
     if regime is Regime.UNSTEADY:
-        return f"there is no steady mean to aim at: f still drifts after {spent} revolutions"
+        return f"there is no steady mean: f still drifts after {spent} revolutions"
     if not np.isfinite(float(record["objective_limit"])):
-        return f"{spent} revolutions are too few to give limits of f; raise numerics.target_revolutions"
+        return f"{spent} revolutions are too few for a confidence interval of f; raise numerics.target_revolutions"
     share = float(record["objective_limit"]) / float(record["objective"])
     return (
-        f"f is known to {share:.1e} of itself after {spent} revolutions, not to {target:g} ({regime.meaning}); "
-        "raise numerics.target_revolutions or numerics.target_error"
+        f"the relative half-width of f is {share:.1e} after {spent} revolutions, above the target {target:g} "
+        f"({regime.meaning}); raise numerics.target_revolutions or numerics.target_error"
     )
 
 
@@ -42,12 +42,12 @@ def in_a_line(record: Any, seconds: float | None = None) -> str:
     if np.isfinite(period):
         told.append(f"period {period:.0f}")
     if regime in (Regime.CHAOTIC, Regime.SEVERAL):
-        told.append(f"kicks grow by e^{float(record['kick_growth']):.2g} a revolution")
+        told.append(f"perturbations grow by e^{float(record['kick_growth']):.2g} per revolution")
     told.append(f"{int(record['steady_revolutions'])} revolutions")
     if seconds is not None:
         told.append(f"{seconds:.1f} s")
     if not np.isfinite(limit):
-        return f"{f:.4g} um, no limits ({', '.join(told)})"
+        return f"{f:.4g} um, interval not known ({', '.join(told)})"
     digits = max(1 - int(np.floor(np.log10(limit))), 0) if limit > 0.0 else 6
     return f"{f:.{digits}f} +- {limit:.{digits}f} um ({', '.join(told)})"
 
@@ -89,8 +89,8 @@ def in_short(scene: Scene, records: Records) -> str:
         return ""
     good = records[records["status"] == Status.OK]
     if len(good) == 0:
-        return "none ended"
+        return "no sample finished"
     limit = np.nanmedian(good["objective_limit"] / good["objective"])
-    text = f"limits {limit:.0e}, met {1.0 - missed(good).mean():.0%}"
+    text = f"±{limit:.0e}, met by {1.0 - missed(good).mean():.0%}"
     chaotic = np.isin(good["regime"], (Regime.CHAOTIC, Regime.SEVERAL)).mean()
     return text + (f", {chaotic:.0%} chaotic" if chaotic else "")

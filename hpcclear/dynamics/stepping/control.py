@@ -193,9 +193,22 @@ def commit_measures(effects, work, W):
             yes = work[at.ACCEPT * W + i] == 1.0
             add_integral(work, rate, work[(at.RATE_SUM + rate) * W + i], yes, i, W)
             keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
+        if effects.rules.largest & (rate >= at.OBJECTIVE_RATES):
+            p = place(rate - at.OBJECTIVE_RATES)
+            for i in range(W):
+                commit_largest(work, p, i, W)
     if effects.rules.responses:
         for i in range(W):
             commit_peak(work, i, W)
+
+
+@lane_function
+def commit_largest(work, p, i, W):
+    """The largest value of the objective's rate at place p after a step."""
+    counts = work[at.ACCEPT * W + i] * work[at.AVERAGING * W + i] == 1.0
+    rate = work[(at.RATE_NOW + at.OBJECTIVE_RATES + p) * W + i]
+    largest = max(work[(at.LARGEST_RATE + p) * W + i], rate if counts else -1e300)
+    work[(at.LARGEST_RATE + p) * W + i] = largest
 
 
 @lane_function

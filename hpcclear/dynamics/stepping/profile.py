@@ -11,8 +11,9 @@ import math
 from functools import cache
 from typing import Any
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
+from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import written_out
@@ -100,4 +101,4 @@ def profile_code(effects: at.Effects, W: int) -> Any:
     places = tuple(k for k, flag in enumerate(at.open_of(effects)) if flag is not None)
     counts = {"bearing": effects.bearing_waves or 0, "journal": effects.journal_waves or 0}
     text = one_text(profiles, f"profiles_{W}", places=places, W=W, **counts)
-    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(text)
+    return c_function(SIGNATURE, text, fastmath=FASTMATH)

@@ -7,13 +7,11 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import (
     AVERAGED,
-    AVERAGED_CAP,
     CHOSEN,
     FINISHED,
     IMPLICIT,
     MAX_STEPS,
     NEXT_SLOT,
-    OBJECTIVE_TOLERANCE,
     PARAMETER_ROWS,
     PROFILED,
     RTOL,
@@ -27,7 +25,6 @@ OK = int(Status.OK)
 STEP_CAP = int(Status.STEP_CAP)
 STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
 NOT_FINITE = int(Status.NOT_FINITE)
-AVERAGE_CAP = int(Status.AVERAGE_CAP)
 UNFINISHED = -1
 
 JOINTS = at.MAX_JOINTS
@@ -51,7 +48,7 @@ def make_stricter(lane, W, work, par, settings):
         row = at.JOINT_BLOCKS + k * at.JOINT_ROWS + at.FILM_STEEPNESS
         film = max(film, par[row * W + lane])
     rtol = settings[RTOL]
-    speed = 1.0 + par[at.SPEED * W + lane] * par[at.CRANK_LENGTH * W + lane]
+    speed = 1.0 + par[at.SPEED * W + lane] * par[at.DRIVEN_LENGTH * W + lane]
     by_film = rtol * min(speed * film / OF_INERTIA, 1.0 / STRICT)
     within = max(par[at.STRICTNESS * W + lane], by_film * by_film)
     edge = 0.0
@@ -71,6 +68,8 @@ def load(lane, W, n, block, queue, settings):
         work[k * W + lane] = 0.0
     for k in range(at.RATE_OLD, at.TIME):
         work[k * W + lane] = 0.0
+    for k in range(at.LARGEST_RATE, at.WORK):
+        work[k * W + lane] = -1e300
     for k in range(at.BOOK):
         book[k * W + lane] = 0.0
     for k in range(at.STRICTER, at.STRICTER_AT_EDGE + 1):
@@ -110,6 +109,7 @@ def finish(lane, W, n, status, block, queue, settings):
         out[slot, at.OUT_DEEPEST + k] = work[(at.DEEPEST + k) * W + lane]
         out[slot, at.OUT_ACTIVE + k] = work[(at.ACTIVE + k) * W + lane]
         out[slot, at.OUT_INVERSE_IMPACT + k] = work[(at.INVERSE_IMPACT + k) * W + lane]
+        out[slot, at.OUT_LARGEST_RATE + k] = work[(at.LARGEST_RATE + k) * W + lane]
         out[slot, at.OUT_LATCHED + k] = book[(at.LATCHED + k) * W + lane]
     for r in range(RATES + int(settings[PROFILED])):
         out[slot, at.OUT_TOTAL + r] = book[(at.TOTAL + r) * W + lane]
@@ -162,49 +162,9 @@ def failure(lane, W, n, work, stages, settings):
 
 
 @lane_event
-def standard_error(count, m2, lag):
-    """Standard error of the mean of a revolution's objective, whose neighbours are correlated.
-
-    First-order autocorrelation: s/sqrt(n) times sqrt((1 + rho)/(1 - rho)); a negative rho is not trusted to help.
-    """
-    if count < 3.0 or m2 <= 0.0:
-        return 0.0 if count >= 3.0 else math.inf
-    rho = min(max(lag / m2, 0.0), 0.99)
-    return math.sqrt(m2 / (count - 1.0) / count * (1.0 + rho) / (1.0 - rho))
-
-
-@lane_event
-def verdict(lane, W, book, settings):
-    """Whether the average may end: a status, or UNFINISHED."""
-    averaged = book[at.COUNT_F * W + lane]
-    if averaged < settings[AVERAGED]:
-        return UNFINISHED
-    if settings[OBJECTIVE_TOLERANCE] == 0.0:
-        return OK
-    # sum of (f_k - mean)(f_{k+1} - mean) from products about the first f
-    mean = book[at.MEAN_F * W + lane]
-    shift = mean - book[at.FIRST_F * W + lane]
-    total = averaged * shift
-    last = book[at.LAST_F * W + lane] - book[at.FIRST_F * W + lane]
-    lag = (
-        book[at.LAG_F * W + lane] - shift * (2.0 * total - last) + (averaged - 1.0) * shift * shift
-    )
-    error = standard_error(averaged, book[at.M2_F * W + lane], lag)
-    if error <= settings[OBJECTIVE_TOLERANCE] * mean:
-        return OK
-    return AVERAGE_CAP if averaged >= settings[AVERAGED_CAP] else UNFINISHED
-
-
-@lane_event
 def book_objective(lane, W, book, f):
     """Add a revolution's objective to the averages over revolutions."""
     count = book[at.COUNT_F * W + lane] + 1.0
-    if count == 1.0:
-        book[at.FIRST_F * W + lane] = f
-    first = book[at.FIRST_F * W + lane]
-    before = book[at.LAST_F * W + lane]
-    book[at.LAG_F * W + lane] += (f - first) * (before - first) * (count > 1.0)
-    book[at.LAST_F * W + lane] = f
     step = f - book[at.MEAN_F * W + lane]
     mean = book[at.MEAN_F * W + lane] + step / count
     book[at.M2_F * W + lane] += step * (f - mean)
@@ -251,4 +211,4 @@ def end_revolution(lane, W, work, book, settings):
         work[(at.ENDED + k) * W + lane] = 0.0
     work[at.ENDING * W + lane] = 0.0
     work[at.AVERAGING * W + lane] = 1.0 if revolution >= settings[TRANSIENT] else 0.0
-    return verdict(lane, W, book, settings)
+    return UNFINISHED if book[at.COUNT_F * W + lane] < settings[AVERAGED] else OK

@@ -12,9 +12,7 @@ from hpcclear.dynamics import layout as at
     ANGLE_TOLERANCE,  # rad, likewise for the end of a revolution of a free crank
     IMPACT_FLOOR,  # m/s, least latched impact speed
     TRANSIENT,  # revolutions
-    AVERAGED,  # revolutions; at least so many if OBJECTIVE_TOLERANCE > 0
-    AVERAGED_CAP,  # and at most so many
-    OBJECTIVE_TOLERANCE,  # relative standard error of the objective to reach; 0: a fixed number
+    AVERAGED,  # revolutions
     MAX_STEPS,
     SMALLEST_STEP,  # relative to the time
     EXPONENT,
@@ -26,7 +24,7 @@ from hpcclear.dynamics import layout as at
     AT_REST,  # rad, within which a crank that starts from rest may turn back
     SENSES,  # 1 where explicit steps look out for the edge of stability
     CHOSEN,  # of each joint: 1 where its gap counts for the objective
-) = range(19)
+) = range(17)
 ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
 SETTINGS = ATOL + 2 * at.MAX_COORDINATES
 
@@ -59,5 +57,5 @@ def rules_in(numbers):
     r = RULES
     return at.Rules(
         numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4], numbers[r + 5],
-        numbers[r + 6],
+        numbers[r + 6], numbers[r + 7],
     )  # fmt: skip

@@ -6,9 +6,10 @@ One function for all steppers: it is compiled once, for any number of lanes, coo
 from functools import cache
 from typing import Any
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from hpcclear.base.bits import call_at
+from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
@@ -116,9 +117,7 @@ SIGNATURE = types.void(_COUNTS, *[_NUMBERS] * 8, *[_COUNTS] * 2)
 @cache
 def special_code() -> Any:
     """The compiled `special`; its ``address`` is what steppers take."""
-    return cfunc(SIGNATURE, cache=True, error_model="numpy", fastmath=FASTMATH)(
-        one_text(special, "special")
-    )
+    return c_function(SIGNATURE, one_text(special, "special"), fastmath=FASTMATH)
 
 
 @lane_function

@@ -66,7 +66,7 @@ def latch(lane, W, work, settings, p):
     speed = max(work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane], settings[IMPACT_FLOOR])
     work[(at.ACTIVE + p) * W + lane] = 1.0
     work[(at.INVERSE_IMPACT + p) * W + lane] = 1.0 / speed
-    # within the tolerance of zero: a hair below it would end the contact at once
+    # within the tolerance of zero: a value just below would end the contact at once
     work[(at.RATE_NOW + at.GAP + p) * W + lane] = max(
         work[(at.RATE_NOW + at.GAP + p) * W + lane], 0.0
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from hpcclear.report import targets
 from hpcclear.report.figures import labels, style
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def _ladder(axes: "Axes", here: xr.Dataset, work: str) -> None:
 
 @style.drawn
 def averaging_figure(found: xr.Dataset) -> "Figure":
-    """Error of the objective against revolutions averaged, for several transients, and the floor that is left."""
+    """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
     panel, error = axes[0, 0], found["averaging_error"]
     for k, transient in enumerate(found["transient"].to_numpy()):
@@ -189,7 +190,8 @@ def surrogate_figure(found: xr.Dataset) -> "Figure":
 
 @style.drawn
 def random_inputs_figure(found: xr.Dataset) -> "Figure":
-    """Error of mean and deviation against Monte Carlo size and time, with 95 % limits; the surrogate's bias."""
+    """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
+    bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
     for row, moment in enumerate(found["moment"].to_numpy()):
         here = found.sel(moment=moment)
@@ -233,7 +235,7 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
 
 @style.drawn
 def parallel_figure(found: xr.Dataset) -> "Figure":
-    """Speed-up and efficiency on the ranks at hand, and the core-seconds lost."""
+    """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
     number = found["ranks"].to_numpy()
     strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()
@@ -304,7 +306,52 @@ def spending_figure(found: xr.Dataset) -> "Figure":
     return figure
 
 
+@style.drawn
+def total_figure(found: xr.Dataset) -> "Figure":
+    """Total error of f of one design against run time: the cheapest settings, three targets, and the scene's own settings."""
+    figure, axes = style.grid(1, 1, 90.0)
+    panel, best = axes[0, 0], targets.front(found)
+    beyond = sum(way.error > 0.1 * targets.TARGETS[-1] for way in best)
+    best = best[: beyond + 1]  # what is far more accurate than all targets is of no interest
+    panel.loglog(
+        [1e3 * way.seconds for way in best], [way.error for way in best], color=style.CYCLE[0],
+        drawstyle="steps-post", label="cheapest settings",
+    )  # fmt: skip
+    label = "recommended"
+    for target in targets.TARGETS:
+        way = targets.cheapest(found, target)
+        if way is None:
+            continue
+        panel.plot(
+            1e3 * way.seconds, way.error, ls="none", marker="*", ms=8.0, color="black", mfc="white",
+            label=label, zorder=4,
+        )  # fmt: skip
+        panel.annotate(
+            f"{target * 100:g} %", (1e3 * way.seconds, way.error), xytext=(5, 4),
+            textcoords="offset points", fontsize=style.SMALL,
+        )  # fmt: skip
+        label = "_"  # one entry of the legend
+    if (own := targets.settings(found)) is not None:
+        panel.plot(
+            1e3 * own.seconds, own.error, ls="none", marker="s", ms=5.0, color=style.PALETTE["vermilion"],
+            label="your settings", zorder=4,
+        )  # fmt: skip
+    panel.set_xlabel("core time of one design (ms)")
+    panel.set_ylabel("relative error of $f$ (–)")
+    style.settle([panel])
+    for axis in (panel.xaxis, panel.yaxis):
+        _decades(axis)
+    _legend_above(figure, panel)
+    _foot(
+        figure,
+        found,
+        "Error: bias of the integration tolerance and error of averaging, squares added.",
+    )
+    return figure
+
+
 FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
+    "total": total_figure,
     "spending": spending_figure,
     "integration": integration_figure,
     "averaging": averaging_figure,
@@ -315,6 +362,7 @@ FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
 """The figures of a dataset, by the name of their file."""
 
 MAIN = {
+    "total": "spent_error",
     "spending": "spent_error",
     "integration": "error",
     "averaging": "averaging_error",

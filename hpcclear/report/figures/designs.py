@@ -1,4 +1,4 @@
-"""Figures of the optimised designs: fronts, and responses side by side."""
+"""Figures of the optimised designs: fronts, and responses beside each other."""
 
 import itertools
 import re
@@ -18,17 +18,18 @@ if TYPE_CHECKING:
 
 @style.drawn
 def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
-    """Pareto fronts of all cases, and the designs that were simulated directly (the paper's Fig. 9).
+    """Pareto fronts of all cases, and the designs that were simulated (the paper's Fig. 9).
 
-    Axes are what each case makes small: mean and deviation, if it asks for nothing else; of more than two things each two
-    have panels of their own. Left the fronts alone, right with the original and the paper's designs, which lie far off.
+    Axes are what each case makes small: mean and standard deviation, if it requests nothing else; of more than two things
+    each two have panels of their own. Left the fronts alone, right with the baseline design and the paper's designs, which
+    lie far off.
 
     Parameters
     ----------
     front : xarray.Dataset
         Kind ``front``.
     verification : xarray.Dataset, optional
-        Kind ``verification``: its designs are drawn with confidence limits, joined to what the surrogate said.
+        Kind ``verification``: its designs are drawn with confidence intervals, joined to what the surrogate said.
     """
     cases = [str(case) for case in front["case"].to_numpy()]
     asked = {case: _goals(front.sel(case=case)) for case in cases}
@@ -99,7 +100,7 @@ def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
     words = labels.statistic(words)
     of_f = words.endswith(" of f")
     unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
-    share = words.startswith("share ")
+    share = words.startswith("probability ")
     if len(words) > 2 * NARROW:
         words = f"{words[: 2 * NARROW - 6].rstrip()} …"
     label = unit.label(words) if of_f or share else f"{words} (SI)"
@@ -125,7 +126,7 @@ def _verified(
     *,
     all_designs: bool,
 ) -> None:
-    """True values of the designs of a case, ours or all, each joined to the surrogate's, of mean and deviation."""
+    """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
     count = verification.sizes["design"]
     cases = (
         [str(c) for c in verification["case"].to_numpy()]
@@ -199,7 +200,7 @@ def _mark(one: xr.Dataset) -> tuple[str, str]:
 
 
 def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
-    """Distances to the confidence limits as `errorbar` wants them, (2, 1); None if there are none."""
+    """Distances to the confidence intervals as `errorbar` wants them, (2, 1); None if there are none."""
     if f"{name}_lower" not in one or f"{name}_upper" not in one:
         return None
     sides = [float(one[f"{name}_{side}"]) for side in ("lower", "upper")]
@@ -208,7 +209,8 @@ def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None
 
 @style.drawn
 def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2) -> "Figure":
-    """Responses of optimised designs beside the original's, α left and β right (the paper's Fig. 10), further ends behind them.
+    """Responses of optimised designs beside the baseline design's, α left and β right (the paper's Fig. 10), further ends
+    behind them.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ def saving(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> floa
 
 
 def shown(value: float, limit: float) -> str:
-    """A relative change with its limits in per cent, as many digits as the limits are worth."""
+    """Return a relative change with its half-width in per cent, with as many digits as the half-width allows."""
     if not np.isfinite(value):
         return "-"
     value, limit = 100.0 * value, 100.0 * limit
@@ -55,7 +55,11 @@ def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> s
     share = saving(content, variant, seconds)
     change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
     text = f"{label(named(content, variant))} changes f by {change.replace(' ± ', ' % ± ')}"
-    cost = f"off saves {100 * share:.0f} %" if share >= 0.005 else "off saves nothing"
+    cost = (
+        f"disabling it saves {100 * share:.0f} %"
+        if share >= 0.005
+        else "disabling it saves nothing"
+    )
     return f"{text}: {cost}{_verdict(one, float(content.attrs['tolerance']))}."
 
 
@@ -92,7 +96,7 @@ def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
 
 
 def told_apart(content: xr.Dataset) -> list[str]:
-    """Pairs whose change of f is surely not the sum of the two, a sentence each."""
+    """Pairs whose change of f is significantly not the sum of the two, a sentence each."""
     off = content["off"].to_numpy()
     single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}
     found = []
@@ -114,9 +118,9 @@ def told_apart(content: xr.Dataset) -> list[str]:
 
 @style.drawn
 def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Figure":
-    """A bar an effect: change of f with its limits on a logarithmic scale, and beside it the time that it takes.
+    """Change of f by each effect, with confidence interval, on a logarithmic scale, and its run time.
 
-    Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is told by evaluations.
+    Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
     """
     off = effects["off"].to_numpy()
     seconds = seconds_of(timing)

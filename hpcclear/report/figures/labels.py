@@ -110,7 +110,7 @@ def with_half_width(value: float, half_width: float, units: str) -> str:
 
 
 def between(low: float, high: float, units: str) -> str:
-    """From where to where limits reach, told so far that they differ."""
+    """Return the ends of an interval in words, with enough digits to differ."""
     for digits in range(4, 8):
         ends = quantity(low, units, digits), quantity(high, units, digits)
         if ends[0] != ends[1]:
@@ -135,7 +135,8 @@ def objective(content: xr.Dataset) -> str:
 
 def statistic(words: str) -> str:
     """A statistic of f as files name it, in the words that are printed."""
-    return re.sub(r"^deviation of f", "standard deviation of f", words)
+    words = re.sub(r"^deviation of f", "standard deviation of f", words)
+    return re.sub(r"^share with f above", "probability of f above", words)
 
 
 def design_variables(content: xr.Dataset) -> list[xr.DataArray]:

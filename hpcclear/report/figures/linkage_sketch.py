@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import cycle
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -73,11 +73,11 @@ class Words:
         self._asked: list[tuple[Array, str, str]] = []
 
     def add(self, place: Any, text: str, colour: str) -> None:
-        """Ask for a word beside a place."""
+        """Request a word beside a place."""
         self._asked.append((np.array([float(place[0]), float(place[1])]), text, colour))
 
     def write(self) -> None:
-        """Write all, the first asked for nearest to their places."""
+        """Write all words, the first ones nearest to their places."""
         to_points = 72.0 / self._axes.figure.dpi
         frame = self._axes.get_window_extent()
         inside = np.array([frame.x0, frame.y0, frame.x1, frame.y1]) * to_points
@@ -107,8 +107,8 @@ def _overlap(one: Array, other: Array) -> float:
 
 
 def draw(axes: "Axes", scene: Scene, poses: Mapping[str, Pose]) -> None:
-    """The linkage at its start."""
-    mechanism = cast(Planar, scene.mechanism)
+    """The linkage where `poses` has its bodies: at its start, or a template's at an angle that shows more."""
+    mechanism = scene.linkage
     placed, words = Placed(mechanism, poses), Words(axes)
     low, high = placed.everything.min(axis=0), placed.everything.max(axis=0)
     size = 0.12 * float(max(high - low))
@@ -164,7 +164,7 @@ def _guide(axes: "Axes", placed: Placed, joint: Any, size: float) -> None:
 
 def _actions(axes: "Axes", scene: Scene, placed: Placed, size: float, words: Words) -> None:
     """Drives as arcs, forces and gravity as arrows, in their positive directions."""
-    mechanism = cast(Planar, scene.mechanism)
+    mechanism = scene.linkage
     green = style.CYCLE[2]
     for drive in mechanism.drives:
         x, y = next(iter(placed.bodies[drive.body].values()))
@@ -204,14 +204,18 @@ def word(axes: "Axes", place: Any, text: str, colour: str, offset: tuple[float, 
 
 def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
     """A line for each body, joint, drive and load."""
-    mechanism = cast(Planar, scene.mechanism)
+    mechanism = scene.linkage
     q = labels.quantity
     lines = ["angles from x, counter-clockwise; ○ mass centre; a ring about a joint: clearance"]
+    placed = "starts at" if scene.template is None else "drawn at"
     for body in mechanism.bodies:
-        size = "" if body.length is None else f"{q(body.length, 'm')}, "
+        size = centre = ""
+        if body.length is not None:
+            along = 0.5 * body.length if body.mass_center is None else body.mass_center
+            size, centre = f"{q(body.length, 'm')}, ", f"mass centre at {q(along, 'm')}, "
         lines.append(
-            f"{body.name}: {size}{q(body.mass, 'kg')}, {q(body.own_inertia, 'kg m^2')}, "
-            f"starts at {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
+            f"{body.name}: {size}{q(body.mass, 'kg')}, {q(body.own_inertia, 'kg m^2')}, {centre}"
+            f"{placed} {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
         )
     for joint in mechanism.joints:
         if joint.kind == "clearance":
@@ -225,7 +229,19 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
         how = f" {drive.frequency:.4g} Hz" if drive.kind == "harmonic" else how
         what = f"{named[drive.kind]}{how}" if drive.kind != "torque" else "is driven by a torque"
         lines.append(f"{drive.name}: {drive.body} {what}")
-    lines += [f"{load.name}: {load.kind}" for load in mechanism.loads]
+    lines += [f"{load.name}: {load.kind}{_range(load)}" for load in mechanism.loads]
     if scene.effects.gravity > 0.0:
         lines.append(f"gravity {scene.effects.gravity:g} m/s², towards -y")
     return lines
+
+
+def _range(load: Any) -> str:
+    """Of a force: its size, or the range of its table."""
+    size = getattr(load, "size", None)
+    if size is None:
+        return ""
+    if not isinstance(size, tuple):
+        return f" {labels.quantity(size, 'N')}"
+    values = [value for _, value in size]
+    low, high = (labels.quantity(one, "N") for one in (min(values), max(values)))
+    return f" {low} to {high} by angle"

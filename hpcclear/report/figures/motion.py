@@ -15,13 +15,16 @@ TURN = 2.0 * np.pi
 def check_some(responses: Collection[object], remedy: str) -> None:
     """InputError unless there is a response to draw."""
     if not responses:
-        raise InputError("responses", 0, "there is nothing to draw", remedy)
+        raise InputError("responses", 0, "there is no response to draw", remedy)
 
 
 def phase(response: xr.Dataset) -> Array:
-    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle."""
-    name = "drive_phase" if "drive_phase" in response else "crank_angle"
-    return response[name].to_numpy()
+    """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle, whichever
+    way it turns."""
+    if "drive_phase" in response:
+        return response["drive_phase"].to_numpy()
+    angle = response["crank_angle"].to_numpy()
+    return -angle if angle[-1] < angle[0] else angle
 
 
 def turns(response: xr.Dataset) -> Array:
@@ -110,6 +113,24 @@ def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
     return found
 
 
+def series(response: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Every series (t,) by its name; of joints, bodies and points by that and their label, which a single one may lack."""
+    found: dict[str, xr.DataArray] = {}
+    for key, variable in response.data_vars.items():
+        name, others = str(key), [dim for dim in variable.dims if dim != "time"]
+        if "time" not in variable.dims or len(others) > 1:
+            continue
+        if not others:
+            found[name] = variable
+            continue
+        labels = [str(label) for label in response[others[0]].to_numpy()]
+        for k, label in enumerate(labels):
+            found[f"{name} {label}"] = variable.isel({others[0]: k})
+        if len(labels) == 1:
+            found[name] = variable.isel({others[0]: 0})
+    return found
+
+
 def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     """Where the output stands and how fast it moves: the slider, or a linkage's last body, by its angle if it turns, else along
     the axis on which it moves further."""
@@ -130,7 +151,7 @@ def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 def clearances(response: xr.Dataset) -> Array:
     """Radial clearance of each joint, m, shape (joints,); NaN where there is none, or where it was never reached.
 
-    Penetration is |e| - c, so contact tells the clearance.
+    Penetration is |e| - c, so the clearance follows from contact.
     """
     reach = eccentricity(response)
     depth = response["penetration"].to_numpy()
@@ -143,7 +164,7 @@ def clearances(response: xr.Dataset) -> Array:
 
 
 def contact(response: xr.Dataset, joint: str) -> str:
-    """Return how long a joint is in contact, in words: a share of the time, never rounded to all or none of it."""
+    """Return how long a joint is in contact, in words: a share of the time, never rounded to 0 or 1."""
     touching = response["penetration"].sel(joint=joint).to_numpy() > 0.0
     if touching.all() or not touching.any():
         return f"in {'contact' if touching.all() else 'flight'} at all instants stored"

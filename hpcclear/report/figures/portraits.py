@@ -18,7 +18,7 @@ _FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
 
 @style.drawn
 def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
-    """Orbit of the journal centres in the clearance circle, contact told from free flight.
+    """Orbit of the journal centres in the clearance circle, contact distinguished from free flight.
 
     Parameters
     ----------

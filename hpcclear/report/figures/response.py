@@ -1,13 +1,11 @@
 """Figures of responses (kind ``response``) over the crank angle, frequency and clearance, and of their energies."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures import labels, motion, style
-from hpcclear.report.figures.varied import varied
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +26,7 @@ def _curve(row: int) -> dict[str, Any]:
 
 @style.drawn
 def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
-    """Slider motion, where there is a slider, contact forces and crank moment over the last revolutions.
+    """Slider motion, where there is a slider, contact forces and torque of the drive over the last revolutions.
 
     Parameters
     ----------
@@ -93,7 +91,8 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 def spectrum_figure(
     response: xr.Dataset, revolutions: int | None = None, orders: float = 100.0
 ) -> "Figure":
-    """Amplitude spectra of slider acceleration (linkage: crank moment) and contact forces over orders of the crank frequency.
+    """Amplitude spectra of slider acceleration (linkage: torque of the drive) and contact forces over orders of the crank
+    frequency.
 
     `orders`: right end of the axis, multiples of the crank frequency; else as for `bifurcation_figure`, of one response.
     """
@@ -123,7 +122,7 @@ def spectrum_figure(
 
 @style.drawn
 def energy_figure(response: xr.Dataset) -> "Figure":
-    """Energy ledger: what drive and loads put in and what is lost since the start, what is stored, what is left unexplained.
+    """Energy balance: work of drive and loads and dissipated energy since the start, stored energy, and the residual.
 
     Of a dataset of kind ``response``.
     """
@@ -153,48 +152,5 @@ def energy_figure(response: xr.Dataset) -> "Figure":
         axes[2, 0].set_ylim(bottom=1e-5 * unit.factor * residual.max())
     axes[2, 0].set_ylabel(unit.label("|residual|"))
     axes[2, 0].set_xlabel(motion.turns_label(response))
-    style.settle(axes)
-    return figure
-
-
-@style.drawn
-def bifurcation_figure(responses: Sequence[xr.Dataset], revolutions: int | None = None) -> "Figure":
-    """Objective of every revolution, and slider velocity once a revolution, against the entry in which the scenes differ.
-
-    A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots.
-
-    Parameters
-    ----------
-    responses : sequence of xarray.Dataset
-        Kind ``response``, of scenes that differ in one physical entry (or in several that have the same value), and with many
-        revolutions. Of files that do not say so, the clearance is found from the motion.
-    revolutions : int, optional
-        The last ones of each are drawn; half of all by default.
-
-    Raises
-    ------
-    InputError
-        No response at all, one with fewer revolutions, or scenes that differ in several entries.
-    """
-    motion.check_some(responses, "Give one response for each value")
-    figure, axes = style.grid(2, 1, 110.0, sharex=True)
-    steady = [motion.steady(response, revolutions) for response in responses]
-    entry = varied(responses)
-    rows = (
-        ("objective $f$ of a revolution", "m", [motion.objective_by_turn(r) for r in steady]),
-        (
-            f"{labels.words(motion.followed(steady[0])[1])} at crank angle 0",
-            str(motion.followed(steady[0])[1].attrs["units"]),
-            [motion.section(r, motion.followed(r)[1]) for r in steady],
-        ),
-    )
-    for panel, (words, units, values) in zip(axes[:, 0], rows, strict=True):
-        unit = labels.scale(units, np.concatenate(values))
-        x = np.repeat(entry.values, [len(v) for v in values]) * entry.scale.factor
-        size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
-        y = np.concatenate(values) * unit.factor
-        panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"])
-        panel.set_ylabel(unit.label(words))
-    axes[1, 0].set_xlabel(entry.scale.label(entry.words))
     style.settle(axes)
     return figure

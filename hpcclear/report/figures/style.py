@@ -6,14 +6,17 @@ pyplot, so nothing is registered globally and nothing needs closing.
 
 import contextlib
 import functools
+import inspect
 import io
 from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.results import files
 
 if TYPE_CHECKING:
@@ -35,11 +38,11 @@ PALETTE = {
     "black": "#000000",
     "grey": "#767676",
 }
-"""Okabe and Ito's colours (without yellow, which is lost on white), told apart by every eye."""
+"""Okabe and Ito's colours (without yellow, which is lost on white), distinguished by every eye."""
 
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
-"""Line styles in the order of `CYCLE`: a curve is never told by its colour alone."""
+"""Line styles in the order of `CYCLE`: a curve is never identified by its colour alone."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 COLOURS = "viridis"  # perceptually even, the same order in grey
@@ -84,9 +87,7 @@ _MARKS = {
     "svg": b"<dc:title>hpcclear</dc:title>",
     "pdf": b"/Creator (hpcclear)",
 }
-"""What tells our figures from a user's, by kind: where the metadata of `render` come to stand."""
-
-_P = ParamSpec("_P")
+"""What distinguishes our figures from a user's, by kind: where the metadata of `render` come to stand."""
 
 
 def matplotlib() -> Any:
@@ -101,25 +102,42 @@ def matplotlib() -> Any:
         import matplotlib as module
     except ModuleNotFoundError:
         reason = "figures are drawn with matplotlib, which is not installed"
-        remedy = "Install it with: pip install 'hpcclear[analysis]'"
-        raise InputError("matplotlib", None, reason, remedy) from None
+        raise InputError("matplotlib", None, reason, installing("analysis")) from None
     return module
 
 
-def drawn(function: "Callable[_P, Figure]") -> "Callable[_P, Figure]":
-    """Draw a figure in this style, whatever the user's settings, and leave those alone."""
+_given: "ContextVar[list[Axes] | None]" = ContextVar("axes of a caller", default=None)
+
+
+def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
+    """Draw a figure in this style, whatever the user's settings, and leave those alone.
+
+    The function takes ``ax`` besides: axes of the caller, as many as the figure has panels, from above to below and from left
+    to right. It draws into them, and returns their figure.
+    """
 
     @functools.wraps(function)
-    def styled(*args: _P.args, **kwargs: _P.kwargs) -> "Figure":
-        with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
-            return function(*args, **kwargs)
+    def styled(*args: Any, ax: Any = None, **kwargs: Any) -> "Figure":
+        token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
+        try:
+            with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
+                return function(*args, **kwargs)
+        finally:
+            _given.reset(token)
 
+    signature = inspect.signature(function)
+    given = inspect.Parameter("ax", inspect.Parameter.KEYWORD_ONLY, default=None)
+    parameters = [*signature.parameters.values(), given]
+    styled.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return styled
 
 
 def page(height: float) -> "Figure":
-    """An empty figure of one column's width and `height` in mm."""
+    """An empty figure of one column's width and `height` in mm; raises InputError where the caller gave axes."""
     matplotlib()
+    if (given := _given.get()) is not None:
+        reason = "this figure has a layout of its own"
+        raise InputError("ax", len(given), reason, "Leave ax out")
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -129,7 +147,19 @@ def page(height: float) -> "Figure":
 
 
 def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
-    """A page of equal panels; axes of shape (rows, columns), options as for `Figure.subplots`."""
+    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`.
+
+    Raises
+    ------
+    InputError
+        If the caller gave another number of axes.
+    """
+    if (given := _given.get()) is not None:
+        if len(given) != rows * columns:
+            reason = f"this figure has {rows * columns} panels"
+            raise InputError("ax", len(given), reason, "Give as many axes, in an array or list")
+        figure: Any = given[0].figure
+        return figure, np.array(given, dtype=object).reshape(rows, columns)
     figure = page(height)
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
@@ -195,7 +225,7 @@ def save(figure: "Figure", path: str | Path) -> Path:
     Raises
     ------
     InputError
-        The suffix is none of these, or the place cannot be written to.
+        The suffix is another one, or the place cannot be written to.
     StorageError
         The disk is full or fails.
     """

@@ -126,7 +126,7 @@ def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
         The file has no Sobol indices.
     """
     if "sobol_total" not in sensitivity:
-        reason = "the study left the Sobol indices out"
+        reason = "the study did not compute Sobol indices"
         raise InputError(
             "sensitivity.sobol_samples", 0, reason, "Set it to a power of two and run again"
         )
@@ -178,7 +178,7 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     found = models_in(kriging)
     shown = {k: m for k, m in found.items() if len(m.names) == 3 and name in m.names}
     if not shown:
-        reason = "no model is one of two design variables and the clearance"
+        reason = "no model has two design variables and the clearance as inputs"
         raise InputError("study.surrogate.models", list(found), reason, "Fit one, [x, y, C]")
     figure, axes = style.grid(len(shown), 2, 24.0 + 40.0 * len(shown))
     fields = [_fields(model, model.names.index(name)) for model in shown.values()]

@@ -13,7 +13,7 @@ from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.paths import described, flatten, quantities
 from hpcclear.scene.plugged import UntrustedSource
 
-_RPM = labels.Scale(30.0 / np.pi, "rpm")
+RPM = labels.Scale(30.0 / np.pi, "rpm")
 
 
 class Varied(NamedTuple):
@@ -45,7 +45,7 @@ def varied(responses: Sequence[xr.Dataset]) -> Varied:
         )
     unit, words = quantities()[next(iter(found))].unit, described(list(found))
     words = "clearance $C$" if words == "radial clearance" else labels.literal(words)
-    return Varied(words, _RPM if unit == "rad/s" else labels.scale(unit or "1", values), values)
+    return Varied(words, RPM if unit == "rad/s" else labels.scale(unit or "1", values), values)
 
 
 def _differing(responses: Sequence[xr.Dataset]) -> dict[str, list[float]]:

@@ -1,4 +1,4 @@
-"""Figures of lives of worn joints (kind ``wear``)."""
+"""Figures of service lives with wear (kind ``wear``)."""
 
 from typing import TYPE_CHECKING
 
@@ -62,7 +62,7 @@ def fan_figure(wear: xr.Dataset) -> "Figure":
 
 @style.drawn
 def survival_figure(wear: xr.Dataset) -> "Figure":
-    """Share of lives that are not over against revolutions, with 95 % limits.
+    """Share of lives that are not over against revolutions, with 95 % confidence intervals.
 
     Of a dataset of kind ``wear``.
 
@@ -72,7 +72,9 @@ def survival_figure(wear: xr.Dataset) -> "Figure":
         No limit was given that could end a life.
     """
     if not any(name.startswith("limit_") for name in wear.attrs):
-        raise InputError("wear.limit", None, "no limit ends a life", "Give one, such as clearance")
+        raise InputError(
+            "wear.limit", None, "no limit ends a service life", "Give one, such as clearance"
+        )
     figure, axes = style.grid(1, 1, 70.0)
     panel, cycles = axes[0, 0], wear["cycle"].to_numpy()
     lower, upper = wear["survival_lower"].to_numpy(), wear["survival_upper"].to_numpy()
@@ -114,7 +116,7 @@ def profile_figure(wear: xr.Dataset) -> "Figure":
     """
     if "bearing_profile" not in wear:
         raise InputError(
-            "wear.profile", "uniform", "surfaces wear evenly: there is no profile", 'Set it to "angular"'
+            "wear.profile", "uniform", "wear is uniform around the surfaces: there is no profile", 'Set it to "angular"'
         )  # fmt: skip
     panels = [
         (str(name), surface, depths)

@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
+from hpcclear.results.grids import SHAPE
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,17 @@ class Content:
     """By the name of the design."""
     troubles: tuple[str, ...] = ()
     """What could not be read or does not belong together, a sentence each."""
+    whole: bool = True
+    """Whether this is all of a directory, not files that were chosen."""
 
     def get(self, kind: str) -> xr.Dataset | None:
         """The dataset of a kind, or None."""
         return self.files.get(kind)
+
+    @property
+    def response(self) -> xr.Dataset | None:
+        """The response of the baseline design, else the first; None if there is none."""
+        return self.responses.get("original", next(iter(self.responses.values()), None))
 
     @property
     def is_compared(self) -> bool:
@@ -38,36 +46,39 @@ class Content:
         return next((str(one.attrs[name]) for one in every if name in one.attrs), "")
 
 
-def read(directory: str | Path) -> Content:
-    """Read every result file of a directory and of its folder ``responses``.
+def read(*places: str | Path) -> Content:
+    """Read every result file of a directory and of its folder ``responses``, or the files that are named.
 
     Raises
     ------
     InputError
-        There is no such directory, or no result in it.
+        There is no such directory or no result in it, or a file that is named is no result.
     """
-    place = Path(directory)
+    chosen = [Path(place) for place in places]
+    whole = len(chosen) == 1 and not chosen[0].is_file()
+    place = chosen[0] if whole else chosen[0].parent
     files: dict[str, xr.Dataset] = {}
     names: dict[str, str] = {}
     responses: dict[str, xr.Dataset] = {}
     troubles = []
-    for path in dataset.files_in(place):
-        try:
-            one = dataset.read(path)
-        except InputError as error:
-            troubles.append(f"{path.relative_to(place)} was left out: {error.reason}.")
+    found = dataset.each_in(place) if whole else ((one, dataset.read(one)) for one in chosen)
+    for path, one in found:
+        if isinstance(one, InputError):
+            troubles.append(f"{path.relative_to(place)} was left out: {one.reason}.")
             continue
-        kind = str(one.attrs["hpcclear_kind"])
+        kind = "map" if SHAPE in one.attrs else str(one.attrs["hpcclear_kind"])
         if kind == "response":
             responses[str(one.attrs.get("design", path.stem))] = one
-        elif kind in files and path.stem != kind:
+        elif kind == "timing" and kind in files:
+            continue  # of another result beside the first
+        elif kind in files and (not whole or path.stem != kind):
             troubles.append(f"{path.name} was left out: {names[kind]} holds {kind} already.")
         else:
             files[kind], names[kind] = one, path.name
     if not files and not responses:
         reason = "there is no result file in it"
         raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
-    return Content(place, files, names, responses, (*troubles, *_strangers(files)))
+    return Content(place, files, names, responses, (*troubles, *_strangers(files)), whole)
 
 
 def _strangers(files: dict[str, xr.Dataset]) -> list[str]:

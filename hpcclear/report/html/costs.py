@@ -1,45 +1,60 @@
-"""The section of the page on what accuracy costs (kind ``accuracy``)."""
+"""The section of the page on accuracy against run time (kind ``accuracy``)."""
 
 import numpy as np
 import xarray as xr
 
+from hpcclear.report import targets
+from hpcclear.report.figures import accuracy as figures
+from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table
+from hpcclear.report.html.markup import Number, Table, folded
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
 
+_CAPTIONS = {
+    "spending": "Error of a steady mean against run time, by tolerance, and the bias of each tolerance.",
+    "integration": "Error of one revolution against run time and force evaluations, by integrator.",
+    "averaging": "Error of f against averaged revolutions, by transient.",
+    "surrogate": "Accuracy of the surrogates against training samples.",
+    "random_inputs": "Error of mean and standard deviation against Monte Carlo samples.",
+    "parallel": "Speed-up on the available ranks, and time lost.",
+}
+
+
 def accuracy(content: Content) -> list[object] | None:
-    """The cheapest way to each error of f, and the errors of everything that follows."""
+    """Cheapest settings for three errors in words and in one figure, then the sources of error, folded."""
     found = content.get("accuracy")
     if found is None:
         return None
     header = ["relative error of f", "integrator", "tolerance or step", "time of a revolution (ms)"]
     cheapest = Table(
-        header, _cheapest(found), "The cheapest way to an error of f over one revolution"
+        header, _cheapest(found), "Cheapest integrator for an error of f over one revolution"
     )
     rows = [*_steady(found), *_averaging(found), *_surrogates(found), *_moments(found)]
     others = Table(
-        ["what", "relative error", "cost"], rows, "Errors of what comes after, and their price"
+        ["approximation", "relative error", "run time"],
+        rows,
+        "Errors of the other approximations, and their run time",
     )
-    words = "Errors are against references far tighter than what is measured; times are of one core, on this machine."
-    return [words, cheapest, others]
-
-
-def words(content: Content) -> list[str]:
-    """What was measured, in a sentence or two for the summary."""
-    found = content.get("accuracy")
-    if found is None:
-        return []
-    told = []
-    for target, name, setting, milliseconds in _cheapest(found):
-        if name != "not reached":
-            told.append(f"{target} costs {milliseconds} ms of a core ({name}, {setting})")
-    reached = "; ".join(told) if told else "no error of f down to 1% was reached"
-    floor = float(found["averaging_floor"])
+    note = "Errors are relative to references with much tighter settings. Times are those of one core of this machine."
+    total = gallery.picture(
+        figures.total_figure,
+        found,
+        "Total error of f of one design against core time: bias of the tolerance and error of averaging.",
+    )
+    drawn = {
+        name: gallery.picture(figures.FIGURES[name], found, caption)
+        for name, caption in _CAPTIONS.items()
+    }
+    ranks = drawn.pop("parallel")
+    sources: list[object] = [cheapest, others, *(one for one in drawn.values() if one)]
     return [
-        f"The cost of accuracy was measured. For one revolution, an error of f of {reached}.",
-        f"Means of f over long intervals differ by {floor:.1e}, at any tolerance.",
+        *targets.sentences(found),
+        *([total] if total else []),
+        note,
+        folded("Sources of error, one by one", sources),
+        *([folded("Ranks", [ranks])] if ranks else []),
     ]
 
 

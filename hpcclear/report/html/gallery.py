@@ -11,79 +11,21 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
 from hpcclear.report.figures import (
-    accuracy,
+    catalogue,
     designs,
     effects,
     fits,
     labels,
     motion,
-    portraits,
     response,
-    samples,
     style,
     surrogates,
-    timing,
-    wear,
 )
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Drawing = tuple[str, "Callable[[xr.Dataset], Figure]", str]
-
-_RESULTS: tuple[Drawing, ...] = (
-    (
-        "samples",
-        samples.samples_figure,
-        "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
-    ),
-    (
-        "sensitivity",
-        surrogates.sensitivity_figure,
-        "Sensitivities against clearance: lines with bands over the whole interval, marks with bars where they "
-        "stopped changing; two standard errors.",
-    ),
-    (
-        "sensitivity",
-        surrogates.sobol_figure,
-        "Global sensitivities: first-order Sobol indices (a variable by itself) and total ones (with interactions, "
-        "so that their sum may exceed 1), with two standard errors.",
-    ),
-    (
-        "sensitivity",
-        surrogates.fit_figure,
-        "Fit of the response surfaces on test points, against clearance and length of the interval.",
-    ),
-    (
-        "kriging",
-        surrogates.surfaces_figure,
-        "Objective over pairs of design variables at the least and the largest clearance, by Kriging.",
-    ),
-    (
-        "kriging",
-        surrogates.parity_figure,
-        "Surrogate against simulation: each point predicted without itself; R² on test points.",
-    ),
-    (
-        "wear",
-        wear.fan_figure,
-        "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
-    ),
-    (
-        "wear",
-        wear.survival_figure,
-        "Survival, with 95 % confidence interval (Clopper and Pearson).",
-    ),
-    (
-        "wear",
-        wear.profile_figure,
-        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over all runs.",
-    ),
-    ("timing", timing.timing_figure, "Time of the ranks, by rank and by stage."),
-)
-"""Kind of file, figure, caption."""
 
 _FITS = (
     surrogates.sensitivity_figure,
@@ -93,15 +35,9 @@ _FITS = (
 )
 """Figures of surrogates: the captions name those that do not fit."""
 
-_RESPONSE = (
-    (portraits.orbit_figure, "journal-centre orbits in the clearance circle"),
-    (portraits.force_polar_figure, "contact force by its direction"),
-    (response.penetration_figure, "penetration"),
-    (portraits.phase_figure, "phase portraits"),
-    (portraits.poincare_figure, "Poincaré section, once a revolution"),
-    (response.spectrum_figure, "spectra"),
-    (response.energy_figure, "energy balance"),
-)
+
+_ELSEWHERE = ("timing", "accuracy")
+"""Kinds whose figures stand in sections of their own."""
 
 
 def figures(content: Content, troubles: list[str]) -> list[dict[str, str]] | None:
@@ -115,9 +51,11 @@ Maker = Callable[[], dict[str, str] | None]
 
 def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
     """Every figure that there may be: what it shows, and what makes its picture and caption."""
-    for kind, draw, caption in _RESULTS:
-        caption += _warnings(kind, content.get(kind)) if draw in _FITS else ""
-        yield from _of_file(draw, content.get(kind), caption)
+    for one in catalogue.RESULTS:
+        if one.kind in _ELSEWHERE:
+            continue
+        fit = _warnings(one.kind, content.get(one.kind)) if one.draw in _FITS else ""
+        yield from _of_file(one.draw, content.get(one.kind), one.caption + fit)
     certificate, times = content.get("effects"), content.get("timing")
     if certificate is not None:
         told = "Change of f with each effect off, with confidence interval and tolerance, and the run time saved."
@@ -129,9 +67,6 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
             "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs."
         )
         yield caption, lambda: _shown(designs.front_figure(front, verified), caption)
-    costs = content.get("accuracy")
-    for name, draw in accuracy.FIGURES.items() if costs is not None else ():
-        yield from _of_file(draw, costs, f"Cost of accuracy: {name.replace('_', ' ')}.")
     found = content.responses
     for first in range(0, len(ENDS), 2):  # two columns a picture
         pair = ENDS[first : first + 2]
@@ -143,8 +78,8 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
         name = "original" if "original" in found else next(iter(found))
         if len(found) == 1:
             yield f"{name}: response", lambda: _response_alone(name, found[name])
-        for draw, what in _RESPONSE:
-            yield from _of_file(draw, found[name], f"{name}: {what}.")
+        for one in catalogue.RESPONSE:
+            yield from _of_file(one.draw, found[name], f"{name}: {one.caption}.")
 
 
 def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
@@ -168,7 +103,7 @@ def _of_file(
 ) -> Iterator[tuple[str, Maker]]:
     """A figure of one file, unless that is missing."""
     if found is not None:
-        yield caption, functools.partial(_tried, draw, found, caption)
+        yield caption, functools.partial(picture, draw, found, caption)
 
 
 def _warnings(kind: str, content: xr.Dataset | None) -> str:
@@ -188,10 +123,10 @@ def _plays(*responses: xr.Dataset) -> str:
     return f", at radial clearances of {' and '.join(told)}" if told else ""
 
 
-def _tried(
+def picture(
     draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset, caption: str
 ) -> dict[str, str] | None:
-    """The figure, unless the file has not what it needs (no Sobol indices, say)."""
+    """Draw a figure of one file with its caption; None if the file has not what it needs (no Sobol indices, say)."""
     try:
         made = draw(found)
     except InputError as error:

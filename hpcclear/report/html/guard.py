@@ -4,14 +4,11 @@ A file's seal says that it is as it was written, not that its numbers make a pic
 an axis 1e308 long, a scene's text nested a thousand levels deep.
 """
 
-import contextlib
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from types import FrameType
+from collections.abc import Callable
 from typing import TypeVar
 
 from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.host import time_limit
 
 LONGEST = 25.0
 """Seconds that a part may take: an honest one takes less than one, also of millions of samples some."""
@@ -28,7 +25,7 @@ def attempt(what: str, make: Callable[[], Made], troubles: list[str]) -> Made | 
         What the user can mend, and what the machine refuses: that is not the content's fault.
     """
     try:
-        with _limited(LONGEST):
+        with time_limit(LONGEST):
             return make()
     except (InputError, StorageError):
         raise
@@ -40,22 +37,3 @@ def attempt(what: str, make: Callable[[], Made], troubles: list[str]) -> Made | 
         reason = f"{type(error).__name__}: {error}"[:200]
     troubles.append(f"{what} was left out: the content cannot be shown ({reason}).")
     return None
-
-
-@contextlib.contextmanager
-def _limited(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError in what takes longer, in the main thread of a process."""
-
-    def ring(number: int, frame: FrameType | None) -> None:
-        raise TimeoutError
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)

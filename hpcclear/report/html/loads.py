@@ -1,6 +1,5 @@
 """The page's section on the loads of the bearings: the numbers and remarks that the terminal prints after `simulate`."""
 
-import numpy as np
 import xarray as xr
 
 from hpcclear.base.outcome import Status
@@ -31,26 +30,41 @@ def loads(content: Content) -> list[object] | None:
         status = Status(int(one["status"]))
         if not status.valid:
             parts.append(f"{name}: failed, {status.message}. Remedy: {status.remedy}.")
-        parts += [f"{label} ({name}): {text}." for label, text in bearings.remarks(one)]
-    return parts or None
+    return [*parts, *_remarks(content)] or None
+
+
+def _remarks(content: Content) -> list[str]:
+    """Every remark once, with the responses that it is on."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for name, one in content.responses.items():
+        for remark in bearings.remarks(one):
+            found.setdefault(remark, []).append(name)
+    every = len(content.responses)
+    return [
+        f"{label} ({'all responses' if 1 < len(names) == every else ', '.join(names)}): {text}."
+        for (label, text), names in found.items()
+    ]
 
 
 def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
     """The bearings of all responses; a column of pressures where the length of a bearing is known."""
     header: list[object] = [
         "response", "joint", "peak force", "at crank angle", "mean force", "contact", "mean gap",
-        "mean pressure",
     ]  # fmt: skip
-    rows = [_row(name, one) for name, each in found.items() for one in each]
-    if not any(np.isfinite(one.pressure) for each in found.values() for one in each):
-        header, rows = header[:-1], [row[:-1] for row in rows]
+    pressed = bearings.pressures([one for each in found.values() for one in each])
+    rows = [
+        [*_row(name, one), *(Number(shown(one)) for _, shown in pressed)]
+        for name, each in found.items()
+        for one in each
+    ]
+    header += [title for title, _ in pressed]
     return Table(header, rows, "Bearings, over the averaged revolutions")
 
 
 def _row(name: str, one: bearings.Bearing) -> list[object]:
     return [
         name, one.joint, quantity(one.peak, "N"), Number(bearings.degrees(one)), quantity(one.mean, "N"),
-        Number(bearings.share(one.contact)), quantity(one.gap, "m"), quantity(one.pressure, "Pa", 3),
+        Number(bearings.share(one.contact)), quantity(one.gap, "m"),
     ]  # fmt: skip
 
 

@@ -45,9 +45,14 @@ class Section:
     """Whether it opens on request only."""
 
 
-def preformatted(text: str, summary: str = "") -> dict[str, str]:
-    """Text whose lines stay as they are; with a summary it is folded away."""
-    return {"text": text, "summary": summary}
+def preformatted(text: str) -> dict[str, object]:
+    """Text whose lines stay as they are."""
+    return {"text": text}
+
+
+def folded(summary: str, parts: Sequence[object]) -> dict[str, object]:
+    """Parts that open on request."""
+    return {"summary": summary, "parts": list(parts)}
 
 
 def render(template: str, **content: object) -> str:

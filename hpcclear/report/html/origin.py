@@ -3,10 +3,18 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from hpcclear.base.errors import InputError
+from hpcclear.report.figures.timing import timing_figure
+from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, preformatted
+from hpcclear.report.html.markup import Number, Table, folded, number, preformatted
 from hpcclear.scene.loading import parse
+
+_PARTS = ("busy", "idle", "compile", "write")
+"""What a rank spends time on, variables of kind ``timing``."""
 
 
 def effects(content: Content) -> list[object] | None:
@@ -25,7 +33,7 @@ def effects(content: Content) -> list[object] | None:
         rows = [row for name in shown for row in _flat(entries.get(name), name)]
         words = "Effects that are not listed were disabled."
         first = [words, Table(["entry", "value"], rows, "Settings of the model")]
-    return [*first, preformatted(scene, "The whole scene file")]
+    return [*first, folded("The whole scene file", [preformatted(scene)])]
 
 
 def _flat(value: Any, path: str) -> Iterator[list[object]]:
@@ -42,10 +50,9 @@ def timing(content: Content) -> list[object] | None:
     found = content.get("timing")
     if found is None:
         return None
-    parts = ("busy", "idle", "compile", "write")
     rows: list[list[object]] = []
     for k, rank in enumerate(found["rank"].to_numpy()):
-        spent = [float(found[name].isel(rank=k).sum()) for name in parts]
+        spent = [float(found[name].isel(rank=k).sum()) for name in _PARTS]
         share = spent[0] / sum(spent) if sum(spent) > 0.0 else 0.0
         row: list[object] = [
             f"rank {rank}",
@@ -57,7 +64,30 @@ def timing(content: Content) -> list[object] | None:
         rows.append(row)
     header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
     header += ["samples"] if "samples" in found else []
-    return [Table(header, rows, "Time of each rank, all stages")]
+    parts: list[object] = [
+        *_fared(content, found),
+        Table(header, rows, "Time of each rank, all stages"),
+    ]
+    picture = gallery.picture(timing_figure, found, "Time of the ranks, by rank and by stage.")
+    return [*parts, picture] if picture else parts
+
+
+def _fared(content: Content, found: xr.Dataset) -> list[object]:
+    """What the run took, in a sentence or two."""
+    spent = {name: float(found[name].sum()) for name in _PARTS}
+    total, count = sum(spent.values()) or 1.0, found.sizes["rank"]
+    wall = float(np.sum([found[name].sum("stage") for name in _PARTS], axis=0).max())
+    words = (
+        f"{count} {'rank' if count == 1 else 'ranks'} worked on it for {number(wall, 3)} s, "
+        f"{spent['busy'] / total:.0%} of {'its' if count == 1 else 'their'} time on computing."
+    )
+    rates = []
+    if "samples" in found and float(found["busy"].sum()) > 0.0:
+        rate = float(found["samples"].sum() / found["busy"].where(found["samples"] > 0).sum())
+        rates.append(f"{number(rate, 3)} samples per second and core")
+    if (samples := content.get("samples")) is not None:
+        rates.append(f"{number(float(samples['rhs_evaluations'].sum()), 3)} force evaluations")
+    return [words, f"{'; '.join(rates).capitalize()}."] if rates else [words]
 
 
 def reproduce(content: Content) -> list[object]:
@@ -68,8 +98,8 @@ def reproduce(content: Content) -> list[object]:
         steps += ["The command that made these results:"]
         steps += [preformatted(str(found["command"].item()))]
     words = (
-        "The same scene, seed and versions on the same type of processor give the same numbers to the last bit, on "
-        "any number of ranks; `hpcclear reproduce` with this directory simulates some of them again and compares."
+        "The same scene, seed and versions on the same type of processor give bit-identical results, on "
+        "any number of ranks. `hpcclear reproduce` with this directory simulates some of them again and compares."
     )
     rows = [
         [label, content.attribute(name)]

@@ -119,12 +119,12 @@
     const below = byId("front-responses");
     below.replaceChildren();
     describe(panel, point);
-    if (point.direct.length) list(panel, "By direct simulation, with confidence limits", point.direct);
-    else put(panel, "p", "This solution was not simulated directly; larger marks were.", { class: "soft" });
+    if (point.direct.length) list(panel, "By simulation, with 95 % confidence intervals", point.direct);
+    else put(panel, "p", "Not simulated: a prediction of the surrogate.", { class: "soft" });
     const one = content.responses[point.response];
     const base = point.response === "original" ? null : content.responses.original;
     if (one) {
-      put(below, "h3", `Responses of ${point.name}${base ? " (grey: the original design)" : ""}`);
+      put(below, "h3", `Responses of ${point.name}${base ? " (grey: the baseline design)" : ""}`);
       const charts = put(below, "div", null, { class: "charts" });
       one.forEach((curve, k) => chart(charts, curve, base ? base[k] : null));
     } else {
@@ -147,6 +147,16 @@
     redraw();
   }
 
+  const along = [0, 1]; /* which axes lie across and up */
+
+  function bars(svg, p, x, y) {
+    if (!p.intervals) return;
+    const [across, up] = along.map((k) => p.intervals[k]);
+    const style = `--own: ${colour(p.case)}`, fixed = { class: "bar", style };
+    if (across) draw(svg, "line", { x1: x(across[0]), x2: x(across[1]), y1: y(p.y), y2: y(p.y), ...fixed });
+    if (up) draw(svg, "line", { x1: x(p.x), x2: x(p.x), y1: y(up[0]), y2: y(up[1]), ...fixed });
+  }
+
   /* where a case has other objectives than mean and deviation, any two may be looked at */
   function directions(controls, redraw) {
     const { axes, points } = content.front;
@@ -157,6 +167,7 @@
       select.value = at;
       select.addEventListener("change", () => {
         content.front[key] = axes[select.value];
+        along[at] = Number(select.value);
         for (const p of points) p[key] = p.at[select.value];
         points.sort((a, b) => a.x - b.x || a.y - b.y);
         redraw();
@@ -173,14 +184,17 @@
     const svg = draw(place, "svg", { viewBox: `0 0 ${width} ${height}`, role: "group" });
     svg.setAttribute("aria-label", "Pareto front: arrow keys move between designs, Enter shows one");
     const box = { left: 52, top: 34, width: width - 66, height: height - 84 };
-    const xs = extent(points.map((p) => p.x), 0.05), ys = extent(points.map((p) => p.y), 0.05);
+    const reach = (axis, key) => points.flatMap((p) => [p[key], ...((p.intervals && p.intervals[along[axis]]) || [])]);
+    const xs = extent(reach(0, "x"), 0.05), ys = extent(reach(1, "y"), 0.05);
     const [x, y] = axes(svg, box, xs, ys, content.front.x, content.front.y, [width < 450 ? 3 : 6, 6]);
     /* simulated designs are drawn last, on top */
     const order = points.map((p, k) => k).sort((a, b) => rank(points[a]) - rank(points[b]));
     function rank(p) { return p.kind === "solution" ? (p.direct.length ? 1 : 0) : 2; }
     const marks = [];
     for (const k of order) {
-      const p = points[k], mark = marker(svg, p, x(p.x), y(p.y));
+      const p = points[k];
+      bars(svg, p, x, y);
+      const mark = marker(svg, p, x(p.x), y(p.y));
       mark.setAttribute("tabindex", "-1");
       mark.setAttribute("role", "button");
       mark.setAttribute("aria-label", `${p.case} ${p.name}: ${content.front.x} ${p.x}, ${content.front.y} ${p.y}`);
@@ -225,7 +239,8 @@
       event.preventDefault();
       keys[event.key]();
     });
-    const first = points.findIndex((p) => content.responses[p.response] && p.kind === "design");
+    const best = points.findIndex((p) => p.name === content.front.recommended);
+    const first = best >= 0 ? best : points.findIndex((p) => content.responses[p.response] && p.kind === "design");
     choose(first >= 0 ? first : Math.max(0, points.findIndex((p) => p.direct.length)));
   }
 

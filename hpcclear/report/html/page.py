@@ -1,4 +1,4 @@
-"""One HTML file about a directory of results: works offline, asks nothing of the network, prints and tabs well."""
+"""One HTML file about a directory of results: works offline, loads nothing from the network, prints and tabs well."""
 
 import base64
 import functools
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.report.answer import answer
-from hpcclear.report.html import costs, gallery, loads, origin, picture, sections
+from hpcclear.report.html import costs, designs, gallery, loads, origin, picture, sections
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import Section, render
@@ -30,13 +30,16 @@ _MISSING = {
 }
 
 
-def write_report(directory: str | Path) -> Path:
-    """Write DIRECTORY/report.html from the result files in the directory.
+def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
+    """Write a page from the result files in a directory, or from chosen ones.
 
     Parameters
     ----------
-    directory : path
-        Holds any of the files of `run`, `sample`, `accuracy` and `simulate`; what is missing is said on the page.
+    *places : path
+        A directory with any of the files of `run`, `sample`, `accuracy` and `simulate`, or files of theirs. What is missing
+        in a directory is said on the page.
+    output : path, optional
+        Of the page; report.html in the directory, or in that of the first file, by default.
 
     Returns
     -------
@@ -46,12 +49,12 @@ def write_report(directory: str | Path) -> Path:
     Raises
     ------
     InputError
-        No such directory, no result in it, matplotlib missing, or no permission to write.
+        No such directory, no result in it, a chosen file that is none, matplotlib missing, or no permission to write.
     StorageError
         The disk is full or fails.
     """
-    content = read(directory)
-    path = Path(directory) / NAME
+    content = read(*places)
+    path = content.directory / NAME if output is None else Path(output)
     files.write_bytes(path, _page(content).encode(), _MARK)
     return path
 
@@ -110,23 +113,22 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
 
     One that cannot be made or filled into its template is left out, and said in `troubles` and on the page.
     """
-    beside = " and those of the paper" if content.is_compared else ""
     drawn = functools.partial(gallery.figures, troubles=troubles)
     makers: tuple[tuple[str, str, str, Callable[[Content], object]], ...] = (
         ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
-        ("summary", "Summary", "summary.html", sections.summary),
-        ("designs", f"Optimised designs{beside}", "designs.html", sections.designs),
+        ("designs", "Optimised designs", "designs.html", designs.designs),
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
+        ("statistics", "Statistics of the samples", "parts.html", sections.statistics),
         ("loads", "Loads of the bearings", "parts.html", loads.loads),
+        ("summary", "Summary", "summary.html", sections.summary),
         ("motion", "Animation", "motion.html", lambda one: one.responses or None),
-        ("accuracy", "Cost of accuracy", "parts.html", costs.accuracy),
+        ("accuracy", "Accuracy and run time", "parts.html", costs.accuracy),
         ("figures", "Figures", "figures.html", drawn),
         ("trust", "Data quality", "parts.html", sections.trust),
         ("effects", "Effects and settings", "parts.html", origin.effects),
         ("reproduce", "How to reproduce", "parts.html", origin.reproduce),
-        ("claims", "Claims of the paper", "parts.html", sections.claims),
-        ("readings", "Effect of ambiguities in the paper", "parts.html", sections.readings),
-        ("time", "Time of the ranks", "parts.html", origin.timing),
+        ("paper", "Comparison with the paper", "parts.html", _paper),
+        ("time", "Run time of the ranks", "parts.html", origin.timing),
     )
     for name, title, template, make in makers:
         # figures are limited one by one
@@ -137,8 +139,14 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
     yield Section("missing", "Results not available", "list.html", _missing(content, troubles))
 
 
-_FOLDED = ("claims", "readings", "time")
+_FOLDED = ("paper", "time")
 """Sections that few readers need."""
+
+
+def _paper(content: Content) -> list[object] | None:
+    """The paper's claims, its designs and how its text can be read; None for a study of another scene."""
+    parts = [sections.claims(content), designs.of_a_paper(content), sections.readings(content)]
+    return [one for part in parts for one in part or ()] or None
 
 
 def _section(
@@ -152,7 +160,9 @@ def _section(
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    for kind in ("accuracy", "wear", "effects"):
+    if not content.whole or (content.responses and not set(content.files) - {"timing"}):
+        return troubles or None
+    for kind in ("accuracy", "wear", "effects", "map", "bifurcation"):
         if set(content.files) <= {kind, "timing"} and kind in content.files:
             return troubles or None  # a directory of that command lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]

@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS
-from hpcclear.report.answer import goals_of, leading_goals
-from hpcclear.report.figures import labels, motion
+from hpcclear.report.answer import goals_of, leading_goals, recommended
+from hpcclear.report.figures import labels, motion, moving
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 
@@ -18,6 +18,7 @@ _LEGEND = {
     "printed": "design of the paper",
 }
 _USUAL = ("mean of f", "deviation of f")
+_WORDS = {"mean": "mean", "deviation": "standard deviation"}
 FRAMES = 180  # of a revolution
 
 
@@ -33,9 +34,9 @@ def picture(content: Content) -> dict[str, Any]:
 def front(content: Content) -> dict[str, Any]:
     """Axes and points of the interactive front; designs that were simulated stand where the simulation puts them.
 
-    At first the axes are the two objectives of the case that the answer is about; where any case has others than mean and
-    deviation of f, the reader may choose, and points stand nowhere along what their case does not ask for.
-    """
+    At first the axes are the two objectives of the case that the answer is about; where a case has others than mean and
+    standard deviation of f, the reader may choose the axes. Points have no place along an axis that is no objective of their
+    case."""
     fronts, verified = content.get("front"), content.get("verification")
     points: list[dict[str, Any]] = []
     if fronts is not None:
@@ -51,6 +52,7 @@ def front(content: Content) -> dict[str, Any]:
         "x": axes[0],
         "y": axes[1],
         **({"axes": axes} if len(axes) > 2 else {}),
+        "recommended": recommended(verified) if verified is not None else "",
         "cases": sorted({point["case"] for point in points}),
         "points": points,
         "legend": {
@@ -60,7 +62,8 @@ def front(content: Content) -> dict[str, Any]:
 
 
 def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence[str]:
-    """The first two objectives of the case that the answer is about, else of the first case; mean and deviation by default."""
+    """The first two objectives of the case that the answer is about, else of the first case; mean and standard deviation by
+    default."""
     asked = leading_goals(verified) if verified is not None else []
     if not asked and fronts is not None and "searched" in fronts:
         asked = str(fronts["searched"][0].item()).split(", ")
@@ -69,9 +72,9 @@ def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence
 
 def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
     """Labels of all axes, the leading two first; then points know where they are along each as ``at``, along the first two as
-    ``x`` and ``y``, None where their case does not ask for it."""
+    ``x`` and ``y``, None where it is no objective of their case."""
     goals = [point.pop("goals") for point in points]
-    units = {words: unit for own in goals for words, (unit, _) in own.items()}
+    units = {words: one[0] for own in goals for words, one in own.items()}
     names = list(dict.fromkeys([*(words for words in leading if words in units), *units]))
     scales = [
         labels.scale(units[words], [own[words][1] for own in goals if words in own])
@@ -83,18 +86,45 @@ def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
         ]
         at = [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
         point["x"], point["y"] = at[:2]
+        ends = [
+            [float(f"{end * s.factor:.6g}") for end in own[w][2:]]
+            if len(own.get(w, ())) == 4
+            else None
+            for w, s in zip(names, scales, strict=True)
+        ]
+        if any(ends):
+            point["intervals"] = ends
         if len(names) > 2:
             point["at"] = at
-    return [s.label(w) if s.unit != "–" else w for w, s in zip(names, scales, strict=True)]
+    words = map(labels.statistic, names)
+    return [s.label(w) if s.unit != "–" else w for w, s in zip(words, scales, strict=True)]
 
 
-def _usual(one: xr.Dataset, ending: str) -> dict[str, tuple[str, float]]:
-    """Mean and deviation of f, which every design has, likewise by words."""
-    moments = [one[f"{word}{ending}"] for word in ("mean", "deviation")]
-    return {w: (str(m.attrs["units"]), float(m)) for w, m in zip(_USUAL, moments, strict=True)}
+Goal = tuple[str, float] | tuple[str, float, float, float]
+"""Unit and value of an objective, and the ends of its confidence interval where that is known."""
 
 
-def _searched(one: xr.Dataset) -> dict[str, tuple[str, float]]:
+def _usual(one: xr.Dataset, ending: str) -> dict[str, Goal]:
+    """Mean and standard deviation of f, which every design has, by their words."""
+    return {
+        words: (
+            str(one[f"{name}{ending}"].attrs["units"]),
+            float(one[f"{name}{ending}"]),
+            *_ends(one, name, ending),
+        )
+        for words, name in zip(_USUAL, ("mean", "deviation"), strict=True)
+    }
+
+
+def _ends(one: xr.Dataset, name: str, ending: str = "_true") -> tuple[()] | tuple[float, float]:
+    """Ends of the confidence interval of a simulated value; nothing where they are not known."""
+    if ending != "_true" or f"{name}_lower" not in one:
+        return ()
+    ends = float(one[f"{name}_lower"]), float(one[f"{name}_upper"])
+    return ends if np.isfinite(np.array(ends)).all() else ()
+
+
+def _searched(one: xr.Dataset) -> dict[str, Goal]:
     """What the case of a solution makes small, by the surrogate: unit and value by its words."""
     words = str(one["searched"].item()).split(", ") if "searched" in one else []
     of_f = str(one["mean"].attrs["units"])
@@ -104,12 +134,13 @@ def _searched(one: xr.Dataset) -> dict[str, tuple[str, float]]:
     }
 
 
-def _verified(one: xr.Dataset) -> dict[str, tuple[str, float]]:
-    """The same of a design, by direct simulation."""
+def _verified(one: xr.Dataset) -> dict[str, Goal]:
+    """The same of a design, by simulation."""
     return {
         str(one[f"{name}_goal"].item()): (
             str(one[f"{name}_unit"].item()) or "1",
             float(one[f"{name}_true"]),
+            *_ends(one, name),
         )
         for name in goals_of(one)
     }
@@ -184,13 +215,13 @@ def _values(one: xr.Dataset) -> list[list[str]]:
 
 def _moments(one: xr.Dataset, mean: str, deviation: str) -> list[list[str]]:
     return [
-        [word, str(quantity(float(one[name]), str(one[name].attrs["units"])))]
+        [_WORDS[word], str(quantity(float(one[name]), str(one[name].attrs["units"])))]
         for word, name in (("mean", mean), ("deviation", deviation))
     ]
 
 
 def _direct(one: xr.Dataset) -> list[list[str]]:
-    """True moments with confidence limits, surrogate errors, counts, and what the paper prints."""
+    """Simulated moments with confidence intervals, surrogate errors, counts, and the values that the paper prints."""
     rows = []
     for word in ("mean", "deviation"):
         units = str(one[f"{word}_true"].attrs["units"])
@@ -198,7 +229,7 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
         if f"{word}_lower" in one and np.isfinite(float(one[f"{word}_lower"])):
             low, high = (float(one[f"{word}_{end}"]) for end in ("lower", "upper"))
             shown += f" ({labels.between(low, high, units)})"
-        rows.append([word, shown])
+        rows.append([_WORDS[word], shown])
     for name in goals_of(one):
         words, unit = (str(one[f"{name}_{what}"].item()) for what in ("goal", "unit"))
         low, high = (float(one[f"{name}_{end}"]) for end in ("lower", "upper"))
@@ -207,11 +238,13 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
             rows.append([words, f"{quantity(float(one[f'{name}_true']), unit)}{known}"])
     for word in ("mean", "deviation"):
         if f"{word}_error" in one and np.isfinite(float(one[f"{word}_error"])):
-            rows.append([f"surrogate's error of the {word}", f"{float(one[f'{word}_error']):+.2%}"])
+            rows.append([f"surrogate error, {_WORDS[word]}", f"{float(one[f'{word}_error']):+.2%}"])
     rows += [[word, f"{int(one[word])}"] for word in ("samples", "failed") if word in one]
     for word in ("mean", "deviation"):
         if f"{word}_paper" in one and np.isfinite(float(one[f"{word}_paper"])):
-            rows.append([f"{word} printed in the paper", f"{float(one[f'{word}_paper']):.4e} m"])
+            rows.append(
+                [f"{_WORDS[word]} printed in the paper", f"{float(one[f'{word}_paper']):.4e} m"]
+            )
     return rows
 
 
@@ -241,8 +274,8 @@ def frames(response: xr.Dataset) -> dict[str, Any]:
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
     shown = shown.isel(time=slice(None, None, every))
-    e = np.stack([shown["eccentricity_x"].to_numpy(), shown["eccentricity_y"].to_numpy()], axis=-1)
-    bodies, points, angles = _slider_crank(shown, e) if "rod_x" in shown else _linkage(shown)
+    e = moving.eccentricities(shown)
+    bodies, points, angles = moving.bodies(shown)
     pairs = [_pair(points, e[:, j]) for j in range(e.shape[1])]
     still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
     return {
@@ -257,39 +290,6 @@ def frames(response: xr.Dataset) -> dict[str, Any]:
         "e": _digits(e.reshape(len(e), -1)),
         "force": _digits(shown["contact_force"].to_numpy()),
     }
-
-
-Drawn = tuple[list[list[int]], np.ndarray, np.ndarray]
-"""Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
-
-
-def _slider_crank(shown: xr.Dataset, e: np.ndarray) -> Drawn:
-    """Points of crank, rod and slider.
-
-    The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
-    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
-    """
-    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
-    phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
-    crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
-    # crank length * crank = rod - u2 * along + e12
-    both = np.column_stack([crank.ravel(), along.ravel()])
-    pin = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0]) * crank
-    slider = np.column_stack([shown["slider_position"].to_numpy(), np.zeros(len(pin))])
-    points = np.stack([np.zeros_like(pin), pin, pin - e[:, 0], slider - e[:, 1], slider], axis=1)
-    return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, np.zeros_like(phi)])
-
-
-def _linkage(shown: xr.Dataset) -> Drawn:
-    names = [str(point).partition(".")[0] for point in shown["point"].to_numpy()]
-    bodies = [
-        [k for k, name in enumerate(names) if name == body]
-        for body in map(str, shown["body"].to_numpy())
-    ]
-    points = np.stack([shown["point_x"].to_numpy(), shown["point_y"].to_numpy()], axis=-1)
-    angles = shown["body_angle"].to_numpy()
-    # without the whole turns before, which would cost digits
-    return bodies, points, angles - motion.TURN * np.floor(angles[0] / motion.TURN)
 
 
 def _pair(points: np.ndarray, e: np.ndarray) -> list[int]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
-from hpcclear.statistics.random.distributions import Distribution
+from hpcclear.base.quantiles import Quantiles
+from hpcclear.statistics.random.rules import draw
 
 
 @dataclass(frozen=True)
@@ -14,10 +14,10 @@ class RandomVariable:
     """An input that scatters, independently of the others."""
 
     name: str
-    distribution: Distribution
+    law: Quantiles
     """Of the value, or of the offset from the design."""
     about_design: bool = False
-    """Whether the distribution is an offset added to the design variable of this name."""
+    """Whether it is an offset added to the design variable of this name."""
 
 
 @dataclass(frozen=True)
@@ -59,30 +59,10 @@ class Wiring:
         self.random = {one.name: one for one in random_inputs}
         self.fixed = dict(fixed)
         self.derived = {one.name: one for one in derived}
-        self._check(design_names, random_inputs)
         self.groups = self._grouped()
 
     def _sources(self, name: str) -> tuple[str, ...]:
         return self.derived[name].of if name in self.derived else (name,)
-
-    def _check(self, design_names: Sequence[str], random_inputs: Sequence[RandomVariable]) -> None:
-        if len(self.column) != len(design_names) or len(self.random) != len(random_inputs):
-            names = [*design_names, *(one.name for one in random_inputs)]
-            raise InputError("design_names, random_inputs", names, "a name twice", "name each once")
-        if not self.column:
-            raise InputError("design_names", design_names, "empty", "name the design variables")
-        used = {source for name in self.names for source in self._sources(name)}
-        for name in used - self.column.keys() - self.random.keys() - self.fixed.keys():
-            raise InputError(name, None, "the surrogate needs it and nothing gives it", "fix it")
-        for name in [*self.column, *self.random, *self.derived]:
-            if name not in used and name not in self.names:
-                raise InputError(name, None, "the surrogate does not depend on it", "leave it out")
-        for name in self.fixed.keys() & (self.column.keys() | self.random.keys()):
-            raise InputError(name, self.fixed[name], "fixed and variable at once", "choose one")
-        for name, one in self.random.items():
-            if one.about_design != (name in self.column):
-                reason = "not a design variable" if one.about_design else "also a design variable"
-                raise InputError(name, one.distribution, reason, "set about_design to match")
 
     def _grouped(self) -> tuple[Group, ...]:
         """Inputs joined while they share a random source; those without any are taken together."""
@@ -111,13 +91,11 @@ class Wiring:
 
     def draw(self, samples: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Independent draws of every random input, ``(1, samples)`` each."""
-        return {
-            name: one.distribution.draw(samples, rng)[None] for name, one in self.random.items()
-        }
+        return {name: draw(one.law, samples, rng)[None] for name, one in self.random.items()}
 
     def corners(self, group: Group) -> dict[str, np.ndarray]:
         """The corners of a group's box of random inputs, as draws: an array of shape (corners,) for each input."""
-        ends = [np.array([self.random[name].distribution.support]) for name in group.sources]
+        ends = [np.array([self.random[name].law.span]) for name in group.sources]
         return dict(zip(group.sources, tensor(ends), strict=True))
 
     def places(

@@ -1,4 +1,4 @@
-"""Mean and deviation of a Kriging mean under random inputs (eqs. 19 to 21).
+"""Mean and standard deviation of a Kriging mean under random inputs (eqs. 19 to 21).
 
 Three ways, each a check on the others:
 
@@ -22,12 +22,13 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
+from hpcclear.statistics.random.rules import kernel_integral
 from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
 
 MOST_PLACES = 2**16
-"""Points at which a surrogate is asked at a time."""
+"""Points at which a surrogate is evaluated at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ class SampledMoments:
 
 
 def sample_moments(values: np.ndarray) -> SampledMoments:
-    """Mean and deviation of independent samples, with standard errors.
+    """Mean and standard deviation of independent samples, with standard errors.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
     Notes
     -----
     The variance of the variance estimate is (m4 - s^4 (s - 3) / (s - 1)) / s, m4 the fourth central
-    moment; the deviation's follows to first order.
+    moment; that of the standard deviation follows to first order.
     """
     count = values.shape[1]
     if count < 4:
@@ -73,9 +74,9 @@ def sample_moments(values: np.ndarray) -> SampledMoments:
 
 
 class RobustObjective:
-    """Mean and deviation of a surrogate under random inputs, for whole swarms of designs.
+    """Mean and standard deviation of a surrogate under random inputs, for whole swarms of designs.
 
-    Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and deviation, in the unit of the
+    Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and standard deviation, in the unit of the
     surrogate. The result of a design does not depend on the others in the call.
 
     On a `Piecewise` model the rules are split at the borders of the boxes (each piece is smooth);
@@ -112,7 +113,7 @@ class RobustObjective:
     Raises
     ------
     InputError
-        Names that do not fit together, a random input too wide for the tolerance, derived random
+        A random input too wide for the tolerance, derived random
         inputs on a piecewise model, a kernel that is no product of the inputs; and on a call, a
         support that leaves the surrogate's domain.
     """
@@ -141,7 +142,12 @@ class RobustObjective:
             self._draws = self._drawn(*draws)
         elif not model.separable:
             label = model.leaves[0].label
-            raise InputError("surrogate", label, "no product of the inputs", 'use "monte-carlo"')
+            raise InputError(
+                "surrogate",
+                label,
+                "the model is not a product of functions of single inputs",
+                'use "monte-carlo"',
+            )
         else:
             self._rules = tuple(
                 TensorRule(leaf, model, self._wiring, tolerance, probes)  # type: ignore[arg-type]
@@ -186,7 +192,10 @@ class RobustObjective:
         simple = isinstance(leaf, Kriging) and leaf.separable and not others
         if not simple or self._wiring.derived or self._joint is not None:
             raise InputError(
-                "model", self.model.names, "no closed form for it", "compare with Monte Carlo"
+                "model",
+                self.model.names,
+                "the model has no closed form",
+                "compare with Monte Carlo",
             )
         return np.array([self._closed(leaf, design) for design in designs]).reshape(-1, 2)
 
@@ -200,9 +209,6 @@ class RobustObjective:
         """Designs as floats, after checking that their random inputs stay inside the domain."""
         designs = np.ascontiguousarray(designs, dtype=np.float64)
         wiring, model = self._wiring, self.model
-        if designs.ndim != 2 or designs.shape[1] != len(wiring.column):
-            expected = f"(n, {len(wiring.column)})"
-            raise InputError("designs", designs.shape, "wrong shape", f"give shape {expected}")
         low, high = (np.empty((len(designs), len(model.names))) for _ in range(2))
         for group in wiring.groups:
             corners = wiring.places(group.dims, designs, wiring.corners(group))
@@ -250,10 +256,10 @@ class RobustObjective:
                 one = wiring.random[name]
                 if one.about_design:
                     about = about - design[wiring.column[name]]
-                single *= one.distribution.kernel_integral(about, length)
+                single *= kernel_integral(one.law, about, length)
                 apart = np.exp(-0.25 * ((about[:, None] - about) / length) ** 2)
                 middle = 0.5 * (about[:, None] + about)
-                double *= apart * one.distribution.kernel_integral(middle, length / sqrt(2))
+                double *= apart * kernel_integral(one.law, middle, length / sqrt(2))
             else:
                 at = wiring.fixed[name] if name in wiring.fixed else design[wiring.column[name]]
                 row = np.exp(-0.5 * ((at - about) / length) ** 2)

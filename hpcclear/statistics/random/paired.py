@@ -1,4 +1,5 @@
-"""By how much a mean or a deviation changes between two functions of the same random points, with limits.
+"""By how much a mean or a standard deviation changes between two functions of the same random points, with confidence
+intervals.
 
 Points come in replicates, each a design with its scatter, or a few points. A change is a ratio of sums over replicates less 1;
 what each replicate would move it by (its influence) is all that is known about its error. Where a motion is chaotic single
@@ -19,17 +20,17 @@ LEAST_KNOWN = 0.9
 
 
 class Change(NamedTuple):
-    """A relative change: its value and the half-width of its limits; NaN where it is not known."""
+    """A relative change: its value and the half-width of its confidence interval; NaN where it is not known."""
 
     value: float
     limit: float
 
     def within(self, tolerance: float) -> bool:
-        """Whether it surely is no larger."""
+        """Whether it significantly is no larger."""
         return bool(abs(self.value) + self.limit <= tolerance)
 
     def beyond(self, tolerance: float) -> bool:
-        """Whether it surely is larger."""
+        """Whether it significantly is larger."""
         return bool(abs(self.value) - self.limit > tolerance)
 
 

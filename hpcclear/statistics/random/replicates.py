@@ -1,6 +1,6 @@
-"""Mean, deviation, quantiles and probabilities from independent replicates, with confidence limits.
+"""Mean, standard deviation, quantiles and probabilities from independent replicates, with confidence intervals.
 
-A replicate is one scrambling of a Sobol sequence, or one draw of plain Monte Carlo: what differs
+A replicate is one randomised Sobol sequence, or one draw of plain Monte Carlo: what differs
 between replicates is all that is known about the error, whatever is inside them. So one
 set of formulas serves both, and the limits take Student's t by the number of replicates.
 
@@ -21,7 +21,7 @@ from scipy.special import betaincinv, stdtrit
 from hpcclear.base.arrays import Array, Booleans
 
 FEWEST = 4
-"""Replicates, or values, from which on an error is told."""
+"""Replicates, or values, from which on an error is reported."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def student(confidence: float, freedom: int) -> float:
 
 
 def moments(values: Array) -> tuple[Estimate, Estimate]:
-    """Mean and deviation, free of bias to the order of their errors.
+    """Mean and standard deviation, free of bias to the order of their errors.
 
     Parameters
     ----------
@@ -96,15 +96,15 @@ def _shifts(sums: Array, counts: Array) -> Array:
 
 @dataclass(frozen=True)
 class Limited(Estimate):
-    """An estimate whose limits are not symmetric."""
+    """An estimate whose confidence interval is not symmetric."""
 
     lower: float
     upper: float
-    """lower and upper: confidence limits; NaN where the sample does not reach that far."""
+    """lower and upper: confidence intervals; NaN where the sample does not reach that far."""
 
 
 def quantile(values: Array, order: float, confidence: float) -> Limited:
-    """A quantile and its limits: those of its order, turned back into values (Woodruff 1952).
+    """A quantile and its confidence interval: that of its order, converted into values (Woodruff 1952).
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
     order : float
         Probability of staying below.
     confidence : float
-        Level of the limits.
+        Confidence level.
 
     Returns
     -------
     Limited
-        Its shifts are those of the order times the slope of the quantile function between the limits (Bahadur); all NaN where
-        fewer than `FEWEST` values or replicates are left.
+        Its shifts are those of the order times the slope of the quantile function between the ends of the interval (Bahadur);
+        all NaN where fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
@@ -139,7 +139,7 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
 
 
 def exceedance(values: Array, limit: float, confidence: float) -> Limited:
-    """Probability of lying above `limit`; its limits are those of as many independent draws as have its error (Korn, Graubard).
+    """Probability of lying above `limit`; its interval is that of as many independent draws as have its error (Korn, Graubard).
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _limits_of_share(
 
 
 def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:
-    """Whether number i is surely less than number j, (n, n); False where it cannot be told.
+    """Whether number i is significantly less than number j, (n, n); False where it is undecided.
 
     Replicates are paired: designs that meet the same scatter differ by less than their own errors.
 

@@ -1,4 +1,4 @@
-"""Shares and quantiles of lives, with limits that hold for any number of them.
+"""Shares and quantiles of service lives, with confidence intervals for any number of them.
 
 C. J. Clopper and E. S. Pearson, "The use of confidence or fiducial limits illustrated in the case of the binomial",
 Biometrika 26 (1934), doi:10.1093/biomet/26.4.404.
@@ -12,7 +12,7 @@ CONFIDENCE = 0.95
 
 
 def share_limits(count: Integers, total: int) -> tuple[Array, Array]:
-    """Clopper and Pearson's 95 % limits of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
+    """Clopper and Pearson's 95 % confidence interval of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
     from scipy.special import betaincinv  # a fifth of a second, and pages need the quantiles alone
 
     count = np.asarray(count)
@@ -49,3 +49,40 @@ def rank_correlation(first: Array, second: Array) -> float:
     if both.sum() < 4 or np.ptp(first[both]) == 0.0 or np.ptp(second[both]) == 0.0:
         return float("nan")
     return float(np.corrcoef(rankdata(first[both]), rankdata(second[both]))[0, 1])
+
+
+def order_limits(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
+    """95 % confidence limits of a quantile of independent values, by their order alone; NaN where too few values are known.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Finite, of any distribution.
+    level : float
+        Probability of staying below, strictly between 0 and 1.
+    unknown : int
+        Further values of which nothing is known, such as failed simulations: the limits hold wherever these lie.
+
+    References
+    ----------
+    H. A. David and H. N. Nagaraja, "Order Statistics" (2003), section 7.1, doi:10.1002/0471722162.
+    """
+    from scipy.special import bdtr
+
+    total = len(values) + unknown
+    if total == 0:
+        return np.nan, np.nan
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    below = bdtr(np.arange(total), total, level)  # of at most k values below the quantile
+    lower = int(np.searchsorted(below, tail, side="right")) - 1 - unknown  # those may all be lowest
+    upper = int(np.searchsorted(below, 1.0 - tail))
+    ranked = np.sort(values)
+    least = ranked[lower] if 0 <= lower < len(ranked) else np.nan
+    most = ranked[upper] if upper < len(ranked) else np.nan
+    return float(least), float(most)
+
+
+def fewest(level: float) -> int:
+    """Number of independent values from which on `order_limits` has both limits of a quantile."""
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    return int(np.ceil(np.log(tail) / np.log(max(level, 1.0 - level)) - 1e-12))

@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.random.distributions import nodes_needed, piece_rule
 from hpcclear.statistics.random.inputs import Group, Wiring, tensor
+from hpcclear.statistics.random.rules import nodes_needed, pieces, rule
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import tensor_moments
@@ -93,12 +93,12 @@ class TensorRule:
         """Nodes and weights of one random input: of all of it, or of the part in this box."""
         one, count = self.wiring.random[name], self.counts[name]
         if self.whole:
-            nodes, weights = one.distribution.rule(count)
+            nodes, weights = rule(one.law, count)
             return nodes[None], weights[None]
         (dim,) = group.dims
         offset = designs[:, self.wiring.column[name]] if one.about_design else np.zeros(1)
         ends = (self.leaf.lower[dim] - offset, self.leaf.upper[dim] - offset)
-        return piece_rule(one.distribution, count, *ends)
+        return pieces(one.law, count, *ends)
 
     def _holds(self, dims: Sequence[int], places: np.ndarray) -> np.ndarray:
         """Whether inputs that do not scatter lie in this box; a border belongs to the upper one."""
@@ -136,11 +136,11 @@ class TensorRule:
             for name in group.sources:
                 if simple:
                     counts[name] = nodes_needed(
-                        self.wiring.random[name].distribution,
+                        self.wiring.random[name].law,
                         float(lengths[group.dims[0]]),
                         tolerance,
                         MOST_NODES,
-                        pieces=not self.whole,
+                        by_pieces=not self.whole,
                     )
                 elif not self.whole:
                     raise InputError(
@@ -151,7 +151,7 @@ class TensorRule:
                 if counts[name] == 0:
                     raise InputError(
                         name,
-                        self.wiring.random[name].distribution,
+                        self.wiring.random[name].law,
                         f"needs more than {MOST_NODES} nodes: it spans many length scales",
                         'narrow it, loosen the tolerance, or use "monte-carlo"',
                     )
@@ -172,11 +172,11 @@ class TensorRule:
         designs = np.zeros((1, len(wiring.column))) if probes is None else np.asarray(probes, float)
         narrow = lengths[dims] / sqrt(2)
         others = [other for other in group.sources if other != name]
-        ends = [wiring.random[other].distribution.support for other in others]
+        ends = [wiring.random[other].law.span for other in others]
         levels = list(product(*((low, 0.5 * (low + high), high) for low, high in ends)))
 
-        def rule(count: int) -> np.ndarray:
-            nodes, weights = wiring.random[name].distribution.rule(count)
+        def averaged(count: int) -> np.ndarray:
+            nodes, weights = rule(wiring.random[name].law, count)
             out = []
             for level in levels:
                 draws = {
@@ -191,9 +191,9 @@ class TensorRule:
                 )
             return np.array(out)
 
-        centres = np.linspace(*wiring.random[name].distribution.support, 5)
-        exact = rule(MOST_NODES)
+        centres = np.linspace(*wiring.random[name].law.span, 5)
+        exact = averaged(MOST_NODES)
         for count in range(1, MOST_NODES):
-            if abs(rule(count) - exact).max() <= tolerance:
+            if abs(averaged(count) - exact).max() <= tolerance:
                 return count
         return 0

@@ -1,7 +1,7 @@
 """Searches through ask and tell: what is asked of them, how they are carried out, and the front of what they met.
 
 Whatever a search keeps for itself, the front is made here, alike for all: the archive of the feasible designs that no other
-one dominates, cut to the size asked for (`pareto.cut`; `pareto.best_subset` where constraints were broken). A design whose
+one dominates, cut to the size requested (`pareto.cut`; `pareto.best_subset` where constraints were broken). A design whose
 objectives are not all finite is infeasible, without limit if no violation was given.
 """
 
@@ -52,17 +52,17 @@ class Task:
 
     @property
     def particles(self) -> int:
-        """Designs at a time; a search may ask for more or fewer."""
+        """Designs at a time; a search may request more or fewer."""
         return self.settings.particles
 
     @property
     def evaluations(self) -> int:
-        """Evaluations in all; what is asked for beyond is not evaluated."""
+        """Evaluations in all; what is requested beyond is not evaluated."""
         return self.iterations * self.particles
 
 
 class Search(Protocol):
-    """A search that asks for designs and is told their objectives."""
+    """A search that requests designs and receives their objectives."""
 
     def ask(self) -> Array | None:
         """Designs to evaluate next, (n, d), within the bounds; None or none: it has come to its end."""
@@ -109,7 +109,7 @@ def minimise(search: Search, function: Function, task: Task, size: int, name: st
     Raises
     ------
     InputError
-        The search failed, asks for what is no design within the bounds, or `size` is less than the number of objectives.
+        The search failed, requests what is no design within the bounds, or `size` is less than the number of objectives.
     """
     met = _Met(task)
     while met.evaluations < task.evaluations:
@@ -156,7 +156,7 @@ class _Met:
         """The best that was met."""
         values, objectives = self.archive.values.reshape(-1, self.objectives), self.objectives
         if size < objectives:
-            raise InputError("size", size, f"a front of {objectives} objectives", "Ask for more.")
+            raise InputError("size", size, f"a front of {objectives} objectives", "Request more.")
         kept = (best_subset if self.infeasible else cut)(values, size)
         if len(kept):
             kept = kept[np.lexsort(values[kept].T[::-1])]
@@ -177,7 +177,7 @@ class _Met:
         if not len(self.archive):
             return f"no feasible point in {self.evaluations} evaluations; least violation {self.least:g}"
         if np.isnan(gain):
-            text = "cannot tell whether settled: nothing feasible before the last iterations"
+            text = "convergence not known: no feasible design before the last iterations"
         else:
             word = "settled" if gain < SETTLED else "still improving, give it more iterations"
             text = f"{word}: the last tenth of the iterations won {gain:.1e} of the hypervolume"
@@ -189,7 +189,7 @@ class _Met:
 
 
 def _asked(search: Search, name: str, bounds: Array) -> Array:
-    """Designs that a search asks for, shape (n, d); none where it has come to its end."""
+    """Designs that a search requests, shape (n, d); none where it has come to its end."""
     remedy = f"Let ask() return designs of shape (n, {len(bounds)}) within the bounds of the task"
     try:
         found = search.ask()
@@ -199,13 +199,13 @@ def _asked(search: Search, name: str, bounds: Array) -> Array:
     except Exception as error:
         raise raised(KEY, name, "failed in ask", error) from error
     if designs.ndim != 2 or designs.shape[1] != len(bounds):
-        reason = f"asks for an array of shape {designs.shape}, not (n, {len(bounds)})"
+        reason = f"returned an array of shape {designs.shape}, not (n, {len(bounds)})"
         raise InputError(KEY, name, reason, remedy)
     good = (designs >= bounds[:, 0]) & (designs <= bounds[:, 1])  # False for NaN
     if not good.all():
         row, column = np.argwhere(~good)[0]
         low, high = bounds[column]
-        reason = f"asks for {designs[row, column]:.9g} in variable {column + 1}, outside [{low:.9g}, {high:.9g}]"
+        reason = f"requested {designs[row, column]:.9g} in variable {column + 1}, outside [{low:.9g}, {high:.9g}]"
         raise InputError(KEY, name, reason, remedy)
     return designs
 

@@ -1,4 +1,4 @@
-"""Fronts of objectives that are known with errors: what is surely better, and what is one."""
+"""Fronts of objectives that are known with errors: what is significantly better, and what is one."""
 
 import moocore
 import numpy as np
@@ -22,7 +22,7 @@ class Compared:
     Attributes
     ----------
     less : array, shape (m, n, n)
-        Whether design i is surely less than design j in an objective.
+        Whether design i is significantly less than design j in an objective.
     """
 
     def __init__(self, values: Array, shifts: Array, confidence: float) -> None:
@@ -34,24 +34,24 @@ class Compared:
 
     @property
     def one(self) -> Booleans:
-        """Whether two designs cannot be told apart in any objective, (n, n)."""
+        """Whether two designs are statistically indistinguishable in any objective, (n, n)."""
         any_less = self.less.any(axis=0)
         return np.asarray(~(any_less | any_less.T))
 
     @property
     def traded(self) -> Booleans:
-        """Whether each of two designs is surely better in some objective, (n, n)."""
+        """Whether each of two designs is significantly better in some objective, (n, n)."""
         any_less = self.less.any(axis=0)
         return np.asarray(any_less & any_less.T)
 
     @property
     def beaten(self) -> Booleans:
-        """Whether another design is surely better in all objectives, (n,)."""
+        """Whether another design is significantly better in all objectives, (n,)."""
         return np.asarray(self.less.all(axis=0).any(axis=0))
 
     def best(self, objective: int) -> int:
-        """The design with the least of an objective; of those that cannot be told from it, the best in the others, one after
-        the other in their order.
+        """The design with the least of an objective; of those that are statistically indistinguishable from it, the best in
+        the others, one after the other in their order.
 
         Raises
         ------
@@ -67,7 +67,8 @@ class Compared:
         return int(np.where(level, self.values[:, last], np.inf).argmin())
 
     def front(self, size: int) -> list[int]:
-        """At most `size` designs, the best of each objective first, each surely better than each other in some objective.
+        """At most `size` designs, the best of each objective first, each significantly better than each other in some
+        objective.
 
         Those between are the ones farthest from all that were taken, objectives scaled to their extent.
         """

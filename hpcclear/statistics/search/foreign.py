@@ -1,4 +1,4 @@
-"""Searches of pymoo in the place of the swarm, through ask and tell: same evaluations, same constraints, same kind of front.
+"""Algorithms of pymoo instead of the swarm, through ask and tell: same evaluations, same constraints, same kind of front.
 
 Whatever an algorithm keeps of what it met, the front is made as the swarm's: the archive of all feasible designs that no
 other one dominates, cut to size. A design whose objectives are not all finite breaks constraints without limit.
@@ -18,6 +18,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.statistics.search.asking import KEY, Task
 
 ALGORITHMS = {
@@ -84,7 +85,7 @@ class Pymoo:
         return np.clip(lower + unit * width, *self._bounds.T)
 
     def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
-        """Objectives (n, m) and violations (n,) of what was asked for, or of the first of it."""
+        """Objectives (n, m) and violations (n,) of what was requested, or of the first of it."""
         from pymoo.problems.static import StaticProblem
 
         asked, finite = self._asked[: len(designs)], np.isfinite(objectives)
@@ -98,7 +99,7 @@ class Pymoo:
 
 
 def is_algorithm(source: Any) -> bool:
-    """Whether something is an algorithm of pymoo, or a class of them: they are set up before they are asked."""
+    """Whether something is an algorithm of pymoo, or a class of them: they are set up before they return designs."""
     return all(hasattr(source, name) for name in ("setup", "ask", "tell"))
 
 
@@ -116,7 +117,7 @@ def _begun(name: str, task: Task) -> Pymoo:
             KEY,
             f"pymoo:{name}",
             "is an algorithm of pymoo, which is not installed",
-            "Install it with: pip install 'hpcclear[pymoo]', or leave the entry out",
+            f"{installing('pymoo')}, or leave the entry out",
         ) from None
     module = importlib.import_module(f"pymoo.algorithms.moo.{ALGORITHMS[name]}")
     entries: dict[str, Any] = {"pop_size": task.particles}

@@ -2,7 +2,7 @@
 
 Each objective gets a model of two scales: Kriging over everything that is known, and Kriging with
 short length scales over what that one leaves. On the moments of a mechanism with clearances
-one model alone took ripples of some percent, which decide the least deviation, for noise. Swarms search
+one model alone took ripples of some percent, which decide the least standard deviation, for noise. Swarms search
 what the models expect and what they do not rule out (their mean less one, two, three standard deviations): the
 ends of what they find come first, then the same near the designs that are believed to be the ends, then whatever lies
 farthest from all designs that are known. Values have errors: believed of a design is what the model makes of all of them,
@@ -193,7 +193,8 @@ def _nearer(
 
 
 def _best(designs: Array, values: Array, count: int, excess: Array | None) -> Array:
-    """Designs with the least sum of all objectives, each in units of its deviation; those that keep the constraints first."""
+    """Designs with the least sum of all objectives, each in units of its standard deviation; those that keep the constraints
+    first."""
     scale = np.nanstd(values, axis=0)
     merit = (values / np.where(scale > 0.0, scale, 1.0)).sum(axis=1)
     if excess is not None:

@@ -5,7 +5,7 @@ to 0.1, r1 and r2 one random number each per particle. What the paper leaves ope
 setting for all problems:
 
 - **Archive**: the feasible non-dominated points met, thinned where crowded (`pareto.Archive`).
-- **Leaders** (P_g): tournaments of `tournament` archive members; the loneliest one wins.
+- **Leaders** (P_g): tournaments of `tournament` archive members; the least crowded member wins.
 - **Personal best** (P): the newest point, unless the old one dominates or equals it.
 - **Bounds**: speeds clipped at `speed_limit` of each range; a particle that leaves is put on the
   bound and that component of its velocity is reversed.
@@ -30,11 +30,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.statistics.search import asking, children
 from hpcclear.statistics.search.asking import Function, Task
 from hpcclear.statistics.search.pareto import Archive, Front
-from hpcclear.statistics.search.settings import SwarmSettings, checked_bounds, whole
+from hpcclear.statistics.search.settings import SwarmSettings
 
 BROKEN_SHARE = 0.85
 """Share of the particles that continue from children where constraints were broken, if any do."""
@@ -43,7 +42,7 @@ BROKEN_ANEW = 0.3
 
 
 class ParticleSwarm:
-    """A particle swarm that asks for points to evaluate and is told their objectives.
+    """A particle swarm that requests points to evaluate and receives their objectives.
 
     Parameters
     ----------
@@ -56,11 +55,6 @@ class ParticleSwarm:
     settings : SwarmSettings, optional
     start : array_like, shape (k, d), optional
         Known designs that replace the first k random particles.
-
-    Raises
-    ------
-    InputError
-        For bounds that are not finite or cross, or start points outside them.
     """
 
     def __init__(
@@ -72,17 +66,17 @@ class ParticleSwarm:
         settings: SwarmSettings | None = None,
         start: ArrayLike | None = None,
     ) -> None:
-        whole("iterations", iterations)
         self.settings = SwarmSettings() if settings is None else settings
-        self._lower, self._upper = checked_bounds(bounds)
-        self.iterations = int(iterations)
+        self._lower, self._upper = np.array(bounds, dtype=float).T
+        self.iterations = iterations
         self.iteration = 0
         self._rng = rng
         self._constrained = False  # whether a design broke a constraint
         shape = (self.settings.particles, len(self._lower))
         self._positions: Array = rng.random(shape)
         if start is not None:
-            self._place(np.array(start, dtype=float))
+            known = np.array(start, dtype=float)
+            self._positions[: len(known)] = (known - self._lower) / (self._upper - self._lower)
         self._velocities: Array = np.zeros(shape)
         self._personal_positions: Array = self._positions.copy()
         self._personal_values: Array = np.empty((shape[0], 0))
@@ -91,78 +85,23 @@ class ParticleSwarm:
             self.settings.archive_capacity, np.empty((0, shape[1])), np.empty((0, 0))
         )
 
-    @property
-    def done(self) -> bool:
-        """Whether all iterations have been told."""
-        return self.iteration >= self.iterations
-
     def ask(self) -> Array:
         """Points to evaluate, shape (particles, d); the same ones until `tell` is called."""
         return self._points(self._positions)
 
-    def tell(self, designs: ArrayLike, objectives: ArrayLike, constraints: ArrayLike) -> None:
-        """Take the objectives of the designs asked for and move the swarm on.
-
-        Parameters
-        ----------
-        designs : array_like, shape (n, d)
-            All that were asked for, in their order.
-        objectives : array_like, shape (n, m)
-            Minimised; a row with a number that is not finite is infeasible.
-        constraints : array_like, shape (n,)
-            Total violations, 0 where no constraint is broken; infinite where that is not known.
-
-        Raises
-        ------
-        InputError
-            For wrong shapes, other designs, or when all iterations are done.
-        """
-        if self.done:
-            raise InputError(
-                "iterations",
-                self.iterations,
-                "the swarm has had all its iterations",
-                "Start another one with start=front.points.",
-            )
-        values, total = self._checked(designs, objectives, constraints)
-        self._constrained |= bool((np.isfinite(values).all(axis=1) & (total > 0.0)).any())
-        self._remember(values, total)
-        feasible = total == 0.0
-        self._archive.add(self._positions[feasible], values[feasible])
+    def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
+        """Take the objectives of the designs asked for (`hpcclear.statistics.search.asking.Search`) and move on."""
+        self._constrained |= bool((np.isfinite(objectives).all(axis=1) & (constraints > 0.0)).any())
+        self._remember(objectives, constraints)
+        feasible = constraints == 0.0
+        self._archive.add(self._positions[feasible], objectives[feasible])
         self.iteration += 1
-        if not self.done:
+        if self.iteration < self.iterations:
             self._move()
-
-    def _place(self, start: Array) -> None:
-        """Put known designs in the place of the first particles."""
-        known = np.atleast_2d(start)
-        if known.shape[1] != len(self._lower) or len(known) > len(self._positions):
-            remedy = f"Give at most {len(self._positions)} points of {len(self._lower)} variables."
-            raise InputError("start", known.shape, "wrong shape", remedy)
-        if not np.all((known >= self._lower) & (known <= self._upper)):
-            raise InputError("start", known.tolist(), "outside the bounds", "Widen the bounds.")
-        self._positions[: len(known)] = (known - self._lower) / (self._upper - self._lower)
 
     def _points(self, unit: Array) -> Array:
         # this form meets both bounds exactly; the clip removes the last rounding error inside
         return np.clip(self._lower * (1.0 - unit) + self._upper * unit, self._lower, self._upper)
-
-    def _checked(
-        self, designs: ArrayLike, objectives: ArrayLike, constraints: ArrayLike
-    ) -> tuple[Array, Array]:
-        """Objectives (n, m) and total violations (n,)."""
-        values, total = np.array(objectives, dtype=float), np.array(constraints, dtype=float)
-        particles, known = self._personal_values.shape
-        if not np.array_equal(designs, self.ask()):
-            raise InputError(
-                "designs", np.shape(designs), "not those asked for", "Give them as ask() did."
-            )
-        if values.shape != (particles, known or np.shape(values)[-1]) or values.size == 0:
-            remedy = f"Give ({particles}, {known or 'm'}) objectives."
-            raise InputError("objectives", values.shape, "wrong shape", remedy)
-        if total.shape != (particles,):
-            raise InputError("constraints", total.shape, "wrong shape", "Give one per design.")
-        return values, total
 
     def _remember(self, values: Array, total: Array) -> None:
         """Update the personal bests: the new point unless the old one is better or equal."""

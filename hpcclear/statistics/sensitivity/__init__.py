@@ -16,6 +16,7 @@ from hpcclear.statistics.sensitivity.selection import Influence, Selection, sele
 from hpcclear.statistics.sensitivity.sobol import (
     SobolIndices,
     analyse_sobol,
+    noise_share,
     sobol_design,
 )
 
@@ -32,6 +33,7 @@ __all__ = [
     "best_estimates",
     "convergence_intervals",
     "design_intervals",
+    "noise_share",
     "select_influential",
     "sobol_design",
 ]

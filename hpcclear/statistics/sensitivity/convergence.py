@@ -29,9 +29,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from hpcclear.base.arrays import Array, Booleans, Integers
-from hpcclear.base.errors import InputError
 from hpcclear.statistics.sensitivity.intervals import SensitivityHistory
-from hpcclear.statistics.surrogate.metrics import check_confidence
 
 
 @dataclass(frozen=True)
@@ -73,15 +71,7 @@ def convergence_intervals(
     Returns
     -------
     ConvergenceIntervals
-
-    Raises
-    ------
-    InputError
-        If a setting is out of range.
     """
-    check_confidence(confidence)
-    if not 0.0 <= tolerance < 1.0:
-        raise InputError("tolerance", tolerance, "not a fraction", "take 0 <= tolerance < 1")
     n_steps, *shape = history.sensitivity.shape
     interval, plateau = np.full((2, *shape), -1, np.int64)
     estimate = np.full((2, *shape), np.nan)
@@ -176,7 +166,7 @@ def _uncertainty(slope: Array, error: Array, truncation: Array) -> Array:
 def _first_determined(
     slope: Array, error: Array, uncertainty: Array, critical: Array, start: int
 ) -> int | None:
-    """The widest interval after `start` in which, and before which, the slope is surely not 0."""
+    """The widest interval after `start` in which, and before which, the slope is significantly not 0."""
     sure = np.abs(slope) > critical * uncertainty
     sure_before = np.abs(slope[:-1]) > critical[:-1] * error[:-1]
     for at in range(start + 1, len(slope)):

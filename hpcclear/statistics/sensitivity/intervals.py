@@ -17,7 +17,6 @@ from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import (
     ResponseSurface,
     Sampler,
-    check_bounds,
     fit_response_surface,
     latin_hypercube,
 )
@@ -26,13 +25,7 @@ from hpcclear.statistics.surrogate.term_choice import least_points
 
 @dataclass(frozen=True)
 class IntervalSettings:
-    """Size of an interval study; the defaults for a surface in two variables follow the paper.
-
-    Raises
-    ------
-    InputError
-        If a setting is out of range.
-    """
+    """Size of an interval study; the defaults for a surface in two variables follow the paper."""
 
     steps: int = 6
     """Number of intervals; 1 gives the sensitivity over the global interval alone."""
@@ -44,16 +37,6 @@ class IntervalSettings:
     """n_points, n_test and order: training points, test points and total order of each surface."""
     chosen: bool = False
     """Whether surfaces choose their terms (`fit_response_surface`)."""
-
-    def __post_init__(self) -> None:
-        if self.steps < 1:
-            raise InputError("steps", self.steps, "no interval at all", "take at least 1")
-        if not 0.0 < self.shrink < 1.0:
-            raise InputError("shrink", self.shrink, "not a fraction", "take 0 < shrink < 1")
-        if self.order < 1:
-            raise InputError("order", self.order, "a constant has no slope", "take at least 1")
-        if self.n_test < 2:
-            raise InputError("n_test", self.n_test, "R2 needs two test points", "take at least 2")
 
     def needed(self, variables: int) -> int:
         """Points without which there is no surface in so many variables."""
@@ -71,7 +54,7 @@ class IntervalDesign:
     """Shape (n, d + 1): the d variables and, last, the clearance. By interval, then clearance, then the training points
     followed by the test points."""
     intervals: Array
-    """Shape (k, d, 2): limits of the variables, the widest first."""
+    """Shape (k, d, 2): bounds of the variables, the widest first."""
     clearances: Array
     """Shape (c,)."""
     settings: IntervalSettings
@@ -82,7 +65,7 @@ class SensitivityHistory:
     """Midpoint derivatives of every surface; NaN where too few simulations succeeded."""
 
     intervals: Array
-    """Shape (k, d, 2): limits of the variables, the widest first."""
+    """Shape (k, d, 2): bounds of the variables, the widest first."""
     clearances: Array
     """Shape (c,)."""
     sensitivity: Array
@@ -127,11 +110,17 @@ def design_intervals(
     Raises
     ------
     InputError
-        If a setting is out of range, or there would be too few points for a standard error.
+        There would be too few points for a standard error.
     """
-    limits = check_bounds(bounds)
-    gaps = np.asarray(clearances, float)
-    _check_design(gaps, settings, settings.needed(len(limits)))
+    limits, gaps = np.asarray(bounds, float), np.asarray(clearances, float)
+    needed = settings.needed(len(limits))
+    if settings.n_points <= needed:
+        raise InputError(
+            "n_points",
+            settings.n_points,
+            f"a surface that takes {needed} points leaves nothing to estimate the scatter from",
+            f"take at least {needed + 1}, better {2 * needed}",
+        )
     fractions = (1.0 - settings.shrink) ** np.arange(settings.steps)
     middle, half = limits.mean(axis=1), np.ptp(limits, axis=1) / 2.0
     lower = middle - fractions[:, np.newaxis] * half
@@ -164,16 +153,11 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
     Raises
     ------
     InputError
-        If the number of values does not fit, or no surface at all can be fitted.
+        If no surface at all can be fitted.
     """
-    y = np.asarray(values, float)
-    if y.shape != (len(design.points),):
-        raise InputError(
-            "values", y.shape, f"not one for {len(design.points)} points", "match them"
-        )
     steps, n_variables, _ = design.intervals.shape
     shape = steps, len(design.clearances)
-    y = y.reshape(*shape, -1)
+    y = np.asarray(values, float).reshape(*shape, -1)
     x = design.points[:, :-1].reshape(*y.shape, n_variables)
     gradient = np.full((2, *shape, n_variables), np.nan)
     quality = np.full((3, *shape), np.nan)
@@ -189,8 +173,8 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
         raise InputError(
             "values",
             int(failed.sum()),
-            "so many simulations failed that no surface can be fitted",
-            "look at their status, mend them, or take more points",
+            "too many simulations failed to fit a surface",
+            "look at their status, correct the cause, or use more points",
         )
     return SensitivityHistory(
         intervals=design.intervals,
@@ -227,17 +211,3 @@ def _tested(
         return float("nan"), float("nan")
     reached = accuracy(values, surface.predict(points))
     return reached.r2, reached.rmae
-
-
-def _check_design(clearances: Array, settings: IntervalSettings, needed: int) -> None:
-    if clearances.ndim != 1 or clearances.size == 0 or not np.isfinite(clearances).all():
-        raise InputError(
-            "clearances", clearances.tolist(), "not a list of numbers", "give at least one"
-        )
-    if settings.n_points <= needed:
-        raise InputError(
-            "n_points",
-            settings.n_points,
-            f"a surface that takes {needed} points leaves nothing to estimate the scatter from",
-            f"take at least {needed + 1}, better {2 * needed}",
-        )

@@ -5,12 +5,12 @@ Section 4.2 of the paper, step 4, leaves "greater impact" open. The rule here:
 1. The effect of a variable is its derivative's magnitude times the length of its global interval:
    the change of f over that interval if the slope held. Effects share the unit of f, so kilograms
    compare with metres.
-2. At each clearance the effects are measured against the largest one that can be told from 0 (by
+2. At each clearance the effects are measured against the largest one that differs significantly from 0 (by
    more than z standard errors, z being the normal quantile of the stated confidence). A variable is
 
-   - influential, if its effect can be told from 0 and reaches the stated fraction of the largest;
-   - negligible, if its effect plus z standard errors stays below that fraction, or its effect can
-     be told from 0 and lies below;
+   - influential, if its effect differs significantly from 0 and reaches the stated fraction of the largest;
+   - negligible, if its effect plus z standard errors stays below that fraction, or its effect
+     differs significantly from 0 and lies below;
    - undecided otherwise: the standard error is too large to tell, or there is no estimate.
 
 3. A variable is selected if it is influential at no less than the stated share of the clearances
@@ -30,8 +30,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from hpcclear.base.arrays import Array, Booleans, Integers
-from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.metrics import check_confidence
 
 
 class Influence(IntEnum):
@@ -94,17 +92,9 @@ def select_influential(
     Returns
     -------
     Selection
-
-    Raises
-    ------
-    InputError
-        If shapes do not fit or a setting is out of range.
     """
-    slope, error, length = _checked(names, sensitivity, standard_error, lengths)
-    check_confidence(confidence)
-    for key, value in (("fraction", fraction), ("share", share)):
-        if not 0.0 < value <= 1.0:
-            raise InputError(key, value, "not a fraction", "take more than 0 and at most 1")
+    slope, error = np.asarray(sensitivity, float), np.asarray(standard_error, float)
+    length = np.asarray(lengths, float)
     effect, effect_error = np.abs(slope) * length, error * length
     known = np.isfinite(effect) & np.isfinite(effect_error)
     effect, effect_error = np.where(known, effect, np.nan), np.where(known, effect_error, np.nan)
@@ -149,25 +139,3 @@ def _order_stable(effect: Array, margin: Array) -> bool:
     allowed = np.hypot(margin[:, :, np.newaxis], margin[:, np.newaxis, :])
     ahead = (lead > allowed).any(axis=0)
     return not bool((ahead & ahead.T).any())
-
-
-def _checked(
-    names: Sequence[str], sensitivity: ArrayLike, standard_error: ArrayLike, lengths: ArrayLike
-) -> tuple[Array, Array, Array]:
-    slope, error = np.asarray(sensitivity, float), np.asarray(standard_error, float)
-    length = np.asarray(lengths, float)
-    if slope.ndim != 2 or slope.shape != error.shape or 0 in slope.shape:
-        raise InputError(
-            "sensitivity", (slope.shape, error.shape), "not two equal tables", "pass shape (c, m)"
-        )
-    if len(names) != slope.shape[1] or length.shape != (slope.shape[1],):
-        raise InputError(
-            "names", tuple(names), f"not one name and length for {slope.shape[1]} columns", "match"
-        )
-    if not (np.isfinite(length) & (length > 0.0)).all():
-        raise InputError(
-            "lengths", length.tolist(), "an interval has no length", "make it positive"
-        )
-    if (error < 0.0).any():
-        raise InputError("standard_error", float(np.nanmin(error)), "negative", "pass magnitudes")
-    return slope, error, length

@@ -214,7 +214,7 @@ class Accumulator:
             If samples are missing.
         """
         if not self.complete:
-            raise RuntimeError("statistics are asked for before every sample has finished")
+            raise RuntimeError("statistics were requested before every sample has finished")
         return self._nodes[0][1]
 
     def loose(self) -> np.ndarray:

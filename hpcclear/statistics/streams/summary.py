@@ -1,4 +1,4 @@
-"""Summaries of samples: mean, deviation, extremes and histogram of every number, and how two of them are merged.
+"""Summaries of samples: mean, standard deviation, extremes and histogram of every number, and how two of them are merged.
 
 Samples are summed up by fixed blocks of indices, each as a binary tree over its samples in the order of their
 indices: so a summary is the same bit for bit wherever the nodes of the tree were worked out.
@@ -40,7 +40,7 @@ class Summary:
     squares: Array
     minimum: Array
     maximum: Array
-    """mean, squares, minimum and maximum, shape (rows,): mean, sum of squared deviations from it, extremes; SI."""
+    """mean, squares, minimum and maximum, shape (rows,): mean, sum of squared differences from it, extremes; SI."""
     histogram: Integers
     """Shape (rows, bins + 2): numbers below the edges, between each two, and at or above the last."""
     status: Integers
@@ -69,7 +69,7 @@ class Summary:
 
 
 class Moments(NamedTuple):
-    """Number of values, mean and sum of squared deviations, arrays of one shape."""
+    """Number of values, mean and sum of squared differences from it, arrays of one shape."""
 
     number: NDArray[Any]
     mean: NDArray[Any]

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.kernels import KERNELS, SQUARED_EXPONENTIAL, Kernel
-from hpcclear.statistics.surrogate.kriging import FIELDS, Kriging
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel
+from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import checked_samples
 from hpcclear.statistics.surrogate.likelihood import maximise
 
@@ -26,7 +25,6 @@ class KrigingMethod:
 
     restarts: int = 3
     kernel: Kernel = SQUARED_EXPONENTIAL
-    fields = FIELDS
 
     @property
     def label(self) -> str:
@@ -91,11 +89,8 @@ def fit_kriging(
     Raises
     ------
     InputError
-        Crossed bounds, points that are not finite or outside the bounds, infinite values, fewer
-        valid samples than parameters to fit (d + 3), or a kernel that is not known.
+        Points outside the bounds, or fewer valid samples than parameters to fit (d + 3).
     """
-    if kernel not in KERNELS:
-        raise InputError("kernel", kernel, "not known", f"take {' or '.join(KERNELS)}")
     points, values, bounds = (np.asarray(a, dtype=np.float64) for a in (points, values, bounds))
     needed = points.shape[-1] + 3  # length scales, signal, noise, mean
     labels, valid = checked_samples(points, values, bounds, names, needed)

@@ -116,11 +116,6 @@ class Kriging:
         return (self,)
 
     @property
-    def fields(self) -> Fields:
-        """`FIELDS`."""
-        return FIELDS
-
-    @property
     def label(self) -> str:
         """The kernel, where it is not the squared exponential."""
         return "" if self.separable else self.kernel

@@ -1,4 +1,4 @@
-"""What is asked of a surrogate: how it is fitted to points in a box, and what the fitted model answers.
+"""Interface of a surrogate: how it is fitted to points in a box, and what the fitted model returns.
 
 `Method` is what a study knows of a kind of surrogate; `hpcclear.statistics.surrogate.regression` makes one of anything with
 `fit` and `predict`.
@@ -68,14 +68,11 @@ class Leaf(Protocol):
         """The input it varies fastest in: where a box is cut."""
 
     def moments(self, points: Array) -> Array | None:
-        """Mean and deviation over equally likely points of n designs, (n, s, d) to (n, 2); None: those of `predict`."""
-
-    @property
-    def fields(self) -> Fields:
-        """What `to_arrays` gives."""
+        """Mean and standard deviation over equally likely points of n designs, (n, s, d) to (n, 2); None: those of
+        `predict`."""
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Return the model as plain arrays, without pickle; their shapes are those of `fields`."""
+        """Return the model as plain arrays of numbers and text, of any shapes, without pickle."""
 
 
 class Method(Protocol):
@@ -84,10 +81,6 @@ class Method(Protocol):
     @property
     def label(self) -> str:
         """What it is called; empty for Kriging with the squared exponential."""
-
-    @property
-    def fields(self) -> Fields:
-        """What `Leaf.to_arrays` gives."""
 
     def fit(
         self,
@@ -116,15 +109,10 @@ def checked_samples(
     Raises
     ------
     InputError
-        Arrays that do not fit together, crossed bounds, points outside them, infinite values, fewer valid samples than needed.
+        Points outside the bounds, or fewer valid samples than needed.
     """
-    labels = _check_shapes(points, values, bounds, names)
+    labels = tuple(names or (f"x{k + 1}" for k in range(points.shape[1])))
     inside(points, labels, *bounds.T)
-    if np.isinf(values).any():
-        index = int(np.isinf(values).argmax())
-        raise InputError(
-            f"values[{index}]", values[index], "infinite", "mark failed samples with NaN"
-        )
     valid = np.isfinite(values)
     if valid.sum() < needed:
         raise InputError(
@@ -134,28 +122,6 @@ def checked_samples(
             f"give at least {needed}, better ten times the number of inputs",
         )
     return labels, valid
-
-
-def _check_shapes(
-    points: np.ndarray, values: np.ndarray, bounds: np.ndarray, names: Sequence[str] | None
-) -> tuple[str, ...]:
-    """The inputs' names, after checking that the arrays fit together."""
-    if points.ndim != 2 or points.shape[1] == 0:
-        raise InputError("points", points.shape, "not a table of points", "give shape (n, d)")
-    dims = points.shape[1]
-    if values.shape != points.shape[:1]:
-        raise InputError("values", values.shape, "not one per point", f"give {points.shape[0]}")
-    if bounds.shape != (dims, 2):
-        raise InputError("bounds", bounds.shape, "wrong shape", f"give shape ({dims}, 2)")
-    labels = tuple(f"x{k + 1}" for k in range(dims)) if names is None else tuple(names)
-    if len(labels) != dims or len(set(labels)) != dims:
-        raise InputError("names", labels, "not one distinct name per input", f"give {dims} names")
-    for name, (low, high) in zip(labels, bounds, strict=True):
-        if not (np.isfinite(low) and np.isfinite(high) and low < high):
-            raise InputError(
-                name, (low, high), "bounds are crossed or not finite", "give lower < upper"
-            )
-    return labels
 
 
 def inside(
@@ -169,10 +135,6 @@ def inside(
         Naming the first variable and value outside.
     """
     points = np.asarray(points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != lower.size:
-        raise InputError(
-            "points", points.shape, "wrong shape", f"give an array of shape (n, {lower.size})"
-        )
     slack = 8 * np.finfo(float).eps * np.maximum(abs(lower), abs(upper))
     good = (points >= lower - slack) & (points <= upper + slack)  # False for NaN too
     if not good.all():
@@ -182,6 +144,6 @@ def inside(
             float(points[row, column]),
             f"outside the surrogate's domain [{lower[column]:.9g}, {upper[column]:.9g}]; "
             "it does not extrapolate",
-            "ask inside the domain, or fit the surrogate on a wider one",
+            "evaluate inside the domain, or fit the surrogate on a wider one",
         )
     return points

@@ -40,7 +40,7 @@ class Accuracy:
     n_test : int
         Test points that counted.
     n_dropped : int
-        Test points whose true value was not finite (a failed simulation).
+        Test points whose simulated value was not finite (a failed simulation).
     constant : bool
         The test values are equal up to rounding, so that R2 and RMAE are undefined.
     scale : float
@@ -68,7 +68,7 @@ class Accuracy:
 
 
 def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
-    """Compare predictions with true values (eqs. 26 and 27, both readings).
+    """Compare predictions with simulated values (eqs. 26 and 27, both readings).
 
     Parameters
     ----------
@@ -84,13 +84,13 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
     Raises
     ------
     InputError
-        If the shapes differ, a prediction is not finite, or fewer than two true values are finite.
+        If fewer than two simulated values are finite.
 
     Notes
     -----
     The standard deviation divides by n, so that ``1 - r2 == (rmse / standard deviation)**2``.
     """
-    true, predicted = _pair(values, predictions)
+    true, predicted = np.asarray(values, float), np.asarray(predictions, float)
     finite = np.isfinite(true)
     n_dropped = int(np.count_nonzero(~finite))
     true, predicted = true[finite], predicted[finite]
@@ -99,7 +99,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
             "test points",
             true.size,
             f"accuracy needs at least two finite test values, {n_dropped} failed",
-            "take more test points or mend the failing simulations",
+            "use more test points or correct the failing simulations",
         )
     error, mean = true - predicted, float(true.mean())
     scale = float(np.abs(true).max())
@@ -136,35 +136,6 @@ def leave_one_out(residuals: ArrayLike, leverages: ArrayLike) -> Array:
     -------
     numpy.ndarray, shape (n,)
         NaN where the leverage is 1: the fit without that point does not exist.
-
-    Raises
-    ------
-    InputError
-        If the shapes differ.
     """
-    residual, leverage = _pair(residuals, leverages)
-    remaining = 1.0 - leverage
-    return residual / np.where(remaining > ROUNDING, remaining, np.nan)
-
-
-def check_confidence(confidence: float) -> None:
-    """Refuse a confidence that is not in (0, 1), by an InputError."""
-    if not 0.0 < confidence < 1.0:
-        raise InputError("confidence", confidence, "not a probability", "take 0.99, for example")
-
-
-def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
-    """Two equally long vectors; the second must be finite."""
-    a, b = np.asarray(first, float), np.asarray(second, float)
-    if a.ndim != 1 or a.shape != b.shape:
-        raise InputError(
-            "values", (a.shape, b.shape), "two vectors of one length are needed", "pass shape (n,)"
-        )
-    if not np.isfinite(b).all():
-        raise InputError(
-            "predictions",
-            int(np.count_nonzero(~np.isfinite(b))),
-            "some predictions are not finite",
-            "a surrogate must answer at every test point: check the points it was asked for",
-        )
-    return a, b
+    remaining = 1.0 - np.asarray(leverages, float)
+    return np.asarray(residuals, float) / np.where(remaining > ROUNDING, remaining, np.nan)

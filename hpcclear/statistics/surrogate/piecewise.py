@@ -13,7 +13,6 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.leaf import Leaf, Method, inside
 
-RAGGED = ("training_point",)
 JUDGED = ("r2", "rmae", "accepted")
 
 
@@ -44,9 +43,6 @@ class Piecewise:
     def __post_init__(self) -> None:
         if not self.leaves or any(leaf.names != self.leaves[0].names for leaf in self.leaves):
             raise InputError("leaves", len(self.leaves), "no models of one kind", "give some")
-        for name in JUDGED:
-            if np.shape(getattr(self, name)) != (len(self.leaves),):
-                raise InputError(name, np.shape(getattr(self, name)), "not one per box", "give all")
         lower, upper = self._corners
         volume = np.prod((upper - lower) / (self.upper - self.lower), axis=1).sum()
         shared = np.minimum(upper[:, None], upper) - np.maximum(lower[:, None], lower)
@@ -104,60 +100,27 @@ class Piecewise:
         return out
 
     def moments(self, points: np.ndarray) -> np.ndarray | None:
-        """Mean and deviation of n designs, ``(n, s, d)`` to ``(n, 2)``, where a model in one piece has its own; else None."""
+        """Mean and standard deviation of n designs, ``(n, s, d)`` to ``(n, 2)``, where a model in one piece has its own; else
+        None."""
         return self.leaves[0].moments(points) if len(self.leaves) == 1 else None
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """The models as plain arrays, without pickle; `stored_fields` names their dimensions."""
-        parts = [leaf.to_arrays() for leaf in self.leaves]
-        arrays = {"names": parts[0]["names"]}
-        for name, dims in self.leaves[0].fields.items():
-            if name != "names":
-                joined = np.concatenate if dims[:1] == RAGGED else np.stack
-                arrays[name] = joined([part[name] for part in parts])
-        arrays["training_points"] = np.array([part["values"].size for part in parts])
-        return arrays | {name: np.asarray(getattr(self, name)) for name in JUDGED}
+        """The models as plain arrays, without pickle: those of leaf number k begin with "leaf{k}_"."""
+        arrays = {name: np.asarray(getattr(self, name)) for name in JUDGED}
+        for k, leaf in enumerate(self.leaves):
+            arrays |= {f"leaf{k}_{name}": array for name, array in leaf.to_arrays().items()}
+        return arrays
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray], method: Method) -> "Piecewise":
-        """The models that `to_arrays` stored; they predict the same to the last bit.
-
-        Raises
-        ------
-        InputError
-            An array is missing, has the wrong shape, or is not finite; the boxes do not tile.
-        """
-        remedy = "use a file written by this package"
-        for name in stored_fields(method):
-            if name not in arrays:
-                raise InputError(name, None, "missing from the stored model", remedy)
-        counts = np.asarray(arrays["training_points"])
-        if counts.ndim != 1 or counts.dtype.kind not in "iu" or (counts < 1).any():
-            raise InputError("training_points", counts, "not one count per box", remedy)
-        stored = np.shape(arrays["values"])
-        if stored != (counts.sum(),):
-            raise InputError("values", stored, "not as many as training_points says", remedy)
-        ends = np.cumsum(counts)
-        leaves = []
-        for k, (count, end) in enumerate(zip(counts, ends, strict=True)):
-            part = {"names": np.asarray(arrays["names"])}
-            for name, dims in method.fields.items():
-                array = np.asarray(arrays[name])
-                if dims[:1] == RAGGED:
-                    part[name] = array[end - count : end]
-                elif name != "names":
-                    if np.shape(array)[:1] != counts.shape:
-                        raise InputError(name, np.shape(array), "not one per box", remedy)
-                    part[name] = array[k]
-            leaves.append(method.restored(part))
-        r2, rmae = (np.asarray(arrays[name], dtype=np.float64) for name in ("r2", "rmae"))
-        return cls(tuple(leaves), r2, rmae, np.asarray(arrays["accepted"], dtype=bool))
+        """The models that `to_arrays` stored; they predict the same to the last bit; errors as `Method.restored`."""
+        leaves = [
+            method.restored(beginning(arrays, f"leaf{k}_")) for k in range(len(arrays["accepted"]))
+        ]
+        judged = {name: np.asarray(arrays[name]) for name in JUDGED}
+        return cls(tuple(leaves), **judged)
 
 
-def stored_fields(method: Method) -> dict[str, tuple[str, ...]]:
-    """What is stored, with dimensions; the leaves' training points lie end to end."""
-    own = {
-        name: dims if name == "names" or dims[:1] == RAGGED else ("leaf", *dims)
-        for name, dims in method.fields.items()
-    }
-    return own | dict.fromkeys(("training_points", *JUDGED), ("leaf",))
+def beginning(arrays: Mapping[str, np.ndarray], start: str) -> dict[str, np.ndarray]:
+    """Arrays, of any shapes, whose names begin so, by what follows."""
+    return {name[len(start) :]: one for name, one in arrays.items() if name.startswith(start)}

@@ -6,7 +6,6 @@ from math import comb
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.errors import InputError
 
 
 def n_terms(n_inputs: int, order: int) -> int:
@@ -15,15 +14,7 @@ def n_terms(n_inputs: int, order: int) -> int:
 
 
 def exponents_up_to(n_inputs: int, order: int) -> Integers:
-    """Exponents of all terms up to a total order, shape (t, d), the constant first.
-
-    Raises
-    ------
-    InputError
-        A negative order.
-    """
-    if order < 0:
-        raise InputError("order", order, "a polynomial has no negative order", "take 0 or more")
+    """Exponents of all terms up to a total order, shape (t, d), the constant first."""
     chosen = (
         c for k in range(order + 1) for c in combinations_with_replacement(range(n_inputs), k)
     )

@@ -60,7 +60,6 @@ class RegressionMethod:
 
     source: Any
     label: str
-    fields = FIELDS
 
     def fit(
         self,
@@ -131,7 +130,6 @@ class Regression:
     stored: Mapping[str, Array] = field(default_factory=dict)
 
     separable = False
-    fields = FIELDS
     columns = COLUMNS
 
     @cached_property
@@ -204,7 +202,8 @@ class Regression:
         return int(np.argmax(spread))
 
     def moments(self, points: Array) -> Array | None:
-        """Mean and deviation over equally likely points of n designs, (n, s, d) to (n, 2), by the regressor if it has them."""
+        """Mean and standard deviation over equally likely points of n designs, (n, s, d) to (n, 2), by the regressor if it
+        has them."""
         if not hasattr(self._model, "moments"):
             return None
         mean, scale = self._scale

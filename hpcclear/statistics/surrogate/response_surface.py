@@ -109,42 +109,15 @@ class ResponseSurface:
         return rows @ self.coefficients, np.sqrt(self.residual_variance * spread)
 
 
-def check_bounds(bounds: ArrayLike) -> Array:
-    """Bounds as a finite array of shape (d, 2), each lower limit below its upper one.
-
-    Raises
-    ------
-    InputError
-        Otherwise.
-    """
-    limits = np.asarray(bounds, float)
-    if limits.ndim != 2 or limits.shape[1] != 2 or len(limits) == 0:
-        raise InputError("bounds", limits.shape, "not a table of limits", "pass shape (d, 2)")
-    wrong = ~(np.isfinite(limits).all(axis=1) & (limits[:, 0] < limits[:, 1]))
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(
-            f"bounds[{row}]",
-            limits[row].tolist(),
-            "limits must be finite and the lower one below the upper one",
-            "swap or widen them",
-        )
-    return limits
-
-
 def scale_inputs(points: ArrayLike, bounds: Array) -> Array:
     """Points of shape (n, d) in physical units, scaled to [-1, 1] over the bounds.
 
     Raises
     ------
     InputError
-        If the shape does not fit, a coordinate is not finite, or a point lies outside.
+        If a coordinate is not finite, or a point lies outside.
     """
     x = np.asarray(points, float)
-    if x.ndim != 2 or x.shape[1] != len(bounds):
-        raise InputError(
-            "points", x.shape, f"{len(bounds)} inputs are bounded", f"pass shape (n, {len(bounds)})"
-        )
     z = (2.0 * x - bounds[:, 0] - bounds[:, 1]) / (bounds[:, 1] - bounds[:, 0])
     outside = ~(np.abs(z) <= 1.0 + OUTSIDE)  # true for NaN as well
     if outside.any():
@@ -205,8 +178,10 @@ def fit_response_surface(
     which square the condition number. Values are taken relative to one of them, so that a
     constant gives coefficients of exactly 0.
     """
-    limits = check_bounds(bounds)
-    z, y, n_dropped = _finite_rows(scale_inputs(points, limits), values)
+    limits = np.asarray(bounds, float)
+    z, y = scale_inputs(points, limits), np.asarray(values, float)
+    finite = np.isfinite(y)
+    z, y, n_dropped = z[finite], y[finite], int(np.count_nonzero(~finite))
     exponents, least = exponents_up_to(len(limits), order), 0.0
     if chosen:
         exponents, least = choose_terms(z, y, order)
@@ -260,11 +235,3 @@ def _decomposed(design: Array, order: int, n_dropped: int) -> tuple[Array, Array
             "give every input more distinct values than the order, or lower the order",
         )
     return left, singular, right
-
-
-def _finite_rows(z: Array, values: ArrayLike) -> tuple[Array, Array, int]:
-    y = np.asarray(values, float)
-    if y.shape != (len(z),):
-        raise InputError("values", y.shape, f"not one value for {len(z)} points", "pass shape (n,)")
-    finite = np.isfinite(y)
-    return z[finite], y[finite], int(np.count_nonzero(~finite))

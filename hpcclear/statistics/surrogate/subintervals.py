@@ -10,7 +10,6 @@ from itertools import product
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
@@ -117,16 +116,8 @@ def _first_boxes(
     bounds: np.ndarray, cuts: Sequence[int] | None, rng: np.random.Generator
 ) -> list[_Box]:
     """The grid of subintervals to begin with, each without points."""
-    if bounds.ndim != 2 or bounds.shape[1] != 2 or not (bounds[:, 0] < bounds[:, 1]).all():
-        raise InputError(
-            "bounds", bounds.tolist(), "not (d, 2) with lower < upper", "mend the bounds"
-        )
     dims = len(bounds)
     pieces = (1,) * dims if cuts is None else tuple(cuts)
-    if len(pieces) != dims or any(piece < 1 for piece in pieces):
-        raise InputError(
-            "cuts", pieces, "not a count of at least 1 per input", f"give {dims} counts"
-        )
     edges = [
         np.linspace(low, high, piece + 1) for (low, high), piece in zip(bounds, pieces, strict=True)
     ]
@@ -149,8 +140,6 @@ def _evaluate_wanted(evaluate: Evaluate, boxes: list[_Box]) -> None:
     """Evaluate what all boxes want in one call and add it to them."""
     batches = [batch for box in boxes for batch in box.wanted]
     values = np.asarray(evaluate(np.concatenate(batches)), dtype=np.float64)
-    if values.shape != (sum(len(batch) for batch in batches),):
-        raise InputError("evaluate", values.shape, "not one value per point", "return shape (n,)")
     parts = iter(np.split(values, np.cumsum([len(batch) for batch in batches])[:-1]))
     for box in boxes:
         points, tests = box.wanted

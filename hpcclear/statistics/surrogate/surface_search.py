@@ -71,7 +71,7 @@ Search = Generator[Array, Array, SurfaceSearch]
 def fit_until_accepted(
     evaluate: Callable[[Mapping[int, Array]], Mapping[int, Array]], searches: Sequence[Search]
 ) -> list[SurfaceSearch]:
-    """Carry out searches side by side: what all of them ask for is evaluated at once, round by round.
+    """Carry out searches in one batch: what all of them request is evaluated at once, round by round.
 
     Parameters
     ----------
@@ -127,8 +127,7 @@ def search(
     InputError
         If no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
-    limits = surfaces.check_bounds(bounds)
-    _check_search(settings)
+    limits = np.asarray(bounds, float)
     orders, targets = settings.orders, (settings.r2_min, settings.rmae_max)
     test = sample(settings.n_test, limits, rng)
     true = _test_values((yield test))
@@ -160,7 +159,7 @@ def search(
             "surrogate",
             tuple(orders),
             f"no surface could be fitted: {attempts[-1].note}",
-            "raise max_points, lower the orders, or mend the failing simulations",
+            "raise max_points, lower the orders, or correct the failing simulations",
         )
     reason = (
         f"no order of {tuple(orders)} reaches R2 >= {targets[0]:g} and RMAE <= {targets[1]:g} "
@@ -177,20 +176,6 @@ def _test_values(values: Array) -> Array:
             "test points",
             len(values),
             "fewer than two of them have a finite value",
-            "take more test points or mend the failing simulations",
+            "use more test points or correct the failing simulations",
         )
     return values
-
-
-def _check_search(settings: SearchSettings) -> None:
-    if len(settings.orders) == 0:
-        raise InputError("orders", tuple(settings.orders), "no order to try", "list at least one")
-    if settings.n_test < 2:
-        raise InputError("n_test", settings.n_test, "R2 needs two test points", "take at least 2")
-    if not 1 <= settings.n_points <= settings.max_points:
-        raise InputError(
-            "n_points",
-            settings.n_points,
-            "outside 1 .. max_points",
-            f"take 1 to {settings.max_points} points",
-        )

@@ -52,7 +52,7 @@ def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
     Raises
     ------
     InputError
-        Too few points to choose by, or a negative order.
+        Too few points to choose by.
     """
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 

@@ -1,7 +1,7 @@
-"""The paper's twelve claims on our own data: each holds, does not hold, or cannot be told.
+"""The paper's twelve claims on our own data: each holds, does not hold, or undecided.
 
 A difference counts when it is larger than `SURE` standard errors. A claim of several parts holds
-when each part does, and does not hold when one part is refuted; otherwise it cannot be told.
+when each part does, and does not hold when one part is refuted; otherwise it is undecided.
 """
 
 import itertools
@@ -99,8 +99,8 @@ def _grows_with_clearance(found: SensitivityEvidence) -> Finding:
     step = np.diff(mean)
     allowed = SURE * np.hypot(error[1:], error[:-1])
     text = (
-        f"mean f over the box from {mean[0]:.3g} to {mean[-1]:.3g}; smallest step "
-        f"{step.min():.2g}, told from 0 beyond {allowed[step.argmin()]:.2g}"
+        f"mean f over the box from {mean[0]:.3g} to {mean[-1]:.3g}; smallest increment "
+        f"{step.min():.2g}, significant above {allowed[step.argmin()]:.2g}"
     )
     return verdict(step > allowed, step < -allowed), text
 
@@ -228,7 +228,7 @@ class ResponseEvidence:
             elif not supported[-1]:
                 texts.append(
                     f"{a} against {b}: {statistic} of {quantity} {100 * change:+.1f} % "
-                    f"(told from 0 beyond {100 * sure:.1f} %)"
+                    f"(significant above {100 * sure:.1f} %)"
                 )
         text = f"{sum(supported)} of {len(wanted)} comparisons as claimed"
         if texts:
@@ -237,8 +237,8 @@ class ResponseEvidence:
 
 
 def _reach(values: Array) -> float:
-    """Half-width of the limits of a mean over copies and their stretches, (copies, stretches): Student's t of the copies
-    where they disagree, of the stretches where motion is regular and copies are one."""
+    """Half-width of the limits of a mean over copies and their intervals, (copies, intervals): Student's t of the copies
+    where they disagree, of the intervals where motion is regular and copies are one."""
     reaches = [
         student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x))
         for x in (values.mean(axis=1), values.mean(axis=0))
@@ -297,7 +297,7 @@ def _kriging_accurate(run: StudyRun, kriging: Result) -> Finding:
         for names, one, error in zip(run.study.models, r2, rmse, strict=True)
     ]
     passed = r2 >= run.study.surrogate.r2
-    text = f"on fresh points, R2 of at least {run.study.surrogate.r2:g} asked for; "
+    text = f"on fresh points, R2 of at least {run.study.surrogate.r2:g} required; "
     return verdict(passed, r2 < 0.9), text + "; ".join(texts)
 
 

@@ -15,7 +15,7 @@ TABLE_4 = {
     ("case 2", "alpha"): ((0.1053, 0.07, 0.0118, 1.4054e-4), (1.8544e-4, 9.6491e-7)),
     ("case 2", "beta"): ((0.2128, 0.0734, 0.0031, 6.3581e-4), (2.6217e-4, 8.3406e-8)),
 }
-"""Values of `DESIGN`, and their printed mean and deviation of f (m)."""
+"""Values of `DESIGN`, and their printed mean and standard deviation of f (m)."""
 
 DESIGN = ("m2", "m3", "u2", "I2")  # kg, kg, m, kg m2
 

@@ -1,6 +1,6 @@
 """The paper's own designs under the possible readings of its text: which comes nearest?
 
-Open are: whether the stiffness of eq. 4 has the factor sqrt(R_J), which its dimension asks for and
+Open are: whether the stiffness of eq. 4 has the factor sqrt(R_J), which its dimension requests and
 the print lacks; the coefficient of restitution (0.9 here, 0.46 in works it builds on); whether the
 bearing's or the journal's radius stays as built when the clearance varies; and whether the mean of
 eq. 13 runs over time or over the steps of the solver. Nothing is fitted to the printed values.
@@ -60,7 +60,7 @@ class Reading:
 
 
 def applies(scene: Scene) -> bool:
-    """Whether the scene is the paper's and asks for the comparison."""
+    """Whether the scene is the paper's and requests the comparison."""
     contact = scene.effects.contact
     return (
         scene.required_study.verification.audit_samples > 0
@@ -89,7 +89,7 @@ def readings(scene: Scene) -> list[Reading]:
 
 
 def evaluate(run: StudyRun) -> Result:
-    """Mean, deviation and f at the smallest clearance for each reading and printed design.
+    """Mean, standard deviation and f at the smallest clearance for each reading and printed design.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def _over_steps(
 
 
 def _moments(values: Array) -> tuple[float, ...]:
-    """`_COLUMNS` of replicates (r, values): scramblings, or independent draws."""
+    """`_COLUMNS` of replicates (r, values): randomised replicates, or independent draws."""
     mean, deviation = moments(values)
     failed = int(np.isnan(values).sum())
     return mean.value, mean.error, deviation.value, deviation.error, failed

@@ -37,6 +37,6 @@ def is_the_papers(scene: Scene) -> bool:
         and scene.clearance_joints() == JOINTS
         and scene.drive.kind == "constant-speed"
         and math.isclose(scene.number("drive.speed"), _SPEED, rel_tol=1e-9)
-        and scene.objective == MEAN_GAP
+        and scene.objective.words == MEAN_GAP.words
         and {"m2", "m3", "u2", "I2", "C"} <= own_names(scene).keys()
     )

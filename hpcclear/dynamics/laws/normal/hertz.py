@@ -1,7 +1,7 @@
 """Hertz: elastic, without loss."""
 
 from hpcclear.dynamics.laws.declared import ContactLaw
-from hpcclear.dynamics.laws.hertz_contact import HERTZIAN, elastic
+from hpcclear.dynamics.laws.hertz_contact import HERTZIAN
 
 
 def no_damping():
@@ -9,8 +9,8 @@ def no_damping():
     return 0.0
 
 
-def no_kink():
-    """It is never cut."""
+def factor():
+    """Nothing but the elastic part."""
     return 1.0
 
 
@@ -19,7 +19,6 @@ LAW = ContactLaw(
     source="Lankarani and Nikravesh 1990, doi:10.1115/1.2912617, for internal contact of spheres",
     formula="K d^1.5",
     valid="small contacts: up to 30 degrees to either side",
-    force=elastic,
-    kink=no_kink,
+    factor=factor,
     **{**HERTZIAN, "damping": no_damping, "without_loss": ""},
 )

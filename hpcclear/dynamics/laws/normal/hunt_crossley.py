@@ -1,18 +1,11 @@
 """Hunt and Crossley: a fixed damping factor, no memory."""
 
-import math
-
 from hpcclear.dynamics.laws.declared import ContactLaw, Parameter
 from hpcclear.dynamics.laws.hertz_contact import HERTZIAN
 
 
-def force(depth, rate, stiffness, damping):
-    """K d^1.5 (1 + chi d')."""
-    return stiffness * (depth * math.sqrt(depth)) * (1.0 + damping * rate)
-
-
-def kink(rate, damping):
-    """Where damping stops the force."""
+def factor(rate, damping):
+    """1 + chi d'."""
     return 1.0 + damping * rate
 
 
@@ -31,8 +24,7 @@ LAW = ContactLaw(
             called="fixed damping factor",
         ),
     ),
-    force=force,
-    kink=kink,
+    factor=factor,
     lossless=lambda values: values["damping"] == 0,
     **HERTZIAN,
 )

@@ -1,0 +1,150 @@
+"""The `bifurcation` command: one entry of a scene over a range, and what the motion does once a revolution at each value."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.identity import sample_key
+from hpcclear.ensemble.maps import cells
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.single import responses_of
+from hpcclear.ranks.team import Ranks
+from hpcclear.report.figures import motion
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+
+REDUCED: "dict[str, Callable[[Array], float]]" = {"max": np.max, "min": np.min, "mean": np.mean}
+"""What may stand before the name of a series: of a revolution, at the stored instants, in place of a section."""
+
+OBJECTIVE = "objective"
+"""Name of the mean gap, f of eq. 13, of each revolution."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is observed once a revolution."""
+
+    name: str = OBJECTIVE
+    """``objective``, a series of the response ("slider_velocity", "contact_force o2"), or "max ", "min ", "mean " and one."""
+    section: float = 0.0
+    """Crank angle at which a series is taken, rad."""
+    transient: int = 60
+    revolutions: int = 60
+    """transient and revolutions: how many are left out and observed."""
+
+    def of(self, response: xr.Dataset) -> xr.DataArray:
+        """The series that is observed; raises InputError where the response has none of this name."""
+        found = motion.series(response)
+        word, _, rest = self.name.partition(" ")
+        name = rest if word in REDUCED else self.name
+        if name not in found:
+            names = [OBJECTIVE, *found]
+            alike = [one for one in found if one.startswith(f"{name} ")]
+            remedy = f"Use one of: {', '.join(alike)}" if alike else nearest(name, names)
+            raise InputError("--observe", self.name, "responses have no such series", remedy)
+        return found[name]
+
+    def described(self, response: xr.Dataset) -> Objective:
+        """Its unit and words, of a short response."""
+        if self.name == OBJECTIVE:
+            return replace(MEAN_GAP, name=OBJECTIVE, words="mean gap of each revolution")
+        series = self.of(response)
+        word = self.name.partition(" ")[0]
+        at = f"at crank angle {np.degrees(self.section):g} deg"
+        how = f"{word} of each revolution" if word in REDUCED else at
+        name = self.name.removeprefix(f"{word} ") if word in REDUCED else self.name
+        words = f"{name.replace('_', ' ')}, {how}"
+        return replace(MEAN_GAP, name=self.name, unit=str(series.attrs["units"]), words=words)
+
+    def __call__(self, scene: Scene, response: xr.Dataset) -> Array:
+        """Values (revolutions,), NaN of a failed simulation."""
+        nothing = np.full(self.revolutions, np.nan)
+        if not Status(int(response["status"])).valid:
+            return nothing
+        shown = motion.steady(response, self.revolutions)
+        if self.name == OBJECTIVE:
+            return motion.objective_by_turn(shown)[-self.revolutions :]
+        series, word = self.of(shown), self.name.partition(" ")[0]
+        if word not in REDUCED:
+            return motion.section(shown, series, self.section)[-self.revolutions :]
+        turn = motion.turns(shown) - motion.turns(shown)[-1] + self.revolutions
+        place = np.clip(np.floor(turn + 1e-9).astype(int), 0, self.revolutions - 1)
+        values = series.to_numpy()
+        return np.array([REDUCED[word](values[place == k]) for k in range(self.revolutions)])
+
+
+def run_bifurcation(
+    scene: Scene,
+    axis: str,
+    output: Path,
+    ranks: Ranks,
+    observation: Observation = Observation(),
+    options: Options = DEFAULT_OPTIONS,
+) -> Finished:
+    """Simulate a scene at each value of an entry on all ranks, and write what is observed of each revolution; on root.
+
+    Parameters
+    ----------
+    scene : Scene
+    axis : str
+        ``PATH=LO:HI:N``.
+    output : Path
+        NetCDF file of kind ``bifurcation``.
+    ranks : Ranks
+    observation : Observation
+    options : Options
+
+    Raises
+    ------
+    InputError, StorageError, Stopped, RankFailed
+    """
+    began = time.perf_counter()
+    place = Place.of_file(output, options.fresh)
+    points, _ = cells(scene, (axis,))
+    key = {**sample_key(scene, points), "command": "bifurcation", "observation": repr(observation)}
+    with Session(place, key, ranks, options) as session:
+        content = session.found("bifurcation")
+        if content is None:
+            session.describe(scene)
+            names = {
+                "study": None,
+                "numerics.target_error": None,
+                "numerics.transient_revolutions": observation.transient,
+                "numerics.averaged_revolutions": observation.revolutions,
+            }
+            variants = [_variant(points.paths[0], value) for value in points.values[:, 0]]
+            long = scene.with_(names)
+            what = observation.described(_short(long, variants[0]))
+            count = observation.revolutions
+            observed = responses_of(long, variants, observation, (count,), ranks, "bifurcation")[
+                :, 0
+            ]
+            coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
+            content = session.write(
+                dataset.dataset(
+                    "bifurcation", coords, {points.names[0]: points.values[:, 0], "observed": observed},
+                    session.attributes, dict(zip(points.names, points.units, strict=True)), what,
+                    points.words,
+                )
+            )  # fmt: skip
+        session.close()
+    return session.finished(content, began)
+
+
+def _variant(paths: tuple[str, ...], value: float) -> Mapping[str, float]:
+    return dict.fromkeys(paths, float(value))
+
+
+def _short(scene: Scene, variant: Mapping[str, float]) -> xr.Dataset:
+    """A response of one revolution, for the names and units of its series."""
+    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
+    return simulate(scene.with_({**variant, **short}), checked=False)

@@ -1,0 +1,269 @@
+"""A simulated response against measured series: aligned in phase, with error norms for each quantity."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base import markup
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.report import bearings
+from hpcclear.report.figures import motion
+from hpcclear.scene.sheets import read
+from hpcclear.scene.units import UnitError, factor
+
+Alignment = Literal["auto", "angle", "correlation", "none"]
+
+SHIFTS = 720
+"""Shifts of a revolution that are tried for the largest correlation; the best is refined between its neighbours."""
+
+MOST_POINTS = 4000
+"""Measured points that the search for a shift uses."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A measured column."""
+
+    heading: str
+    name: str
+    """Heading without its unit."""
+    unit: str
+    """As written; empty for none, which is read as SI."""
+    values: Array
+    """Shape (n,), in that unit."""
+
+    def si(self, unit: str) -> Array:
+        """Values (n,) in the SI unit `unit`; raises InputError where the column has a unit of another kind."""
+        if not self.unit:
+            return self.values
+        try:
+            return self.values * float(factor(self.unit, "" if unit == "1" else unit))
+        except UnitError as error:
+            raise InputError("heading", self.heading, error.reason, error.remedy) from None
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity, measured and simulated at the measured points; SI."""
+
+    name: str
+    """As headings of exported tables have it, without the unit."""
+    unit: str
+    shown: str
+    """The unit of the measured column."""
+    measured: Array
+    simulated: Array
+
+    @property
+    def norms(self) -> dict[str, float]:
+        """RMS and largest error, that of mean and of peak (simulated less measured, SI), and the correlation coefficient."""
+        difference = self.simulated - self.measured
+        peaks = [float(np.abs(one).max()) for one in (self.simulated, self.measured)]
+        return {
+            "rms": float(np.sqrt(np.mean(difference**2))),
+            "relative_rms": float(np.sqrt(np.mean(difference**2))) / _rms(self.measured),
+            "largest": float(np.abs(difference).max()),
+            "mean": float(difference.mean()),
+            "peak": peaks[0] - peaks[1],
+            "correlation": _correlation(self.simulated, self.measured),
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A response against measurements."""
+
+    axis: str
+    """"angle" or "time"."""
+    shown: str
+    """Unit of the measured axis."""
+    x: Array
+    """Measured angle, rad, or time, s; shape (n,)."""
+    shift: float
+    """What was added to the measured axis, rad or s."""
+    aligned: str
+    """How: in words."""
+    revolutions: int
+    """Simulated revolutions, continued periodically."""
+    quantities: tuple[Quantity, ...]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the norms of each quantity, SI."""
+        rows = [
+            (f"{one.name} ({one.unit})", *(f"{value:.4g}" for value in one.norms.values()))
+            for one in self.quantities
+        ]
+        header = ("quantity", "RMS error", "relative", "largest", "mean", "peak", "correlation")
+        return markup.table(f"Comparison, {self.aligned}", rows, header)
+
+
+def compare(
+    response: xr.Dataset,
+    path: str | Path,
+    align: Alignment = "auto",
+    names: Mapping[str, str] | None = None,
+) -> Comparison:
+    """Compare a response with a table of measured series.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``; its averaged revolutions are used, continued periodically.
+    path : path
+        CSV file. The first column is ``time`` or an angle of the crank, the others are quantities as exported tables name
+        them: ``contact_force crank_rod [kN]``. Units stand in brackets; without one, numbers are SI.
+    align : {"auto", "angle", "correlation", "none"}
+        By the crank angle of the table (modulo one revolution), or shifted to the largest correlation of all columns
+        together. "auto": by angle where there is one. "none": time and angle as they stand.
+    names : mapping of str to str, optional
+        Quantities by headings of the table, where these have names of their own.
+
+    Raises
+    ------
+    InputError
+        The table cannot be read, names what the response has not, or has units of another kind.
+    """
+    columns = read_columns(Path(path))
+    axis, unit = _axis(columns[0])
+    given = columns[0].si(unit)
+    inside = bearings.averaged(response)
+    if inside.sum() < 3:
+        reason = "no averaged revolution is stored in it"
+        raise InputError("response", int(inside.sum()), reason, "Give a response that succeeded")
+    shown = response.isel(time=np.flatnonzero(inside))
+    turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
+    place, to_place = _places(shown, axis)
+    pairs = [(column, *_series(shown, column, names or {})) for column in columns[1:]]
+    measured = [column.si(str(one.attrs.get("units", "1"))) for column, _, one in pairs]
+    simulated = [_periodic(place, one.to_numpy()) for _, _, one in pairs]
+    how = ("angle" if axis == "angle" else "correlation") if align == "auto" else align
+    shift, words = 0.0, "not aligned"
+    if how == "angle":
+        if axis != "angle":
+            remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
+            raise InputError("--align", how, f"{path} has no angle", remedy)
+        # the table says where in a revolution, not in which of the simulated ones
+        steps: Array = 2.0 * np.pi * np.arange(float(turns))
+        shift = _best(to_place(given), simulated, measured, steps)
+        words = "by crank angle"
+    elif how == "correlation":
+        span = float(np.ptp(place))
+        shift = _best(
+            to_place(given),
+            simulated,
+            measured,
+            np.linspace(0, span, SHIFTS * turns, endpoint=False),
+            refine=True,
+        )
+        words = "by the largest correlation"
+    at = to_place(given) + shift
+    quantities = tuple(
+        Quantity(name, str(one.attrs.get("units", "1")), column.unit, own, curve(at))
+        for (column, name, one), own, curve in zip(pairs, measured, simulated, strict=True)
+    )
+    return Comparison(axis, columns[0].unit, given, shift, words, turns, quantities)
+
+
+def read_columns(path: Path) -> list[Column]:
+    """Return the columns of numbers of a measured table, each with its unit; raises InputError where there is no series."""
+    sheet = read(path, "measured table")
+    columns = [one for one in sheet.columns if not sheet.is_text(one)]
+    if len(columns) < 2 or len(sheet.lines) < 3:
+        reason = "has no series: an axis, a quantity and three rows are needed"
+        raise InputError(
+            "measured table", str(path), reason, "Give time or angle first, then quantities"
+        )
+    rows = range(len(sheet.lines))
+    return [
+        Column(one.heading, one.name, one.unit, np.array([sheet.number(one, row) for row in rows]))
+        for one in columns
+    ]
+
+
+def _axis(column: Column) -> tuple[str, str]:
+    """Kind and SI unit of the first column."""
+    name = _plain(column.name)
+    if name in ("time", "t"):
+        return "time", "s"
+    if name in ("angle", "crank angle", "phi", "crankangle"):
+        return "angle", "rad"
+    remedy = 'Call it "time [s]" or "crank_angle [deg]"'
+    raise InputError(
+        "heading", column.heading, "the first column is neither time nor angle", remedy
+    )
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\s_.]+", " ", name).strip().lower()
+
+
+def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], Array]]:
+    """Places (t,) of the instants along the axis, which rise, and what gives those of measured values."""
+    if axis == "time":
+        time = response["time"].to_numpy()
+        return time - time[0], lambda given: given - time[0]
+    angle, sense = motion.crank_angle(response)  # times its sense, so that it rises
+    first = sense * angle[0]
+    return angle - angle[0], lambda given: np.unwrap(sense * (given - first))
+
+
+def _series(
+    response: xr.Dataset, column: Column, names: Mapping[str, str]
+) -> tuple[str, xr.DataArray]:
+    """Name and series (t,) of the quantity that a column measures."""
+    wanted = names.get(column.heading, names.get(column.name, column.name))
+    found = motion.series(response)
+    match = {_plain(name): name for name in found}.get(_plain(wanted))
+    if match is None:
+        alike = [name for name in found if name.startswith(f"{wanted} ")]
+        remedy = f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, list(found))
+        raise InputError(
+            "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
+        )
+    return match, found[match]
+
+
+def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:
+    """A series between its places (t,), continued with the period of them all."""
+    span = float(place[-1])
+    return lambda at: np.interp(np.mod(at, span), place, values)
+
+
+def _best(
+    at: Array,
+    simulated: list[Callable[[Array], Array]],
+    measured: list[Array],
+    shifts: Array,
+    refine: bool = False,
+) -> float:
+    """The shift with the largest sum of correlation coefficients."""
+    few = np.unique(np.linspace(0, len(at) - 1, min(len(at), MOST_POINTS)).astype(int))
+
+    def agreement(shift: float) -> float:
+        return sum(
+            _correlation(curve(at[few] + shift), own[few])
+            for curve, own in zip(simulated, measured, strict=True)
+        )
+
+    best = float(max(shifts, key=agreement)) if len(shifts) > 1 else float(shifts[0])
+    if refine and len(shifts) > 1:
+        step = float(shifts[1] - shifts[0])
+        best = float(max(best + step * np.linspace(-1.0, 1.0, 41), key=agreement))
+    return best
+
+
+def _correlation(first: Array, second: Array) -> float:
+    """Correlation coefficient; 0 where one of them is constant."""
+    one, other = first - first.mean(), second - second.mean()
+    size = float(np.sqrt((one @ one) * (other @ other)))
+    return float(one @ other) / size if size > 0.0 else 0.0
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) or float("nan")

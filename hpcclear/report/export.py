@@ -1,0 +1,149 @@
+"""Tables of results as files of other programs: CSV, Excel, MATLAB, Parquet. Equal results give equal bytes."""
+
+import io
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
+from hpcclear.report import xlsx
+from hpcclear.report.tables import identifier, to_table
+from hpcclear.results import dataset, files
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+MOST_ROWS = 2**20 - 1
+"""Rows of an Excel sheet below its heading."""
+
+
+def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "DataFrame":
+    """Write a result file as a table: a row a design or an instant, in the format that the name of `output` ends in.
+
+    Parameters
+    ----------
+    path : path
+        Result file of any command.
+    output : path
+        Ends in ``.csv``, ``.xlsx``, ``.mat`` or ``.parquet``. A file there is replaced if hpcclear wrote it.
+    units : sequence of str
+        As `to_table`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        What was written, as `to_table` makes it.
+
+    Raises
+    ------
+    InputError
+        The result cannot be read, the format is not known or needs a package that is not installed, or another
+        file is in the way.
+    StorageError
+        The disk is full or fails.
+    """
+    place = Path(output)
+    check_format(place)
+    table = to_table(dataset.read(path), units)
+    content, mark = FORMATS[place.suffix.lower()](table)
+    files.write_bytes(place, content, mark)
+    return table
+
+
+def check_format(output: Path) -> None:
+    """Raise InputError unless a name ends as that of a format."""
+    if output.suffix.lower() not in FORMATS:
+        reason = "a table is written as csv, xlsx, mat or parquet"
+        raise InputError("output", str(output), reason, f"End the name in {' or '.join(FORMATS)}")
+
+
+Written = tuple[bytes, bytes]
+"""Bytes of a file, and a part of them near one of its ends by which it is known as ours."""
+
+
+def _csv(table: "DataFrame") -> Written:
+    text = table.to_csv(index=False, lineterminator="\n").encode()
+    return text, text[: min(text.find(b"\n"), 1000)]  # its own headings
+
+
+def _parquet(table: "DataFrame") -> Written:
+    arrow, parquet = _arrow()
+    made = arrow.Table.from_pandas(table, preserve_index=False)
+    about = {key: json.dumps(value) for key, value in table.attrs.items()}
+    buffer = io.BytesIO()
+    with parquet.ParquetWriter(buffer, made.schema, store_schema=False) as writer:
+        writer.write_table(made)
+        writer.add_key_value_metadata({**about, "generator": "written by hpcclear"})
+    return buffer.getvalue(), b"written by hpcclear"
+
+
+def _mat(table: "DataFrame") -> Written:
+    """Columns as variables, and structures `units` and `long_names` by the same names."""
+    from scipy.io import savemat
+
+    names: dict[str, str] = {}
+    for heading in (*table.columns, *(key for key in table.attrs if key in table.attrs["units"])):
+        name, k = identifier(str(heading)), 2
+        while name in names.values():
+            name, k = f"{identifier(str(heading))[:59]}_{k}", k + 1
+        names[str(heading)] = name
+    content: dict[str, Any] = {names[str(h)]: _column(table[h].to_numpy()) for h in table.columns}
+    content |= {names[h]: table.attrs[h] for h in names if h in table.attrs}
+    for key in ("units", "long_names"):
+        content[key] = {names[h]: text for h, text in table.attrs[key].items() if h in names}
+    content |= {f"about_{key}": table.attrs[key] for key in ("title", "scene", "scene_hash")}
+    buffer = io.BytesIO()
+    savemat(buffer, content, long_field_names=True, oned_as="column")
+    head = b"MATLAB 5.0 MAT-file, written by hpcclear"  # in place of one with the time of day
+    return head.ljust(116) + buffer.getvalue()[116:], head
+
+
+def _column(values: np.ndarray) -> np.ndarray:
+    """Numbers as they are, text as a column of cells."""
+    return values if values.dtype.kind in "fi" else values.astype(object).reshape(-1, 1)
+
+
+def _xlsx(table: "DataFrame") -> Written:
+    """Three sheets: the data; quantities with their units and meanings; what the result is."""
+    if len(table) > MOST_ROWS:
+        reason = f"an Excel sheet has at most {MOST_ROWS} rows, the result has {len(table)}"
+        raise InputError("output", len(table), reason, "Export it as csv or parquet")
+    attributes = table.attrs
+    units, words = attributes["units"], attributes["long_names"]
+    data = zip(*(table[heading].tolist() for heading in table.columns), strict=True)
+    single = [(key, attributes[key]) for key in attributes if key in units]
+    about = [(key, attributes[key]) for key in ("title", "scene_hash")]
+    sheets = {
+        "data": [tuple(table.columns), *data],
+        "quantities": [("heading", "unit", "meaning"), *((h, units[h], words[h]) for h in units)],
+        "about": [
+            ("what", "value"), *single, *about,
+            *(("scene", line) for line in attributes["scene"].splitlines()),
+        ],
+    }  # fmt: skip
+    return xlsx.book(sheets), xlsx.MARK
+
+
+def _arrow() -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet; InputError with the extra that brings them."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ModuleNotFoundError:
+        kind, reason = "parquet", "parquet files need the package pyarrow, which is not installed"
+        remedy = f"{installing('tables')}; csv, xlsx and mat need nothing"
+        raise InputError("output", kind, reason, remedy) from None
+    return pyarrow, pyarrow.parquet
+
+
+FORMATS: dict[str, Callable[["DataFrame"], Written]] = {
+    ".csv": _csv,
+    ".xlsx": _xlsx,
+    ".mat": _mat,
+    ".parquet": _parquet,
+}
+"""What makes a file of each ending."""

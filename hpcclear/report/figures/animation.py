@@ -1,0 +1,192 @@
+"""Films of a response: the mechanism in motion above its contact forces, as GIF or MP4."""
+
+import io
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, motion, moving, style
+from hpcclear.results import files
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+RATE = 25
+"""Frames a second: a frame takes 40 ms, which a GIF can say."""
+
+LONGEST = 120.0  # s
+
+_DPI = 150
+
+
+def animate(
+    response: xr.Dataset, path: str | Path, seconds: float = 6.0, revolutions: int = 2
+) -> Path:
+    """Write a film of the last revolutions, slowed down or sped up to a length in seconds.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``.
+    path : path
+        Ends in ``.gif``, or in ``.mp4`` where the program ffmpeg is installed.
+    seconds : float
+        Length of the film.
+    revolutions : int
+        How many revolutions; fewer if the response has fewer.
+
+    Raises
+    ------
+    InputError
+        Another ending, no ffmpeg, no length, or another file in the way.
+    StorageError
+        The disk is full or fails.
+    """
+    place = Path(path)
+    if place.suffix.lower() not in (".gif", ".mp4"):
+        reason = "an animation is a gif or an mp4"
+        raise InputError("animation", str(place), reason, "End the name in .gif or .mp4")
+    if not 1.0 / RATE <= seconds <= LONGEST:
+        reason = f"the length must be {1 / RATE:g} to {LONGEST:g} s"
+        raise InputError("animation", seconds, reason, "Give another length")
+    program = _ffmpeg(place) if place.suffix.lower() == ".mp4" else ""
+    pictures = _pictures(motion.latest(response, revolutions), round(seconds * RATE))
+    content = _mp4(pictures, program) if program else _gif(pictures)
+    files.write_bytes(place, content, b"hpcclear")
+    return place
+
+
+def _pictures(shown: xr.Dataset, count: int) -> Iterator[Array]:
+    """Frames (height, width, 3), bytes, evenly spaced in time."""
+    time = shown["time"].to_numpy()
+    at = np.linspace(time[0], time[-1], count, endpoint=False)
+    nearest = np.clip(np.searchsorted(time, at), 0, len(time) - 1)
+    figure, movable = _scene(shown)
+    canvas: Any = figure.canvas
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    for k in nearest:
+        canvas.restore_region(still)
+        for artist in movable(int(k)):
+            artist.axes.draw_artist(artist)
+        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _scene(shown: xr.Dataset) -> "tuple[Figure, Any]":
+    """The figure without what moves, and a function that gives these artists at an instant."""
+    with style.matplotlib().rc_context({**style.RC, "backend": "agg"}):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        forces = shown["contact_force"].to_numpy()
+        pressed = forces.shape[1] > 0 and bool((forces > 0.0).any())
+        ratio = [2.2, 1.0] if pressed else [1.0]
+        figure, axes = style.grid(len(ratio), 1, 100.0 if pressed else 70.0, height_ratios=ratio)
+        FigureCanvasAgg(figure)
+        figure.set_dpi(_DPI)
+        mechanism = _Mechanism(axes[0, 0], shown)
+        cursor = _forces(axes[1, 0], shown) if pressed else None
+        style.settle(axes)
+    turn = motion.turns(shown)
+
+    def movable(k: int) -> list[Any]:
+        if cursor is None:
+            return mechanism.at(k)
+        cursor.set_xdata([turn[k], turn[k]])
+        return [*mechanism.at(k), cursor]
+
+    return figure, movable
+
+
+class _Mechanism:
+    """Bodies as lines and areas through their points."""
+
+    def __init__(self, axes: "Axes", shown: xr.Dataset) -> None:
+        self._bodies, self._points, _ = moving.bodies(shown)
+        unit = labels.scale("m", self._points)
+        self._points = self._points * unit.factor
+        low, high = self._points.min(axis=(0, 1)), self._points.max(axis=(0, 1))
+        margin = 0.08 * float((high - low).max())
+        axes.set(
+            xlim=(low[0] - margin, high[0] + margin),
+            ylim=(low[1] - margin, high[1] + margin),
+            aspect="equal",
+        )
+        axes.set_xlabel(unit.label("x"))
+        axes.set_ylabel(unit.label("y"))
+        colours = [style.CYCLE[k % 7] for k in range(len(self._bodies))]
+        self._lines = [
+            axes.plot([], [], "o-", color=colour, lw=2.0, ms=3.5, animated=True)[0]
+            for colour in colours
+        ]
+
+    def at(self, k: int) -> list[Any]:
+        """Artists at an instant; more than two points are a closed outline."""
+        for line, places in zip(self._lines, self._bodies, strict=True):
+            ends = [*places, places[0]] if len(places) > 2 else places
+            line.set_data(*self._points[k, ends].T)
+        return self._lines
+
+
+def _forces(axes: "Axes", shown: xr.Dataset) -> Any:
+    """Contact forces over the revolutions, and the line that marks the instant."""
+    unit, turn = labels.of(shown["contact_force"]), motion.turns(shown)
+    for row, (joint, label) in enumerate(motion.joints(shown).items()):
+        force = shown["contact_force"].sel(joint=joint).to_numpy() * unit.factor
+        axes.plot(turn, force, color=style.CYCLE[row % 7], lw=0.8, label=labels.literal(label))
+    axes.legend(loc="upper right", ncols=3)
+    axes.set_ylabel(unit.label("contact force"))
+    axes.set_xlabel(motion.turns_label(shown))
+    return axes.axvline(turn[0], color=style.PALETTE["black"], lw=1.0, animated=True)
+
+
+def _gif(pictures: Iterator[Array]) -> bytes:
+    from PIL import Image  # comes with matplotlib
+
+    fast = Image.Quantize.FASTOCTREE
+    first, *others = [Image.fromarray(one).quantize(64, fast) for one in pictures]
+    buffer = io.BytesIO()
+    first.save(
+        buffer, "GIF", save_all=True, append_images=others, duration=1000 // RATE, loop=0,
+        comment=b"hpcclear",
+    )  # fmt: skip
+    return buffer.getvalue()
+
+
+def _ffmpeg(place: Path) -> str:
+    """The program ffmpeg; InputError if there is none."""
+    program = shutil.which("ffmpeg")
+    if program is None:
+        reason = "MP4 needs the program ffmpeg, which is not installed"
+        remedy = f"Install ffmpeg, or name the file {str(place.with_suffix('.gif'))!r}"
+        raise InputError("animation", str(place), reason, remedy)
+    return program
+
+
+def _mp4(pictures: Iterator[Array], program: str) -> bytes:
+    """An MP4 that every player reads (H.264, 4:2:0, even sides); the same bytes for the same pictures and ffmpeg."""
+    first = next(pictures)
+    height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(RATE)]
+    coded = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-threads", "1", "-fflags", "+bitexact"]
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "film.mp4"
+        words = [program, "-v", "error", *raw, "-i", "-", *coded]
+        words += ["-flags:v", "+bitexact", "-metadata", "comment=hpcclear", str(target)]
+        every = [first, *pictures]
+        content = b"".join(one[:height, :width].tobytes() for one in every)
+        done = subprocess.run(words, input=content, capture_output=True, check=False)
+        if done.returncode != 0:
+            reason = (
+                f"ffmpeg cannot write it ({done.stderr.decode(errors='replace')[-200:].strip()})"
+            )
+            raise InputError("animation", ".mp4", reason, "Write a .gif, or install another ffmpeg")
+        return target.read_bytes()

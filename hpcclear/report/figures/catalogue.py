@@ -1,0 +1,170 @@
+"""Every figure by the name that `hpcclear plot` gives it, with the caption that it has on the page."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import (
+    accuracy,
+    designs,
+    effects,
+    maps,
+    motion,
+    portraits,
+    response,
+    samples,
+    surrogates,
+    timing,
+    wear,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CROSSINGS = 200
+"""Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
+
+
+class Entry(NamedTuple):
+    """A figure of one file."""
+
+    name: str
+    kind: str
+    """Of the file."""
+    draw: "Callable[[xr.Dataset], Figure]"
+    caption: str
+
+
+def section_figure(found: xr.Dataset) -> "Figure":
+    """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
+    count = motion.whole_turns(found) - int(found.attrs.get("transient_turns", 0))
+    if count < CROSSINGS:
+        reason = f"a Poincaré section takes at least {CROSSINGS} revolutions"
+        remedy = f"Simulate with --set numerics.averaged_revolutions={CROSSINGS}"
+        raise InputError("revolutions", count, reason, remedy)
+    return portraits.poincare_figure(found, revolutions=count)
+
+
+RESULTS: tuple[Entry, ...] = (
+    Entry(
+        "samples",
+        "samples",
+        samples.samples_figure,
+        "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
+    ),
+    Entry(
+        "map",
+        "map",
+        maps.map_figure,
+        "Largest Lyapunov exponent, period and regime of each cell of the map; along a line also f with its 95 % CI.",
+    ),
+    Entry(
+        "bifurcation",
+        "bifurcation",
+        maps.bifurcation_figure,
+        "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions.",
+    ),
+    Entry(
+        "sensitivities",
+        "sensitivity",
+        surrogates.sensitivity_figure,
+        "Sensitivities against clearance: lines with bands over the whole interval, marks with bars where they "
+        "stopped changing; two standard errors.",
+    ),
+    Entry(
+        "sobol",
+        "sensitivity",
+        surrogates.sobol_figure,
+        "Global sensitivities: first-order Sobol indices (a variable by itself) and total ones (with interactions, "
+        "so that their sum may exceed 1), with two standard errors.",
+    ),
+    Entry(
+        "surface-fit",
+        "sensitivity",
+        surrogates.fit_figure,
+        "Fit of the response surfaces on test points, against clearance and length of the interval.",
+    ),
+    Entry(
+        "surrogates",
+        "kriging",
+        surrogates.surfaces_figure,
+        "Objective over pairs of design variables at the least and the largest clearance, by Kriging.",
+    ),
+    Entry(
+        "parity",
+        "kriging",
+        surrogates.parity_figure,
+        "Surrogate against simulation: each point predicted without itself; R² on test points.",
+    ),
+    Entry(
+        "wear",
+        "wear",
+        wear.fan_figure,
+        "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
+    ),
+    Entry(
+        "survival",
+        "wear",
+        wear.survival_figure,
+        "Survival, with 95 % confidence interval (Clopper and Pearson).",
+    ),
+    Entry(
+        "wear-profile",
+        "wear",
+        wear.profile_figure,
+        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over all runs.",
+    ),
+    Entry("timing", "timing", timing.timing_figure, "Time of the ranks, by rank and by stage."),
+)
+"""Of files other than responses."""
+
+RESPONSE: tuple[Entry, ...] = (
+    Entry(
+        "orbit", "response", portraits.orbit_figure, "journal-centre orbits in the clearance circle"
+    ),
+    Entry(
+        "force-direction",
+        "response",
+        portraits.force_polar_figure,
+        "contact force by its direction",
+    ),
+    Entry("penetration", "response", response.penetration_figure, "penetration"),
+    Entry("phase", "response", portraits.phase_figure, "phase portraits"),
+    Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
+    Entry("spectrum", "response", response.spectrum_figure, "spectra"),
+    Entry("energy", "response", response.energy_figure, "energy balance"),
+)
+"""Of a response, beside `response_figure`."""
+
+
+def drawings(
+    found: Mapping[str, xr.Dataset], responses: Mapping[str, xr.Dataset]
+) -> "dict[str, Callable[[], Figure]]":
+    """Return what draws each figure that results allow, by its name.
+
+    Parameters
+    ----------
+    found : mapping of str to xarray.Dataset
+        Files by their kinds, without responses.
+    responses : mapping of str to xarray.Dataset
+        By the names of designs; the figures of a single one are those of "original", else of the first.
+    """
+    made: dict[str, Callable[[], Figure]] = {
+        one.name: partial(one.draw, found[one.kind]) for one in RESULTS if one.kind in found
+    }
+    if "effects" in found:
+        made["effects"] = partial(effects.effects_figure, found["effects"], found.get("timing"))
+    if "front" in found:
+        made["front"] = partial(designs.front_figure, found["front"], found.get("verification"))
+    for name, draw in accuracy.FIGURES.items() if "accuracy" in found else ():
+        made[f"accuracy-{name.replace('_', '-')}"] = partial(draw, found["accuracy"])
+    if len(responses) > 1:
+        made["comparison"] = partial(designs.comparison_figure, responses)
+    if responses:
+        one = responses.get("original", next(iter(responses.values())))
+        made["response"] = partial(response.response_figure, one)
+        made |= {entry.name: partial(entry.draw, one) for entry in RESPONSE}
+    return made

@@ -1,0 +1,47 @@
+"""A simulated response over measured series (`hpcclear.report.compare`)."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcclear.report.figures import labels, style
+from hpcclear.scene.units import factor
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hpcclear.report.compare import Comparison
+
+
+@style.drawn
+def overlay_figure(comparison: "Comparison") -> "Figure":
+    """Each quantity, measured and simulated, over the measured time or angle, in the units of the measurement."""
+    figure, axes = style.grid(
+        len(comparison.quantities), 1, 10.0 + 38.0 * len(comparison.quantities), sharex=True
+    )
+    base = "s" if comparison.axis == "time" else "rad"
+    across = scale(comparison.shown, base)
+    order = np.argsort(comparison.x, kind="stable")
+    x = comparison.x[order] * across.factor
+    for panel, one in zip(axes[:, 0], comparison.quantities, strict=True):
+        unit = scale(one.shown, one.unit)
+        dots: dict[str, Any] = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
+        panel.plot(x, one.measured[order] * unit.factor, ".", label="measured", **dots)
+        line = one.simulated[order] * unit.factor
+        panel.plot(x, line, color=style.PALETTE["blue"], label="simulated")
+        panel.set_ylabel(
+            unit.label(labels.literal(one.name.replace("_", " ").replace(" ", "\n", 1)))
+        )
+    axes[0, 0].legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.25), borderaxespad=0.0)
+    name = "measured time" if comparison.axis == "time" else "measured crank angle"
+    axes[-1, 0].set_xlabel(across.label(name))
+    style.settle(axes, 4)
+    figure.align_ylabels()
+    return figure
+
+
+def scale(unit: str, si: str) -> labels.Scale:
+    """Return how to show numbers in the unit of the measurement, SI where it names none."""
+    if not unit:
+        return labels.Scale(1.0, labels.pretty(si))
+    return labels.Scale(1.0 / float(factor(unit, "" if si == "1" else si)), unit)

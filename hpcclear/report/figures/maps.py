@@ -1,0 +1,180 @@
+"""Maps of periodic and chaotic motion (kind ``samples``), and bifurcation figures."""
+
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import Regime, Status
+from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.figures.varied import RPM, varied
+from hpcclear.results.grids import grid
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_PERIODS = (0.5, 1.5, 2.5, 4.5, 8.5, 20.5)
+_REGIMES = [regime for regime in Regime if regime is not Regime.UNJUDGED]
+_EXPONENT = "largest Lyapunov exponent\nper revolution"
+
+
+@style.drawn
+def map_figure(content: xr.Dataset) -> "Figure":
+    """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval.
+
+    Of a dataset that `hpcclear map` wrote.
+
+    Raises
+    ------
+    InputError
+        The dataset is no map.
+    """
+    cells = grid(content)
+    names = [str(name) for name in cells["objective"].dims]
+    return _plane(cells, names) if len(names) == 2 else _line(cells, names[0])
+
+
+def entry(variable: xr.DataArray) -> tuple[Array, str]:
+    """Values (n,) of an entry of the scene in a readable unit, and the label of its axis; angular speeds in rpm."""
+    unit = RPM if variable.attrs.get("units") == "rad/s" else labels.of(variable)
+    words = labels.literal(labels.words(variable))
+    label = unit.label(words) if unit.unit != "–" else words
+    return variable.to_numpy() * unit.factor, label
+
+
+def _plane(cells: xr.Dataset, names: list[str]) -> "Figure":
+    figure, axes = style.grid(3, 1, 175.0, sharex=True)
+    (x, across), (y, up) = (entry(cells[name]) for name in names)
+    exponent = cells["kick_growth"].to_numpy().T
+    finite = np.abs(exponent[np.isfinite(exponent)])
+    most = float(np.quantile(finite, 0.98)) if finite.size else 1.0
+    colours, boundaries = style.matplotlib().colormaps, style.matplotlib().colors.BoundaryNorm
+    steps = np.arange(len(_REGIMES) + 1) + 0.5
+    regime = np.where(cells["status"].to_numpy() == Status.OK, cells["regime"].to_numpy(), np.nan)
+    panels: tuple[tuple[str, Array, dict[str, Any]], ...] = (
+        (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -most, "vmax": most}),
+        (
+            "period (revolutions)",
+            cells["period"].to_numpy().T,
+            {"cmap": "viridis", "norm": boundaries(_PERIODS, 256)},
+        ),
+        (
+            "regime",
+            regime.T,
+            {
+                "cmap": colours["viridis"].resampled(len(_REGIMES)),
+                "norm": boundaries(steps, len(_REGIMES)),
+            },
+        ),
+    )
+    for panel, (words, values, options) in zip(axes[:, 0], panels, strict=True):
+        drawn = panel.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
+        bar = figure.colorbar(drawn, ax=panel, label=words)
+        if words == "regime":
+            bar.set_ticks(
+                [float(one) for one in _REGIMES], labels=[one.name.lower() for one in _REGIMES]
+            )
+        panel.set_ylabel(up)
+        panel.grid(False)
+        style.settle([bar.ax])
+    axes[-1, 0].set_xlabel(across)
+    style.settle(axes)
+    return figure
+
+
+def _line(cells: xr.Dataset, name: str) -> "Figure":
+    figure, axes = style.grid(4, 1, 150.0, sharex=True)
+    x, across = entry(cells[name])
+    unit = labels.of(cells["objective"])
+    for panel, key, reach, factor, words in (
+        (axes[0, 0], "kick_growth", "kick_growth_limit", 1.0, _EXPONENT),
+        (axes[3, 0], "objective", "objective_limit", unit.factor, unit.label("$f$, 95 % CI")),
+    ):
+        values, width = (cells[one].to_numpy() * factor for one in (key, reach))
+        panel.errorbar(x, values, width, fmt="o", ms=2.0, lw=0.7, color=style.PALETTE["blue"])
+        panel.set_ylabel(words)
+    axes[0, 0].axhline(0.0, color=style.PALETTE["grey"], lw=0.6)
+    axes[1, 0].plot(x, cells["period"].to_numpy(), "s", ms=2.0, color=style.PALETTE["vermilion"])
+    axes[1, 0].set_ylabel("period\n(revolutions)")
+    regime = cells["regime"].to_numpy().astype(float)
+    regime[(cells["status"].to_numpy() != Status.OK) | (regime == Regime.UNJUDGED)] = np.nan
+    axes[2, 0].plot(x, regime, "D", ms=2.0, color=style.PALETTE["green"])
+    axes[2, 0].set_yticks([int(one) for one in _REGIMES], [one.name.lower() for one in _REGIMES])
+    axes[2, 0].set_ylim(0.5, len(_REGIMES) + 0.5)
+    axes[-1, 0].set_xlabel(across)
+    style.settle(axes)
+    return figure
+
+
+@style.drawn
+def bifurcation_figure(
+    responses: "xr.Dataset | Sequence[xr.Dataset]", revolutions: int | None = None
+) -> "Figure":
+    """Values once a revolution against the entry of the scene that is varied.
+
+    A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots.
+
+    Parameters
+    ----------
+    responses : xarray.Dataset or sequence of xarray.Dataset
+        Kind ``bifurcation``. Or responses (kind ``response``) of scenes that differ in one physical entry (or in several that
+        have the same value), with many revolutions: their objective, and the velocity of the slider at crank angle 0. Of
+        files that do not say so, the clearance is found from the motion.
+    revolutions : int, optional
+        Of responses, the last ones of each are drawn; half of all by default.
+
+    Raises
+    ------
+    InputError
+        No response at all, one with fewer revolutions, or scenes that differ in several entries.
+    """
+    if isinstance(responses, xr.Dataset):
+        return _observed(responses)
+    motion.check_some(responses, "Give one response for each value")
+    figure, axes = style.grid(2, 1, 110.0, sharex=True)
+    steady = [motion.steady(response, revolutions) for response in responses]
+    varying = varied(responses)
+    rows = (
+        ("objective $f$ of a revolution", "m", [motion.objective_by_turn(r) for r in steady]),
+        (
+            f"{labels.words(motion.followed(steady[0])[1])} at crank angle 0",
+            str(motion.followed(steady[0])[1].attrs["units"]),
+            [motion.section(r, motion.followed(r)[1]) for r in steady],
+        ),
+    )
+    for panel, (words, units, values) in zip(axes[:, 0], rows, strict=True):
+        x = np.repeat(varying.values, [len(v) for v in values]) * varying.scale.factor
+        _dots(panel, x, np.concatenate(values), units, words)
+    axes[1, 0].set_xlabel(varying.scale.label(varying.words))
+    style.settle(axes)
+    return figure
+
+
+def _observed(content: xr.Dataset) -> "Figure":
+    """Of a file of kind ``bifurcation``."""
+    variables = labels.design_variables(content)
+    if not variables or content.attrs.get("hpcclear_kind") != "bifurcation":
+        reason = "the dataset is no bifurcation"
+        remedy = "Make one with hpcclear bifurcation"
+        raise InputError("kind", content.attrs.get("hpcclear_kind"), reason, remedy)
+    figure, axes = style.grid(1, 1, 70.0)
+    x, across = entry(variables[0])
+    seen = content["observed"]
+    words, units = str(seen.attrs["long_name"]), str(seen.attrs["units"])
+    _dots(axes[0, 0], np.repeat(x, seen.sizes["crossing"]), seen.to_numpy().ravel(), units, words)
+    axes[0, 0].set_xlabel(across)
+    style.settle(axes)
+    return figure
+
+
+def _dots(panel: "Axes", x: Array, values: Array, units: str, words: str) -> None:
+    unit = labels.scale(units, values)
+    size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
+    y = values * unit.factor
+    panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"], rasterized=len(x) > 5000)
+    panel.set_ylabel("\n".join(textwrap.wrap(unit.label(words), 30)))

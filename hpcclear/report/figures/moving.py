@@ -1,0 +1,50 @@
+"""The mechanism in motion: its bodies by their points, and films of them as GIF and MP4."""
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.report.figures import motion
+
+Drawn = tuple[list[list[int]], Array, Array]
+"""Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
+
+
+def bodies(shown: xr.Dataset) -> Drawn:
+    """Return the bodies of a response (kind ``response``) at each instant."""
+    return _slider_crank(shown, eccentricities(shown)) if "rod_x" in shown else _linkage(shown)
+
+
+def eccentricities(shown: xr.Dataset) -> Array:
+    """Return journal centres from bearing centres, m, shape (t, joints, 2)."""
+    both = [shown[f"eccentricity_{axis}"].to_numpy() for axis in "xy"]
+    return np.stack(both, axis=-1)
+
+
+def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
+    """Points of crank, rod and slider.
+
+    The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
+    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
+    """
+    rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
+    phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
+    crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
+    # crank length * crank = rod - u2 * along + e12
+    both = np.column_stack([crank.ravel(), along.ravel()])
+    pin = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0]) * crank
+    slider = np.column_stack([shown["slider_position"].to_numpy(), np.zeros(len(pin))])
+    points = np.stack([np.zeros_like(pin), pin, pin - e[:, 0], slider - e[:, 1], slider], axis=1)
+    return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, np.zeros_like(phi)])
+
+
+def _linkage(shown: xr.Dataset) -> Drawn:
+    names = [str(point).partition(".")[0] for point in shown["point"].to_numpy()]
+    bodies = [
+        [k for k, name in enumerate(names) if name == body]
+        for body in map(str, shown["body"].to_numpy())
+    ]
+    points = np.stack([shown["point_x"].to_numpy(), shown["point_y"].to_numpy()], axis=-1)
+    angles = shown["body_angle"].to_numpy()
+    # without the whole turns before, which would cost digits
+    return bodies, points, angles - motion.TURN * np.floor(angles[0] / motion.TURN)

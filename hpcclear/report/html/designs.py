@@ -1,0 +1,190 @@
+"""The page's section on designs: those that a reader compares, each once, then the rest folded; and those of a paper."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.objectives import ENDS, ORDINALS
+from hpcclear.report import alike, beside
+from hpcclear.report.answer import constraints, is_plain
+from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import Number, Table, number, quantity
+
+_SIMULATED = (
+    ("mean_true", "mean of f"),
+    ("deviation_true", "std. deviation of f"),
+    ("percentile", "95th percentile of f"),
+    ("life_mean", "mean, own wear"),
+    ("life_deviation", "std. deviation, own wear"),
+)
+_PREDICTED = (
+    ("mean_surrogate", "surrogate: mean"),
+    ("deviation_surrogate", "surrogate: std. deviation"),
+)
+_PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. deviation"))
+"""Variables of kind ``verification``, and the heads of their columns."""
+
+_WORDS = (
+    "Values are by simulation, ± half-width of the 95 % confidence interval. f: {}. In brackets: the name of the design in "
+    "verification.nc, which also contains intermediate designs of the search."
+)
+
+
+def designs(content: Content) -> dict[str, object] | None:
+    """What was found, a table a case with each distinct design once, and further designs folded; None without any."""
+    verified = content.get("verification")
+    if verified is None:
+        return None
+    shown = beside.roles(verified)
+    named = [one.design for each in shown.values() for one in each]
+    tables = [
+        _table(verified, {one.design: one.words for one in each}, _SIMULATED, caption)
+        for case, each in shown.items()
+        if each and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
+    ]
+    if not named:
+        tables = [
+            _table(verified, {name: name for name in _names(verified)}, _SIMULATED, "Designs")
+        ]
+    spread = [name for name in _names(verified) if " front " in name]
+    remarks = str(verified.attrs.get("remarks", "none"))
+    columns = (*_SIMULATED[:2], *_PREDICTED)
+    return {
+        "words": [_WORDS.format(labels.objective(verified)), *_findings(verified)],
+        "remarks": "" if remarks == "none" else remarks,
+        "tables": tables,
+        "variables": _variables(verified),
+        "more": [
+            _table(
+                verified, {name: name for name in rest}, columns, "Simulated and predicted values"
+            )
+        ]
+        if (rest := _distinct(verified, [*named, *spread]))
+        else [],
+    }
+
+
+def _variables(verified: xr.Dataset) -> str:
+    """What the design variables are: "m2: mass of the rod; ..."."""
+    known = [
+        (str(labels.words(v)), str(v.attrs.get("long_name", "")))
+        for v in labels.design_variables(verified)
+        if bool(np.isfinite(v).any())
+    ]
+    return "; ".join(f"{name}: {words}" for name, words in known if words and words != name)
+
+
+def of_a_paper(content: Content) -> list[object]:
+    """Words and table of the designs that a publication prints, beside the optimised ones; nothing without any."""
+    verified = content.get("verification")
+    if verified is None or not content.is_compared:
+        return []
+    ends = [f"{case} {end}" for case in beside.roles(verified) for end in ENDS]
+    printed = [name for name in _names(verified) if labels.is_printed(verified.sel(design=name))]
+    names = [name for name in _names(verified) if name in ends or name in printed]
+    words = (
+        "Mean and standard deviation of f: by simulation with 95 % half-widths, and as the paper prints them in its Table 4. "
+        "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "
+        "nothing was fitted to them."
+    )
+    columns = (*_SIMULATED[:2], *_PRINTED)
+    table = _table(
+        verified, {name: name for name in names}, columns, "Table 4: this study and the paper"
+    )
+    return [words, table]
+
+
+def _names(verified: xr.Dataset) -> list[str]:
+    return [str(name) for name in verified["design"].to_numpy()]
+
+
+def _distinct(verified: xr.Dataset, names: Sequence[str]) -> list[str]:
+    """Names without those of designs that an earlier one of the same case has already."""
+    kept: list[str] = []
+    for name in names:
+        twins = alike.again(verified, verified.sel(design=name))
+        if not any(one in twins and one.split()[0] == name.split()[0] for one in kept):
+            kept.append(name)
+    return kept
+
+
+def _findings(verified: xr.Dataset) -> list[str]:
+    """A sentence for the lowest mean and the lowest standard deviation of each case."""
+    by_name = {name: verified.sel(design=name) for name in _names(verified)}
+    words = []
+    for name, one in by_name.items():
+        case, _, letter = name.rpartition(" ")
+        base = by_name.get(f"{case} original")
+        if letter not in ("alpha", "beta") or base is None or not is_plain(one):
+            continue  # of another objective, which the answer has
+        what = "mean" if letter == "alpha" else "deviation"
+        printed = "mean" if letter == "alpha" else "standard deviation"
+        change = float(one[f"{what}_true"]) / float(base[f"{what}_true"]) - 1.0
+        value = quantity(float(one[f"{what}_true"]), str(one[f"{what}_true"].attrs["units"]))
+        within = _within_intervals(by_name, one, what)
+        words.append(
+            f"Design “{name}” has the lowest {printed} of f of all simulated designs{within}: {value}, "
+            f"{abs(change):.0%} {'below' if change < 0 else 'above'} the baseline design."
+        )
+    return words
+
+
+def _within_intervals(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: str) -> str:
+    """A restriction, where another design of the case has a lower value that is statistically indistinguishable."""
+    case = str(one["case"].item()) if "case" in one else ""
+    rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
+    less = any(float(rival[f"{what}_true"]) < float(one[f"{what}_true"]) for rival in rivals)
+    return " within the confidence intervals" if less else ""
+
+
+def _table(
+    verified: xr.Dataset,
+    shown: Mapping[str, str],
+    columns: Sequence[tuple[str, str]],
+    caption: str,
+) -> Table:
+    """A row for each design, by its name and what it is called; each column in one unit, empty ones left out."""
+    chosen = verified.sel(design=list(shown))
+    known = [(v, labels.words(v)) for v in labels.design_variables(chosen)]
+    known += [(chosen[name], words) for name, words in columns if name in chosen]
+    known = [(v, words) for v, words in known if bool(np.isfinite(v).any())]
+    scales = [labels.of(variable) for variable, _ in known]
+    header = ["design", *(s.label(words) for s, (_, words) in zip(scales, known, strict=True))]
+    asked = [] if is_plain(chosen.isel(design=0)) else _objectives(chosen)
+    if asked:  # each case has its own, so the cells say what it is
+        header += [*(f"objective {k + 1}" for k in range(len(asked))), "constraints"]
+    rows = []
+    for k, words in enumerate(shown.values()):
+        row: list[object] = [words]
+        for scale, (variable, _) in zip(scales, known, strict=True):
+            text = number(float(variable[k]) * scale.factor)
+            row.append(Number(text + _half_width(chosen.isel(design=k), str(variable.name), scale)))
+        rows.append([*row, *_goals(chosen.isel(design=k), asked)])
+    return Table(header, rows, caption)
+
+
+def _objectives(verified: xr.Dataset) -> list[str]:
+    return [name for name in ORDINALS if f"{name}_goal" in verified]
+
+
+def _goals(one: xr.Dataset, names: Sequence[str]) -> list[object]:
+    """Cells of objectives and constraints of a case, where these are not mean and standard deviation alone."""
+    if not names:
+        return []
+    cells: list[object] = []
+    for name in names:
+        value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
+        words = labels.statistic(str(one[f"{name}_goal"].item()))
+        cells.append(f"{words}: {value}" if words else "")
+    return [*cells, "; ".join(constraints(one)) or "none"]
+
+
+def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
+    """Half-width of the confidence interval of a simulated value, as text behind it."""
+    word = name.removesuffix("_true")
+    if f"{word}_lower" not in one or f"{word}_upper" not in one:
+        return ""
+    half = 0.5 * (float(one[f"{word}_upper"]) - float(one[f"{word}_lower"])) * scale.factor
+    return f" ± {half:.2g}" if np.isfinite(half) else ""

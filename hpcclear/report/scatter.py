@@ -1,0 +1,57 @@
+"""Lines on the scatter of one design: which random inputs contribute to its variance, and what tighter tolerances bring."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.spread import Line
+
+HALF_WIDTH = 1.96
+"""Half-width of a 95 % confidence interval, standard errors."""
+
+
+def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+    """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
+    they are not known."""
+    found, name = files.get("contributions"), str(best["design"].item())
+    if found is None or name not in found["design"].to_numpy():
+        return
+    own = found.sel(design=name)
+    rows = np.flatnonzero(np.isfinite(own["contribution"].to_numpy()))
+    if not len(rows):
+        return
+    names = own["input"].to_numpy()[rows]
+    together = own["together"].to_numpy()[rows] != 0
+    shares, falls = (
+        (own[kind].to_numpy()[rows], own[f"{kind}_error"].to_numpy()[rows])
+        for kind in ("contribution", "halved")
+    )
+    parts = [(str(names[k]), *(one[k] for one in shares)) for k in np.flatnonzero(~together)]
+    if together.any():
+        joined = "+".join(map(str, names[together])) + " (correlated)"
+        parts.append((joined, *(one[together][0] for one in shares)))
+    rest = float(own["unexplained"])
+    yield Line(
+        "contributions",
+        f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}; "
+        f"{rest:.0%} by higher interactions and chaotic motion",
+    )
+    each = [(str(names[k]), *(one[k] for one in falls)) for k in range(len(rows))]
+    yield Line(
+        "tolerances",
+        f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}",
+    )
+
+
+def _listed(parts: list[tuple[str, float, float]]) -> str:
+    """Names with shares and half-widths, the largest first."""
+    ranked = sorted(parts, key=lambda one: -one[1])
+    return ", ".join(share(name, value, HALF_WIDTH * error) for name, value, error in ranked)
+
+
+def share(name: str, value: float, half_width: float) -> str:
+    """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
+    if value > half_width:
+        return f"{name} {value:.0%} ± {half_width:.1%}"
+    return f"{name} 0% within {max(half_width, value):.1%}"

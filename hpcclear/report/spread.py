@@ -1,0 +1,198 @@
+"""How the results of a batch of samples are spread: statistics with confidence intervals, and warnings of its samples.
+
+The `sample` command prints these lines, and the page shows them. No number is stated that the samples do not determine.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.objectives import Objective
+from hpcclear.base.outcome import Status
+from hpcclear.report import bearings
+from hpcclear.report.figures import labels
+from hpcclear.results.names import KINDS
+from hpcclear.scene.units import UnitError, to_si
+from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_limits, share_limits
+
+LEVELS = (0.5, 0.95, 0.99)
+"""Probabilities of the quantiles that are stated."""
+
+DRAWN = {
+    "lhs": "Latin hypercube over the ranges of the study variables",
+    "monte-carlo": "independent samples of the random inputs",
+    "random-lhs": "Latin hypercube of the random inputs",
+    "qmc": "Sobol sequence of the random inputs",
+}
+"""What samples are samples of, by the method that drew them (attribute ``sampling``)."""
+
+INDEPENDENT = "95 % confidence intervals of independent samples"
+USUALLY_WIDER = f"{INDEPENDENT}: those of this method usually vary less"
+CHOSEN = "none: the designs were chosen, they are no random sample"
+
+
+class Line(NamedTuple):
+    """One line: its subject and its text."""
+
+    label: str
+    text: str
+
+
+class Beyond(NamedTuple):
+    """A threshold of a result: a variable of the samples, and the value to exceed, SI."""
+
+    name: str
+    value: float
+
+
+def beyond(units: Mapping[str, str], words: str) -> Beyond:
+    """Return the threshold that a user writes as ``"3 kN"`` (of f) or ``"peak_contact_force=3 kN"``; plain numbers are SI.
+
+    Parameters
+    ----------
+    units : mapping of str to str
+        SI unit of each result, by its name.
+    words : str
+
+    Raises
+    ------
+    InputError
+        There is no such result, or the value has another unit.
+    """
+    name, equals, text = (part.strip() for part in words.rpartition("="))
+    name = name if equals else "objective"
+    if name not in units:
+        remedy = nearest(name, sorted(units))
+        raise InputError("--beyond", words, f"samples have no result {name!r}", remedy)
+    try:
+        value = float(text)
+        if np.isfinite(value):
+            return Beyond(name, value)
+    except ValueError:
+        pass
+    try:
+        return Beyond(name, to_si(text.strip("\"'"), "" if units[name] == "1" else units[name]))
+    except UnitError as error:
+        raise InputError("--beyond", words, error.reason, error.remedy) from None
+
+
+def units_of(objective: Objective) -> dict[str, str]:
+    """Return the SI unit of each result that samples may have, by its name, for an objective."""
+    rows = {name: row.of(objective) for name, row in KINDS["samples"].data.items()}
+    return {name: row.units for name, row in rows.items() if row.dtype == "f8"}
+
+
+def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[Line]:
+    """Return mean, standard deviation and quantiles of f, the 95th percentile of each peak force, and shares beyond thresholds.
+
+    Parameters
+    ----------
+    samples : xarray.Dataset
+        Kind ``samples``. Failed ones are left out of moments; the intervals of quantiles and shares hold whatever these were.
+    thresholds : sequence of Beyond
+
+    Returns
+    -------
+    list of Line
+        Empty where fewer than two samples succeeded. Without the attribute ``sampling`` there are no intervals.
+    """
+    method = str(samples.attrs.get("sampling", ""))
+    f = _values(samples, "objective")
+    known = f[np.isfinite(f)]
+    if len(known) < 2:
+        return []
+    unit, drawn = str(samples["objective"].attrs["units"]), method in DRAWN
+    lines = [Line("samples of", DRAWN[method])] if drawn else []
+    lines += _moments(known, unit, drawn)
+    lines += [
+        Line(f"P{100 * level:.0f} of f", _quantile(f, level, unit, drawn))
+        for level in (LEVELS if drawn else LEVELS[:1])
+    ]
+    for joint in samples["joint"].to_numpy() if drawn and "peak_contact_force" in samples else ():
+        peak = samples["peak_contact_force"].sel(joint=joint).to_numpy()
+        if np.nanmax(peak, initial=0.0) > 0.0:
+            lines.append(Line(f"P95 peak force, {joint}", _quantile(peak, 0.95, "N", drawn)))
+    lines += [_share(samples, one, drawn) for one in thresholds]
+    if len(known) < len(f):
+        left_out = f"{len(f) - len(known)} of {len(f)}, left out of mean and standard deviation"
+        lines.append(Line("failed", left_out))
+    how = (INDEPENDENT if method == "monte-carlo" else USUALLY_WIDER) if drawn else CHOSEN
+    return [*lines, Line("intervals", how)]
+
+
+def remarks(samples: xr.Dataset) -> list[str]:
+    """Return what the warnings of `simulate` say of these samples, each with the number of samples that it is about."""
+    good = samples["status"].to_numpy() == Status.OK
+    found = []
+    f, half_width = (_values(samples, f"objective{end}") for end in ("", "_uncertainty"))
+    sensitive = half_width > bearings.SENSITIVE * np.abs(f)
+    if "regime" not in samples and sensitive.any():
+        worst = float(np.nanmax((half_width / np.abs(f))[sensitive]))
+        found.append((int(sensitive.sum()), bearings.sensitive_words(worst)))
+    flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(f), int)
+    counts = [(int((good & ((flags & flag) != 0)).sum()), flag) for flag in bearings.WARNED]
+    found += [(count, bearings.REMARKS[flag]) for count, flag in counts if count]
+    return [f"{count} of {len(f)} samples: {text}" for count, text in found]
+
+
+def _values(samples: xr.Dataset, name: str) -> Array:
+    """A result of each sample, shape (n,); at joints the largest."""
+    values = samples[name].to_numpy()
+    return values.max(axis=1) if values.ndim > 1 else values
+
+
+def _moments(known: Array, unit: str, drawn: bool) -> list[Line]:
+    # loads SciPy, which a page without samples does not need
+    from hpcclear.statistics.random.replicates import moments, student
+
+    mean, deviation = moments(known[:, None])  # each sample is a replicate
+    if not drawn or not np.isfinite(mean.value):
+        plain = (known.mean(), known.std(ddof=1))
+        texts = [labels.quantity(float(value), unit) for value in plain]
+        texts = [f"{t}, interval not stated: too few samples" for t in texts] if drawn else texts
+    else:
+        reach = student(CONFIDENCE, mean.freedom)
+        texts = [
+            labels.with_half_width(one.value, reach * one.error, unit) for one in (mean, deviation)
+        ]
+    return [Line("mean of f", texts[0]), Line("std. deviation of f", texts[1])]
+
+
+def _quantile(values: Array, level: float, unit: str, drawn: bool) -> str:
+    """A quantile with its confidence interval by the order of the values; not stated where the samples do not reach so far."""
+    known = values[np.isfinite(values)]
+    value = float(np.quantile(known, level, method="hazen"))
+    if not drawn:
+        return labels.quantity(value, unit)
+    failed = len(values) - len(known)
+    low, high = order_limits(known, level, failed)
+    if np.isfinite([low, high]).all():
+        return f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
+    if failed and len(values) >= fewest(level):
+        return "not stated: too many samples failed"
+    return f"not stated: it takes {fewest(level)} samples"
+
+
+def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
+    """Share of samples beyond a threshold, with Clopper and Pearson's confidence interval."""
+    if one.name not in samples:
+        return Line(one.name, "not recorded in these samples")
+    values = _values(samples, one.name)
+    failed, total = int(np.isnan(values).sum()), len(values)
+    above = int((values > one.value).sum())
+    name = "f" if one.name == "objective" else one.name.replace("_", " ")
+    label = f"{name} > {labels.quantity(one.value, str(samples[one.name].attrs['units']))}"
+    text = f"{_percent(above / (total - failed))} of the samples" if total > failed else "–"
+    if drawn and total > failed:
+        low = float(share_limits(np.array([above]), total)[0][0])
+        high = float(share_limits(np.array([above + failed]), total)[1][0])
+        text = f"{text} ({_percent(low)} to {_percent(high)})"
+    return Line(label, text)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

@@ -1,0 +1,252 @@
+"""Results as one table: a row a design or an instant, joints as columns, quantities with their units as headings.
+
+This is what leaves the program for spreadsheets, MATLAB and pandas; `hpcclear.report.export` writes it.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels
+from hpcclear.scene.loading import parse
+from hpcclear.scene.paths import flatten
+from hpcclear.scene.units import UnitError, factor
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+ROWS: dict[str, tuple[str, ...]] = {
+    "response": ("time",),
+    "samples": ("sample",),
+    "bifurcation": ("value", "crossing"),
+    "sensitivity": ("surface", "interval", "clearance", "parameter"),
+    "kriging": ("model", "point"),
+    "front": ("case", "run", "solution"),
+    "verification": ("design",),
+    "chaos": ("design",),
+    "contributions": ("design", "input"),
+    "claims": ("claim",),
+    "readings": ("reading", "design"),
+    "statistics": ("bin",),
+    "wear": ("life", "cycle"),
+    "effects": ("variant",),
+    "timing": ("rank", "stage"),
+    "accuracy": ("integrator", "rung"),
+}
+"""Dimensions along which the rows of a table go, by the kind of a result."""
+
+MOST_COLUMNS = 128
+"""Columns that one variable may fill: profiles around a bearing have thousands, and stay in the result file."""
+
+SI = "SI"
+"""Word for the units of the result file, in place of those of the scene."""
+
+_QUANTITY = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([^\d\s.].*)")
+
+
+def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
+    """Return a result as a table.
+
+    Parameters
+    ----------
+    content : xarray.Dataset
+        Of any kind that hpcclear writes: a response has a row for each stored instant, samples and maps a row for each design,
+        a verification a row for each verified design.
+    units : sequence of str
+        Units of all quantities that they fit, such as ``("mm", "kN", "deg", "rpm")``. A quantity for which none is given has
+        the unit that the scene file uses most for its kind, else its SI unit. ``"SI"`` alone: SI units everywhere.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Headings are names with their units, ``peak_contact_force crank_rod [N]``; labels of joints, bodies and points
+        follow the name. Codes are words (``status``). Failed numbers are NaN. ``attrs`` holds single values of the result by
+        the same kind of heading, ``units`` and ``long_names`` by heading, ``left_out`` (variables with too many
+        columns), ``scene`` and ``scene_hash``.
+
+    Raises
+    ------
+    InputError
+        The dataset is no result, or one of `units` is no unit of any quantity in it.
+    """
+    import pandas as pd  # comes with xarray
+
+    kind = str(content.attrs.get("hpcclear_kind"))
+    if kind not in ROWS:
+        reason = "the dataset is no result of hpcclear"
+        raise InputError("kind", kind, reason, "Give a dataset that hpcclear wrote or returned")
+    made = _Table(content, ROWS[kind], _Units(content, units))
+    for variable in dict.fromkeys([*ROWS[kind], *map(str, content.variables)]):
+        made.add(variable)
+    table = pd.DataFrame(made.columns)
+    if len(made.rows) > 1:  # places of a grid that nothing fills
+        known = [
+            h for h in made.columns if h not in made.keys and made.columns[h].dtype.kind == "f"
+        ]
+        table = table[table[known].notna().any(axis=1)].reset_index(drop=True) if known else table
+    origin = {key: str(content.attrs.get(key, "")) for key in ("title", "scene", "scene_hash")}
+    table.attrs = {
+        **made.single, "units": made.units, "long_names": made.words,
+        "left_out": made.left_out, "kind": kind, **origin,
+    }  # fmt: skip
+    return table
+
+
+class _Table:
+    """A table in the making."""
+
+    def __init__(self, content: xr.Dataset, rows: tuple[str, ...], units: "_Units") -> None:
+        self.content, self.rows, self._units = content, rows, units
+        self.shape = tuple(content.sizes[dim] for dim in rows)
+        self.columns: dict[str, np.ndarray] = {}
+        self.keys: set[str] = set()
+        self.single: dict[str, Any] = {}
+        self.units: dict[str, str] = {}
+        self.words: dict[str, str] = {}
+        self.left_out: list[str] = []
+
+    def add(self, name: str) -> None:
+        """Add a variable: as columns, as single values, or to what is left out."""
+        variable = self.content[name]
+        if name in self.content.dims and name not in self.rows:
+            return  # labels of columns
+        variable, dims = _lower_edges(variable, self.content, self.rows)
+        across = [dim for dim in dims if dim not in self.rows]
+        alone = not set(dims) & set(self.rows)
+        count = int(np.prod([variable.sizes[dim] for dim in across], initial=1))
+        if count > MOST_COLUMNS or (alone and not set(across) <= {"joint"}):
+            self.left_out.append(name)
+            return
+        values, unit = self._units.shown(variable)
+        ordered = variable.copy(data=values).transpose(
+            *[d for d in self.rows if d in dims], *across
+        )
+        for place in product(*(range(variable.sizes[dim]) for dim in across)):
+            label = " ".join(_label(self.content, d, k) for d, k in zip(across, place, strict=True))
+            heading = " ".join(part for part in (name, label, unit and f"[{unit}]") if part)
+            one = ordered.isel(dict(zip(across, place, strict=True)))
+            self.units[heading], self.words[heading] = (
+                unit,
+                str(variable.attrs.get("long_name", name)),
+            )
+            if alone:
+                self.single[heading] = one.item()
+            else:
+                self.columns[heading] = self._filled(one)
+                self.keys |= {heading} if name in self.rows else set()
+
+    def _filled(self, one: xr.DataArray) -> np.ndarray:
+        """Values of every row, repeated along dimensions that the variable lacks."""
+        sizes = [self.content.sizes[d] if d in one.dims else 1 for d in self.rows]
+        return np.broadcast_to(one.to_numpy().reshape(sizes), self.shape).ravel()
+
+
+def _lower_edges(
+    variable: xr.DataArray, content: xr.Dataset, rows: tuple[str, ...]
+) -> tuple[xr.DataArray, tuple[str, ...]]:
+    """A variable and its dimensions; edges between bins as the lower edge of each bin, -inf of the first."""
+    if "edge" in variable.dims and rows == ("bin",):
+        whole = variable.pad(edge=(1, 0), constant_values=-np.inf).rename(edge="bin")
+        if whole.sizes["bin"] == content.sizes["bin"]:
+            variable = whole.drop_vars("bin", errors="ignore")
+    return variable, tuple(map(str, variable.dims))
+
+
+def _label(content: xr.Dataset, dim: str, place: int) -> str:
+    """What a place along a dimension is called in a heading."""
+    if dim not in content.coords:
+        return str(place)
+    value = content[dim].to_numpy()[place]
+    return f"{value:g}" if isinstance(value, np.floating) else str(value)
+
+
+class _Units:
+    """Units in which quantities are shown."""
+
+    def __init__(self, content: xr.Dataset, asked: Sequence[str]) -> None:
+        self._si = list(asked) == [SI]
+        self._asked = [] if self._si else list(asked)
+        strings = {} if self._si else _strings(str(content.attrs.get("scene", "")))
+        self._by_path = strings
+        self._usual = [unit for unit, _ in Counter(strings.values()).most_common()]
+        known = {str(v.attrs.get("units", "")) for v in content.variables.values()}
+        for unit in self._asked:
+            if not any(_fits(unit, one) for one in known if one not in ("", "1")):
+                listed = ", ".join(sorted(map(labels.plain, known - {"", "1"})))
+                reason = "it fits no quantity of this result"
+                raise InputError("--unit", unit, reason, f"Units of its quantities: {listed}")
+
+    def shown(self, variable: xr.DataArray) -> tuple[np.ndarray, str]:
+        """Values and their unit; codes as words, without one."""
+        values, unit = variable.to_numpy(), str(variable.attrs.get("units", ""))
+        if "flag_meanings" in variable.attrs:
+            return _words(variable), ""
+        if unit in ("", "1") or values.dtype.kind != "f":
+            return values, ""
+        for chosen in (*self._asked, *self._own(variable), *self._usual):
+            if _fits(chosen, unit):
+                return values / float(factor(chosen, unit)), chosen
+        return values, labels.plain(unit)
+
+    def _own(self, variable: xr.DataArray) -> list[str]:
+        """Units of the scene's own entry of a design variable."""
+        path = str(variable.attrs.get("scene_path", ""))
+        places = (path, f"study.variables.{path}.")
+        return [
+            u for p, u in self._by_path.items() if path and (p == path or p.startswith(places[1]))
+        ]
+
+
+def _fits(unit: str, si: str) -> bool:
+    """Whether a unit measures what another, of the result file, does."""
+    try:
+        factor(unit, si)
+    except UnitError:
+        return False
+    return True
+
+
+def _strings(text: str) -> dict[str, str]:
+    """The unit of every quantity with one in a scene's text, by its path; of overrides too."""
+    try:
+        content = dict(flatten(parse(text, "scene")))
+    except InputError:
+        return {}
+    overrides = (line[len("# set: ") :] for line in text.splitlines() if line.startswith("# set: "))
+    content |= dict(line.partition("=")[::2] for line in overrides)
+    found = {}
+    for path, value in content.items():
+        for k, one in enumerate(value if isinstance(value, list) else [value]):
+            match = _QUANTITY.fullmatch(one.strip(" \"'")) if isinstance(one, str) else None
+            if match:
+                found[f"{path}.{k}" if isinstance(value, list) else path.strip()] = match[1]
+    return found
+
+
+def _words(variable: xr.DataArray) -> np.ndarray:
+    """Codes (any shape) as the words of their meanings; several flags of one value are joined by a plus sign."""
+    meanings = str(variable.attrs["flag_meanings"]).split()
+    codes = variable.to_numpy()
+    single = "flag_values" in variable.attrs
+    numbers = np.atleast_1d(variable.attrs["flag_values" if single else "flag_masks"])
+    words: Mapping[int, str] = dict(zip(map(int, numbers), meanings, strict=True))
+
+    def said(code: int) -> str:
+        if single:
+            return words.get(code, str(code))
+        return "+".join(word for mask, word in words.items() if code & mask)
+
+    text = {int(code): said(int(code)) for code in np.unique(codes)}
+    return np.array([text[int(code)] for code in codes.ravel()], dtype=object).reshape(codes.shape)
+
+
+def identifier(heading: str) -> str:
+    """A heading as a name of MATLAB: letters, digits and underscores, at most 63; its unit is left out."""
+    name = re.sub(r"\W+", "_", heading.partition(" [")[0])
+    return name.strip("_")[:63]

@@ -1,0 +1,177 @@
+"""Total error of f of one design against run time: measured settings, the cheapest for a target, and the scene's own."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.scene import Scene
+from hpcclear.scene.loading import scene_of_text
+
+TARGETS = (1e-2, 1e-3, 1e-4)
+"""Relative errors of f that are put in words."""
+
+REPLICAS = 32
+"""Of a mean over replicas; each has a transient of its own."""
+
+
+DOUBLINGS = 21
+"""Of the 10 revolutions of the shortest mean over replicas: up to ten millions."""
+
+
+class Way(NamedTuple):
+    """Settings, what they cost and what they reach."""
+
+    seconds: float
+    """Core time of one design."""
+    error: float
+    """Relative error of f: the bias of the tolerance and the error of averaging, squares added."""
+    words: str
+    """The settings."""
+
+
+def ways(found: xr.Dataset) -> list[Way]:
+    """Return every measured pair of tolerance and revolutions whose bias is known well enough, the cheapest first.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        Kind ``accuracy``, with its panel of tolerance and revolutions at least.
+
+    Returns
+    -------
+    list of Way
+        Means over `REPLICAS` replicas, by their formula; single runs too, where the panel of averaging is there.
+    """
+    bias = _largest_bias(found)
+    made = [way for k in range(len(bias)) for way in _ways_of(found, k, float(bias[k]))]
+    return sorted(way for way in made if np.isfinite(way[:2]).all() and way.error > 0.0)
+
+
+def front(found: xr.Dataset) -> list[Way]:
+    """Return the ways than which none that is cheaper has a smaller error."""
+    kept: list[Way] = []
+    for way in ways(found):
+        if not kept or way.error < kept[-1].error:
+            kept.append(way)
+    return kept
+
+
+def cheapest(found: xr.Dataset, target: float) -> Way | None:
+    """Return the cheapest way to a relative error; None if none that was measured reaches it."""
+    return next((way for way in front(found) if way.error <= target), None)
+
+
+def sentences(found: xr.Dataset) -> list[str]:
+    """Return a sentence for each of `TARGETS`, and one for the scene's own settings."""
+    words = []
+    for target in TARGETS:
+        way = cheapest(found, target)
+        words.append(
+            f"For an error of f of {target * 100:g} %: {way.words}; {seconds(way.seconds)} of one core per design."
+            if way is not None
+            else f"For an error of f of {target * 100:g} %: no measured setting reaches it. Try numerics.target_error."
+        )
+    own = settings(found)
+    if own is not None:
+        words.append(
+            f"Your settings ({own.words}): error of {own.error:.1e}, {seconds(own.seconds)} of one core per design."
+        )
+    return words
+
+
+def seconds(value: float) -> str:
+    """Return a time in words."""
+    return f"{value:.2g} s" if value >= 0.1 else f"{1e3 * value:.2g} ms"
+
+
+def settings(found: xr.Dataset) -> Way | None:
+    """Return what the scene's own settings cost and reach; None if the file does not have them, or not as numbers."""
+    try:
+        scene = scene_of_text(str(found.attrs["scene"]), "scene")
+    except (InputError, KeyError):
+        return None
+    numerics = scene.numerics
+    if numerics.target_error is not None:
+        way = cheapest(found, numerics.target_error)
+        return (
+            None
+            if way is None
+            else way._replace(words=f"target_error {_short(numerics.target_error)}")
+        )
+    if not isinstance(numerics.averaged_revolutions, int):
+        return None
+    return _own(found, scene)
+
+
+def _own(found: xr.Dataset, scene: Scene) -> Way:
+    """A single run at the tolerance and over the revolutions of a scene, between those that were measured."""
+    numerics = scene.numerics
+    tolerance = np.log(found["tolerance"].to_numpy())
+    order = np.argsort(tolerance)
+    at = np.log(numerics.rtol)
+    bias, price = (
+        float(np.interp(at, tolerance[order], values[order]))
+        for values in (known_bias(found), found["tolerance_seconds"].to_numpy())
+    )
+    waited, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
+    words = f"rtol {_short(numerics.rtol)}, {waited} transient and {averaged} averaged revolutions"
+    error = float(np.hypot(bias, _averaging(found, waited, averaged)))
+    return Way(price * (waited + averaged), error, words)
+
+
+def _averaging(found: xr.Dataset, transient: int, averaged: int) -> float:
+    """Error of an average, from the measured ones: the nearest shorter transient, interpolated in the logarithms."""
+    if "averaging_error" not in found:
+        return float(np.sqrt(np.nanmedian(found["turn_variance"]) / averaged))
+    waited = found["transient"].to_numpy()
+    error = found["averaging_error"].isel(transient=int((waited <= transient).sum()) - 1).to_numpy()
+    counts = found["averaged"].to_numpy().astype(float)
+    return float(
+        np.exp(np.interp(np.log(averaged), np.log(counts), np.log(np.maximum(error, 1e-16))))
+    )
+
+
+def known_bias(found: xr.Dataset) -> Array:
+    """Return the bias of each tolerance less its standard error, shape (tolerances,); 0 where it is the reference."""
+    bias, doubt = (
+        np.nan_to_num(found[name]) for name in ("tolerance_bias", "tolerance_bias_error")
+    )
+    return np.asarray(np.sqrt(np.maximum(bias**2 - doubt**2, 0.0)))
+
+
+def _largest_bias(found: xr.Dataset) -> Array:
+    """Largest bias of each tolerance by two standard errors; a value below that of a tighter one would be luck."""
+    bias = (
+        np.abs(found["tolerance_bias"].to_numpy()) + 2.0 * found["tolerance_bias_error"].to_numpy()
+    )
+    known = np.where(np.isfinite(bias), bias, np.nanmin(bias) if np.isfinite(bias).any() else 0.0)
+    order = np.argsort(found["tolerance"].to_numpy())
+    largest = np.empty_like(known)
+    largest[order] = np.maximum.accumulate(known[order])
+    return largest
+
+
+def _ways_of(found: xr.Dataset, k: int, bias: float) -> Iterator[Way]:
+    """Ways at one tolerance: means over replicas, and single runs."""
+    rtol, price = _short(float(found["tolerance"][k])), float(found["tolerance_seconds"][k])
+    wait, variance = REPLICAS * float(found["spin_up"]), float(found["turn_variance"][k])
+    for count in (10 * 2 ** np.arange(DOUBLINGS)).tolist():
+        words = f"rtol {rtol} and {count} averaged revolutions over {REPLICAS} replicas"
+        yield Way(price * (count + wait), float(np.hypot(bias, np.sqrt(variance / count))), words)
+    if "averaging_error" not in found:
+        return
+    # of no more than every longer run reaches: less would be luck
+    error = found["averaging_error"].transpose("transient", "averaged").to_numpy()[::-1, ::-1]
+    error = np.maximum.accumulate(np.maximum.accumulate(error, 0), 1)[::-1, ::-1]
+    for row, transient in zip(error, found["transient"].to_numpy().tolist(), strict=True):
+        for one, averaged in zip(row, found["averaged"].to_numpy().tolist(), strict=True):
+            words = f"rtol {rtol}, {transient} transient and {averaged} averaged revolutions"
+            yield Way(price * (transient + averaged), float(np.hypot(bias, one)), words)
+
+
+def _short(value: float) -> str:
+    return f"{value:.0e}".replace("e-0", "e-")

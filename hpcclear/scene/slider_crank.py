@@ -1,0 +1,133 @@
+"""The slider-crank as a template of a linkage: its tables written out as bodies, joints, drive and load.
+
+Nothing below the scene depends on which template wrote a linkage; `SERIES` and `HOLDS` say what its own names stand for.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from hpcclear.scene.driving import ForceLoad, PlanarDrive, PlanarSpeed, PlanarTorque
+from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed
+from hpcclear.scene.places import NamedPlace, Place
+from hpcclear.scene.planar import (
+    Ground,
+    Materials,
+    Planar,
+    PlanarBody,
+    PlanarClearance,
+    PlanarJoint,
+    PlanarRevolute,
+    PlanarSlide,
+    Rubbing,
+)
+
+JOINTS = {"crank_rod": ("crank.b", "rod.a"), "rod_slider": ("slider.pin", "rod.b")}
+"""Journal and bearing of the joints that may have clearance: O12, O23."""
+
+SERIES: Mapping[str, tuple[str, str]] = {
+    "slider_position": ("body_x", "slider"),
+    "slider_velocity": ("body_vx", "slider"),
+    "slider_acceleration": ("acceleration", "slider"),
+    "rod_x": ("body_x", "rod"),
+    "rod_y": ("body_y", "rod"),
+    "rod_angle": ("body_angle", "rod"),
+}
+"""What the time series of a slider-crank are of the linkage's: a quantity and its body."""
+
+HOLDS: Mapping[str, tuple[tuple[str, float], ...]] = {
+    "reaction_x": (("crank_rod_x", -1.0), ("rod_slider_x", -1.0)),
+    "reaction_y": (("crank_rod_y", -1.0), ("rod_slider_y", -1.0)),
+    "bearing_x": (("crank_frame_x", 1.0),),
+    "bearing_y": (("crank_frame_y", 1.0),),
+    "guide_force": (("guide_across", 1.0),),
+}
+"""Its reactions without clearance: those of constraints, each with its sign; a column each where there are several."""
+
+DRAWN_AT = math.radians(50.0)
+"""Crank angle of its drawing, rad; at the start, crank and rod lie on one line."""
+
+_TABLES = {
+    "mechanism.crank": "mechanism.bodies.crank",
+    "mechanism.rod": "mechanism.bodies.rod",
+    "mechanism.slider": "mechanism.bodies.slider",
+    "mechanism.offset": "mechanism.ground.points.guide.y",
+    "drive": "mechanism.drives.drive",
+    "effects.guide_friction": "mechanism.joints.guide.friction",
+    "effects.slider_load": "mechanism.loads.load.size",
+    **{f"joints.{name}": f"mechanism.joints.{name}" for name in JOINTS},
+}
+
+
+def path_in_linkage(path: str) -> str:
+    """The entry of the linkage's tables that an entry of a slider-crank's scene stands for, itself if none does."""
+    for own, table in _TABLES.items():
+        if path == own or path.startswith(f"{own}."):
+            rest = path.removeprefix(own)
+            part = rest.split(".")[1] if rest else ""
+            return f"{table}.materials{rest}" if part in Materials.model_fields else table + rest
+    return path
+
+
+def linkage_of(scene: Any) -> Planar:
+    """The tables of the linkage that a scene's slider-crank is; they are valid since the scene's are."""
+    mechanism, effects = scene.mechanism, scene.effects
+    bodies = [
+        PlanarBody.model_construct(
+            name=name, length=bar.length, mass=bar.mass, inertia=bar.inertia,
+            mass_center=bar.mass_center, start_angle=start, bending=bar.bending,
+        )
+        for name, bar, start in (
+            ("crank", mechanism.crank, 0.0), ("rod", mechanism.rod, 0.0)
+        )
+    ]  # fmt: skip
+    pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
+    slider = PlanarBody.model_construct(name="slider", mass=mechanism.slider.mass, points=(pin,))
+    rubs = effects.guide_friction
+    friction = None
+    if rubs is not None:
+        friction = Rubbing.model_construct(coefficient=rubs.coefficient, ramp_speed=rubs.ramp_speed)
+    ground, line = Ground(), "ground.o"
+    if mechanism.offset is not None:
+        beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
+        ground, line = Ground(points=(*ground.points, beside)), "ground.guide"
+    guide = PlanarSlide.model_construct(
+        name="guide", kind="slide", point="slider.pin", line=line, friction=friction
+    )
+    frame = PlanarRevolute.model_construct(
+        name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o"
+    )
+    loads: tuple[ForceLoad, ...] = ()
+    if effects.slider_load is not None:
+        loads = (
+            ForceLoad.model_construct(
+                name="load", kind="force", place="slider.pin", size=effects.slider_load
+            ),
+        )
+    return Planar.model_construct(
+        bodies=(*bodies, slider),
+        ground=ground,
+        joints=(frame, guide, *(_joint(scene, name) for name in JOINTS)),
+        drives=(_drive(scene.drive),),
+        loads=loads,
+    )
+
+
+def _joint(scene: Any, name: str) -> PlanarJoint:
+    joint, (journal, bearing) = getattr(scene.joints, name), JOINTS[name]
+    places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
+    if not isinstance(joint, ClearanceJoint):
+        return PlanarRevolute.model_construct(kind="revolute", **places)
+    x, y = joint.start_eccentricity
+    return PlanarClearance.model_construct(
+        **places, kind="clearance", clearance=joint.clearance, bearing_radius=joint.bearing_radius,
+        length=joint.length, materials=Materials.model_construct(bearing=joint.bearing, journal=joint.journal),
+        start_eccentricity=Place.model_construct(x=x, y=y),
+        wear=joint.wear, film=joint.film, out_of_round=joint.out_of_round,
+    )  # fmt: skip
+
+
+def _drive(drive: Any) -> PlanarDrive:
+    model = PlanarSpeed if isinstance(drive, ConstantSpeed) else PlanarTorque
+    entries = {name: getattr(drive, name) for name in type(drive).model_fields}
+    return model.model_construct(name="drive", body="crank", period=True, **entries)

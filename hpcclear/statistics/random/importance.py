@@ -1,0 +1,258 @@
+"""Probabilities of rare failures by adaptive importance sampling, with limits from independent repeats.
+
+Inputs are independent standard normals u. A pilot moves a mixture of normal densities, by a few levels of f, to where f exceeds
+the limit (cross-entropy method); failures may lie in several places. Then values are drawn from a mixture of it, of a wide
+density and of the inputs' own one, and weighted by the ratio of densities, so that the mean of the weights of those beyond the
+limit is the probability without bias, however rough f is. The share of the inputs' own density bounds the weights, and finds
+regions that the pilot missed. What the repeats disagree by is the error.
+
+Where (nearly) no value lies beyond the limit, what is known of the largest lower level that enough values exceed is an upper
+limit for it.
+
+Sources: R. Y. Rubinstein and D. P. Kroese, "The Cross-Entropy Method" (2004), doi:10.1007/978-1-4757-4321-0; of
+mixtures that bound weights T. Hesterberg, "Weighted average importance sampling and defensive mixture distributions",
+Technometrics 37 (1995), doi:10.1080/00401706.1995.10484303; A. Owen and Y. Zhou, "Safe and effective importance sampling",
+J. Amer. Stat. Assoc. 95 (2000), doi:10.1080/01621459.2000.10473909.
+"""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.statistics.random.replicates import Limited, spread, student
+
+REPEATS = 16
+"""Independent repeats, whose disagreement is the error."""
+
+LEVELS, PILOT, ELITE = 8, 1024, 0.1
+"""Levels of a pilot at most, its draws at each, and the share of them that the next density is fitted to."""
+
+PARTS, STEPS = 4, 20
+"""Normal densities of a mixture, and steps of its fit."""
+
+WIDE = 2.0
+"""Deviations of the wide density, and of a pilot's first."""
+
+OWN, SPREAD = 0.1, 0.2
+"""Shares of the draws from the inputs' own density and from the wide one; the others come from the fitted one."""
+
+CLIPPED = 5.0
+"""Largest weight in a fit, over their mean: one draw makes no density."""
+
+PRIOR = 0.3
+"""Variance that the covariances of a fit are drawn to, as by so many draws as there are inputs."""
+
+ANEW = 2
+"""How often draws may be dropped because the pilot had missed where most failures are."""
+
+ENOUGH = 20.0
+"""Equally weighted draws that those beyond a level are worth, at least, for limits of its probability."""
+
+
+class Density:
+    """A mixture of the inputs' own density, a wide one and fitted ones.
+
+    Parameters
+    ----------
+    shares : array, shape (k,)
+        Of the fitted ones, of sum 1.
+    centres : array, shape (k, d)
+    covariances : array, shape (k, d, d)
+    """
+
+    def __init__(self, shares: Array, centres: Array, covariances: Array) -> None:
+        size = centres.shape[1]
+        own = np.zeros((2, size)), np.stack([np.eye(size), WIDE**2 * np.eye(size)])
+        self._shares = np.concatenate([[OWN, SPREAD], (1.0 - OWN - SPREAD) * shares])
+        self._centres = np.concatenate([own[0], centres])
+        self._factors = np.linalg.cholesky(np.concatenate([own[1], covariances]))
+
+    def draw(self, count: int, rng: np.random.Generator) -> Array:
+        """So many draws, (count, d)."""
+        u = rng.standard_normal((count, self._centres.shape[1]))
+        ends = np.cumsum(self._shares)
+        kind = np.searchsorted(ends[:-1], rng.random(count), side="right")
+        return np.asarray(self._centres[kind] + np.einsum("nij,nj->ni", self._factors[kind], u))
+
+    def weights(self, u: Array) -> Array:
+        """Density of the inputs over this one, (n,), at most 1 / `OWN`."""
+        logs = _logs(u, self._centres, self._factors) - _logs(
+            u, self._centres[:1], self._factors[:1]
+        )
+        return np.asarray(1.0 / (np.exp(np.minimum(logs, 700.0)) @ self._shares))
+
+
+def _logs(u: Array, centres: Array, factors: Array) -> Array:
+    """Logarithms of normal densities at u, (n, k), up to a constant."""
+    found = np.empty((len(u), len(centres)))
+    for k, (centre, factor) in enumerate(zip(centres, factors, strict=True)):
+        steps = np.linalg.solve(factor, (u - centre).T)
+        found[:, k] = -0.5 * (steps**2).sum(axis=0) - np.log(np.diag(factor)).sum()
+    return found
+
+
+def fitted(u: Array, weights: Array) -> Density:
+    """The density that fits weighted draws, (n, d) and (n,), by expectation and maximisation."""
+    size = u.shape[1]
+    share = np.minimum(weights, CLIPPED * weights.mean())
+    share = share / share.sum()
+    whole = _covariance(u, share, share @ u)
+    rows = [int(share.argmax())]
+    scaled = np.linalg.solve(np.linalg.cholesky(whole), u.T).T
+    while len(rows) < min(PARTS, len(u)):  # the farthest ones, as far as they are worth something
+        away = np.linalg.norm(scaled[:, None] - scaled[rows], axis=2).min(axis=1)
+        rows.append(int((away * np.sqrt(share)).argmax()))
+    centres, count = u[rows], len(rows)
+    covariances = np.tile(whole, (count, 1, 1))
+    parts = np.full(count, 1.0 / count)
+    for _ in range(STEPS):
+        factors = np.asarray(np.linalg.cholesky(covariances), float)
+        logs = _logs(u, centres, factors) + np.log(parts)
+        belongs = np.exp(logs - logs.max(axis=1, keepdims=True))
+        belongs *= (share / belongs.sum(axis=1))[:, None]
+        parts = (belongs.sum(axis=0) + 0.02) / (1.0 + 0.02 * count)
+        centres = (belongs.T @ u + 1e-6 * centres) / (belongs.sum(axis=0)[:, None] + 1e-6)
+        covariances = np.array(
+            [_covariance(u, one, centre) for one, centre in zip(belongs.T, centres, strict=True)]
+        )
+    assert covariances.shape == (count, size, size)
+    return Density(parts, centres, covariances)
+
+
+def _covariance(u: Array, share: Array, centre: Array) -> Array:
+    """Covariance of weighted draws; as few of them are worth little, drawn to `PRIOR`."""
+    size, total = u.shape[1], share.sum()
+    if total <= 0.0:
+        return PRIOR * np.eye(size)
+    worth = total**2 / (share**2).sum()
+    steps = u - centre
+    own = (steps.T * (share / total)) @ steps
+    return np.asarray((worth * own + size * PRIOR * np.eye(size)) / (worth + size))
+
+
+def pilot(
+    dimensions: int, limit: float, rng: np.random.Generator, negligible: float = 0.0
+) -> Generator[Array, Array, Density]:
+    """Yield draws u, (n, d), take f there, (n,), NaN where it failed, and return a density near where f exceeds the limit, or
+    a lower level whose probability is `negligible` already."""
+    density = Density(np.ones(1), np.zeros((1, dimensions)), WIDE**2 * np.eye(dimensions)[None])
+    reached, last = -np.inf, False
+    for _ in range(LEVELS):
+        u = density.draw(PILOT, rng)
+        f = yield u
+        known = np.isfinite(f)
+        if known.sum() < 4 * dimensions:
+            break
+        level = min(float(np.quantile(f[known], 1.0 - ELITE)), limit)
+        elite = known & (f >= level)
+        weights = density.weights(u[elite])
+        density = fitted(u[elite], weights)
+        if last or level <= reached or weights.sum() / known.sum() < negligible:
+            break
+        reached, last = level, level >= limit  # once more at the limit
+    return density
+
+
+@dataclass
+class Rare:
+    """A probability of exceeding a limit in the making.
+
+    Attributes
+    ----------
+    negligible : float
+        A probability below which its upper limit is enough.
+    f, weights : array, shape (REPEATS, n)
+        All draws of the repeats so far.
+    """
+
+    dimensions: int
+    limit: float
+    negligible: float = 0.0
+    density: Density | None = None
+    f: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
+    weights: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
+    simulations: int = 0
+    _failing: list[tuple[Array, Array]] = field(default_factory=list)
+    _anew: int = 0
+
+    def prepared(self, rng: np.random.Generator) -> Generator[Array, Array, None]:
+        """Yield the draws of the pilot, and take f there."""
+        going = pilot(self.dimensions, self.limit, rng, self.negligible)
+        u = next(going)
+        while self.density is None:
+            f = yield u
+            self.simulations += len(f)
+            try:
+                u = going.send(f)
+            except StopIteration as end:
+                self.density = end.value
+
+    def lengthened(
+        self, length: int, rngs: Sequence[np.random.Generator]
+    ) -> Generator[Array, Array, None]:
+        """Yield `length` draws more of each repeat, and take f there."""
+        assert self.density is not None  # after the pilot
+        draws = [self.density.draw(length, rng) for rng in rngs]
+        f = yield np.concatenate(draws)
+        self.simulations += len(f)
+        weights = np.array([self.density.weights(u) for u in draws])
+        self.f = np.concatenate([self.f, f.reshape(REPEATS, length)], axis=1)
+        self.weights = np.concatenate([self.weights, weights], axis=1)
+        beyond = f > self.limit
+        self._failing.append((np.concatenate(draws)[beyond], weights.ravel()[beyond]))
+
+    def begun_anew(self) -> bool:
+        """Drop draws of which a few are worth nearly all, for a density that is fitted to them, too; whether that was done."""
+        u, weights = (np.concatenate(part) for part in zip(*self._failing, strict=True))
+        if self._anew == ANEW or len(u) < self.dimensions or self.known:
+            return False
+        self._anew += 1
+        self.density = fitted(u, weights)
+        self.f = self.weights = np.empty((REPEATS, 0))
+        return True
+
+    @property
+    def known(self) -> bool:
+        """Whether those beyond the limit are worth enough draws."""
+        return _worth(self.f, self.weights, self.limit) >= ENOUGH
+
+    def told(self, confidence: float) -> Limited:
+        """The probability with limits, at a two-sided confidence."""
+        one = weighted(self.f, self.weights, self.limit, confidence)
+        if self.known:
+            return one
+        known = np.sort(self.f[np.isfinite(self.f)])[::-1]
+        for level in known[known < self.limit][:: max(len(known) // 64, 1)]:
+            if _worth(self.f, self.weights, float(level)) >= ENOUGH:
+                upper = weighted(self.f, self.weights, float(level), confidence).upper
+                return Limited(one.value, one.shifts, 0.0, upper)
+        return Limited(one.value, one.shifts, 0.0, 1.0)
+
+
+def _worth(f: Array, weights: Array, level: float) -> float:
+    """Equally weighted draws that those beyond a level are worth."""
+    beyond = np.where(f > level, weights, 0.0)
+    return float(beyond.sum() ** 2 / max((beyond**2).sum(), 1e-300))
+
+
+def weighted(f: Array, weights: Array, level: float, confidence: float) -> Limited:
+    """The probability of exceeding a level from weighted draws, (repeats, n): mean of the repeats, limits symmetric in its
+    logarithm."""
+    known = np.isfinite(f)
+    counts = known.sum(axis=1)
+    nothing = np.full(len(f), np.nan)
+    if (counts > 0).sum() < 2:
+        return Limited(np.nan, nothing, np.nan, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        each = np.where(known & (f > level), weights, 0.0).sum(axis=1) / counts
+    value = float(np.nanmean(each))
+    shifts = each - value
+    if value <= 0.0:
+        return Limited(0.0, shifts, 0.0, 1.0)
+    error = float(spread(shifts[None])[0])
+    factor = float(
+        np.exp(min(error / value * student(confidence, int((counts > 0).sum()) - 1), 500.0))
+    )
+    return Limited(value, shifts, value / factor, min(value * factor, 1.0))

@@ -1,0 +1,297 @@
+"""What moments of surrogates need of distributions: draws, Gauss rules, integrals of a squared-exponential kernel.
+
+Of uniform and normal laws by formula, of samples by the values themselves, of any other by its quantile function
+(`hpcclear.base.quantiles`).
+
+Sources: G. H. Golub and J. H. Welsch, "Calculation of Gauss quadrature rules", Math. Comp. 23
+(1969), doi:10.1090/S0025-5718-69-99647-1; W. Gautschi, "Orthogonal Polynomials" (2004), section 2.2
+(discretised Stieltjes procedure).
+"""
+
+from functools import lru_cache, singledispatch
+from math import inf, pi, sqrt
+
+import numpy as np
+from scipy.linalg import eigh_tridiagonal
+from scipy.special import ndtr, roots_legendre
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.base.normal import TAIL, truncated_quantile
+from hpcclear.base.quantiles import Normal, Quantiles, Samples, Uniform
+
+FINE = 400
+"""Nodes of the inner products that define rules, and steps of a quantile function."""
+
+Rule = tuple[np.ndarray, np.ndarray]
+"""Nodes and weights."""
+
+
+@singledispatch
+def draw(law: Quantiles, size: int, rng: np.random.Generator) -> Array:
+    """Independent draws, ``(size,)``; those of a normal are clipped to its span."""
+    return law(rng.random(size) + 2.0**-54)
+
+
+@draw.register
+def _(law: Uniform, size: int, rng: np.random.Generator) -> Array:
+    return rng.uniform(*law.span, size)
+
+
+@draw.register
+def _(law: Normal, size: int, rng: np.random.Generator) -> Array:
+    if law.reach == inf:
+        drawn = rng.normal(law.middle, law.deviation, size)
+    else:
+        drawn = law.middle + law.deviation * truncated_quantile(rng.random(size), *_limits(law))
+    return np.clip(drawn, *law.span)
+
+
+@draw.register
+def _(law: Samples, size: int, rng: np.random.Generator) -> Array:
+    return rng.choice(np.array(law.values), size)
+
+
+@singledispatch
+def rule(law: Quantiles, count: int) -> Rule:
+    """Gauss rule with `count` nodes, whose weights add up to 1."""
+    values, weights = _table(law)
+    middle = weights @ values
+    scale = sqrt(weights @ (values - middle) ** 2)
+    nodes, weights = _gauss_rule((values - middle) / scale, weights, count)
+    return np.clip(middle + scale * nodes, *law.span), weights
+
+
+@rule.register
+def _(law: Uniform, count: int) -> Rule:
+    nodes, weights = legendre(count)
+    low, high = law.span
+    return low + (high - low) * nodes, weights
+
+
+@rule.register
+def _(law: Normal, count: int) -> Rule:
+    nodes, weights = _truncated_rule(*_limits(law), count)  # Hermite's would go beyond the span
+    return np.clip(law.middle + law.deviation * nodes, *law.span), weights
+
+
+@rule.register
+def _(law: Samples, count: int) -> Rule:
+    return _sampled_rule(law.values, count)
+
+
+@singledispatch
+def kernel_integral(law: Quantiles, centres: Array, length: float) -> Array:
+    """Expectation of ``exp(-(x - centre)**2 / (2 length**2))``; of a normal that is not cut off, over all of it.
+
+    By quantiles it is summed at steps of the place in standard deviations of a normal, where the trapezoidal rule is good:
+    what is smooth vanishes at both ends.
+    """
+    values, weights = _table(law)
+    steps = (values - np.asarray(centres)[..., None]) / length
+    return np.exp(-0.5 * steps**2) @ weights
+
+
+@kernel_integral.register
+def _(law: Uniform, centres: Array, length: float) -> Array:
+    low, high = ((limit - centres) / length for limit in law.span)
+    return sqrt(2 * pi) * length / (law.span[1] - law.span[0]) * _normal_between(low, high)
+
+
+@kernel_integral.register
+def _(law: Normal, centres: Array, length: float) -> Array:
+    if law.reach == inf:
+        return _normal_kernel_integral(law, centres, length, -inf, inf)
+    return _normal_kernel_integral(law, centres, length, *law.span) / _mass(law)
+
+
+@kernel_integral.register
+def _(law: Samples, centres: Array, length: float) -> Array:
+    whole = np.zeros(np.shape(centres))
+    for value in law.values:  # one after the other: centres may be many
+        whole += np.exp(-0.5 * ((value - centres) / length) ** 2)
+    return whole / len(law.values)
+
+
+@singledispatch
+def pieces(law: Quantiles, count: int, lower: Array, upper: Array) -> Rule:
+    """Rules over the part of the span between limits (n,): ``(n, count)`` nodes and weights.
+
+    The weights of a row add up to the probability of its part: 0 where the limits leave nothing. The highest of some values
+    belongs to the piece that ends with it.
+
+    Raises
+    ------
+    InputError
+        If the law is known by its quantiles alone.
+    """
+    raise InputError("distribution", law, "has no density here", 'use "monte-carlo"')
+
+
+@pieces.register
+def _(law: Uniform, count: int, lower: Array, upper: Array) -> Rule:
+    places, weights = _legendre_between(law, count, lower, upper)
+    low, high = law.span
+    return places, weights * np.full(places.shape, 1.0 / (high - low))
+
+
+@pieces.register
+def _(law: Normal, count: int, lower: Array, upper: Array) -> Rule:
+    places, weights = _legendre_between(law, count, lower, upper)
+    bell = np.exp(-0.5 * np.square((places - law.middle) / law.deviation)) / sqrt(2 * pi)
+    return places, weights * (bell / (law.deviation * _mass(law)))
+
+
+@pieces.register
+def _(law: Samples, count: int, lower: Array, upper: Array) -> Rule:
+    rules = [_sampled_piece(law, count, *ends) for ends in zip(lower, upper, strict=True)]
+    return np.stack([one[0] for one in rules]), np.stack([one[1] for one in rules])
+
+
+def _legendre_between(law: Quantiles, count: int, lower: Array, upper: Array) -> Rule:
+    """The rules of a density of 1."""
+    low = np.maximum(lower, law.span[0])[:, None]
+    width = np.maximum(np.minimum(upper, law.span[1])[:, None] - low, 0.0)
+    nodes, weights = legendre(count)
+    return low + width * nodes, width * weights
+
+
+def _sampled_piece(law: Samples, count: int, lower: float, upper: float) -> Rule:
+    low, high = law.span
+    inside = tuple(x for x in law.values if lower <= x < upper or x == upper == high)
+    if not inside:
+        return np.full(count, np.clip(lower, low, high)), np.zeros(count)
+    nodes, weights = _sampled_rule(inside, count)
+    return nodes, weights * (len(inside) / len(law.values))
+
+
+@lru_cache(maxsize=64)
+def legendre(count: int) -> Rule:
+    """Nodes and weights (they add up to 1) of the Gauss-Legendre rule on [0, 1]; read-only."""
+    nodes, weights = roots_legendre(count)
+    nodes, weights = 0.5 * (1.0 + nodes), 0.5 * weights
+    nodes.setflags(write=False)
+    weights.setflags(write=False)
+    return nodes, weights
+
+
+def nodes_needed(
+    law: Quantiles, length: float, tolerance: float, most: int, *, by_pieces: bool = False
+) -> int:
+    """Fewest nodes that integrate every kernel, and every product of two, to `tolerance`.
+
+    Second moments need the product of two kernels of length scale l, which is one of l / sqrt(2)
+    about the middle of their centres (times a factor <= 1): so that narrower kernel is tested, with
+    its centre all over the support and three length scales beyond.
+
+    Parameters
+    ----------
+    length : float
+        Length scale, in the unit of the law.
+    tolerance : float
+        Absolute; the kernel itself is at most 1.
+    most : int
+        Where to give up.
+    by_pieces : bool
+        Whether for `pieces` instead of `rule`.
+
+    Returns
+    -------
+    int
+        0 if `most` nodes are not enough.
+    """
+    narrow = length / sqrt(2)
+    low, high = law.span
+    centres = np.linspace(low - 3 * narrow, high + 3 * narrow, 201)
+    exact = kernel_integral(_inside(law) if isinstance(law, Normal) else law, centres, narrow)
+    ends = np.array([low]), np.array([high])
+    for count in range(1, most + 1):
+        if by_pieces:
+            nodes, weights = (a[0] for a in pieces(law, count, *ends))
+        else:
+            nodes, weights = rule(law, count)
+        kernels = np.exp(-0.5 * ((nodes[:, None] - centres) / narrow) ** 2)
+        if abs(weights @ kernels - exact).max() <= tolerance:
+            return count
+    return 0
+
+
+@lru_cache(maxsize=64)
+def _table(law: Quantiles) -> Rule:
+    """Values of a law by its quantiles, (m,), and their probabilities."""
+    places = np.linspace(-TAIL, TAIL, FINE + 1)
+    weights = np.exp(-0.5 * places**2)
+    return law(ndtr(places)), weights / weights.sum()
+
+
+def _inside(law: Normal) -> Normal:
+    """What is left of it inside its span."""
+    return Normal(law.middle, law.deviation, TAIL * law.deviation) if law.reach == inf else law
+
+
+def _limits(law: Normal) -> tuple[float, float]:
+    """Ends of its span in standard deviations."""
+    low, high = law.span
+    return (low - law.middle) / law.deviation, (high - law.middle) / law.deviation
+
+
+def _mass(law: Normal) -> float:
+    """Probability of its span, of the normal that is not cut off."""
+    low, high = _limits(law)
+    return float(_normal_between(np.float64(low), np.float64(high)))
+
+
+@lru_cache(maxsize=256)
+def _truncated_rule(low: float, high: float, count: int) -> Rule:
+    """Gauss rule of the standard normal cut off at two limits (discretised Stieltjes)."""
+    low, high = max(low, -TAIL - 3), min(high, TAIL + 3)
+    nodes, weights = legendre(FINE)
+    x = low + (high - low) * nodes
+    weights = weights * np.exp(-0.5 * (x**2 - np.min(x**2)))
+    return _gauss_rule(x, weights / weights.sum(), count)
+
+
+@lru_cache(maxsize=256)
+def _sampled_rule(values: tuple[float, ...], count: int) -> Rule:
+    """Gauss rule of values with equal chance; of no more different values than nodes, these themselves."""
+    places, times = np.unique(np.array(values), return_counts=True)
+    weights = times / times.sum()
+    if len(places) > count:
+        found = _gauss_rule(places, weights, count)
+        return np.clip(found[0], values[0], values[-1]), found[1]
+    missing = count - len(places)
+    return np.append(places, np.full(missing, places[-1])), np.append(weights, np.zeros(missing))
+
+
+def _gauss_rule(x: np.ndarray, weights: np.ndarray, count: int) -> Rule:
+    """Gauss rule of masses `weights` at `x` (discretised Stieltjes), with fewer nodes than masses."""
+    diagonal, side = np.zeros(count), np.zeros(count)
+    before, now = np.zeros_like(x), np.ones_like(x)
+    for k in range(count):
+        diagonal[k] = weights @ (x * now**2)
+        following = (x - diagonal[k]) * now - side[k] * before
+        norm = sqrt(weights @ following**2)
+        before, now = now, following / norm
+        if k + 1 < count:
+            side[k + 1] = norm
+    places, vectors = eigh_tridiagonal(diagonal, side[1:])
+    return places, vectors[0] ** 2 / (vectors[0] ** 2).sum()
+
+
+def _normal_between(low: np.ndarray | np.float64, high: np.ndarray | np.float64) -> np.ndarray:
+    """Probability of a standard normal between limits, keeping its digits in the upper tail."""
+    flip = low > 0
+    low, high = np.where(flip, -high, low), np.where(flip, -low, high)
+    return ndtr(high) - ndtr(low)
+
+
+def _normal_kernel_integral(
+    law: Normal, centres: Array, length: float, lower: float, upper: float
+) -> Array:
+    """Integral of normal density times kernel between limits: the product is normal again."""
+    mean, deviation = law.middle, law.deviation
+    width = sqrt(deviation**2 + length**2)
+    narrow = deviation * length / width
+    middle = (mean * length**2 + np.asarray(centres) * deviation**2) / width**2
+    height = length / width * np.exp(-0.5 * ((centres - mean) / width) ** 2)
+    return height * _normal_between((lower - middle) / narrow, (upper - middle) / narrow)

@@ -1,0 +1,85 @@
+"""What makes the scatter of verified designs: contributions of their random inputs, and what tighter tolerances would bring.
+
+Nothing is simulated for it: the samples that verify a design are fitted.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.results import dataset
+from hpcclear.scene.points import Points
+from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.statistics.sensitivity.contributions import contributions
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+
+_NAMES = ("contribution", "contribution_error", "halved", "halved_error")
+
+
+def inputs_of(run: StudyRun) -> list[str]:
+    """Random inputs of all cases, in the study's order."""
+    used = {name for case in run.study.cases for name in case.random}
+    return [row.name for row in run.study.random if row.name in used]
+
+
+def of_designs(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    made: Sequence[Array],
+    drawn: Callable[[Choice, Array], Points],
+) -> Result:
+    """Contributions of the random inputs to the scatter of designs.
+
+    Parameters
+    ----------
+    run : StudyRun
+    choices : sequence of Choice
+    made : sequence of arrays, shape (2, replicates, values)
+        Of `hpcclear.study.truth.doubled`.
+    drawn : callable
+        A design and its f, (replicates, values), to the points they were taken at.
+
+    Returns
+    -------
+    dict of arrays
+        ``contribution``, ``halved`` and their ``_error``, (n, inputs), as `hpcclear.statistics.sensitivity.contributions` has
+        them, NaN for inputs that are none of a design's case; ``unexplained`` and ``unexplained_error``, (n,).
+    """
+    names = inputs_of(run)
+    result: Result = {name: np.full((len(choices), len(names)), np.nan) for name in _NAMES}
+    result["unexplained"], result["unexplained_error"] = np.full((2, len(choices)), np.nan)
+    for row, (choice, (f, _)) in enumerate(zip(choices, made, strict=True)):
+        random = run.study.case(choice.case).random
+        points = drawn(choice, f)
+        own = [points.names.index(name) for name in random]
+        count = f.size // SCRAMBLINGS  # plain draws in as many parts
+        values = points.values[: SCRAMBLINGS * count, own].reshape(SCRAMBLINGS, count, len(own))
+        its = f.ravel()[: SCRAMBLINGS * count].reshape(SCRAMBLINGS, count)
+        found = contributions(values, its, _groups(run, random))
+        columns = [names.index(name) for name in random]
+        parts = (found.share, found.share_error, found.halved, found.halved_error)
+        for name, part in zip(_NAMES, parts, strict=True):
+            result[name][row, columns] = part
+        result["unexplained"][row], result["unexplained_error"][row] = found.rest, found.rest_error
+    return result
+
+
+def _groups(run: StudyRun, random: Sequence[str]) -> list[int]:
+    """A number for each input, the same for those that vary together."""
+    joined = () if run.study.correlation is None else run.study.correlation.inputs
+    return [len(random) if name in joined else k for k, name in enumerate(random)]
+
+
+def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
+    """Write contributions.nc; `found` of `of_designs`, (n, ...) each."""
+    names = inputs_of(run)
+    coords = {"design": np.array([one.name for one in choices]), "input": np.array(names)}
+    joined = () if run.study.correlation is None else run.study.correlation.inputs
+    data = {name: found[name] for name in (*_NAMES, "unexplained", "unexplained_error")}
+    data["together"] = np.array([name in joined for name in names], np.int8)
+    run.write(
+        dataset.dataset("contributions", coords, data, objective=run.scene.objective),
+        "contributions.nc",
+    )

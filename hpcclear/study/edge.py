@@ -1,0 +1,224 @@
+"""The edge of what a rare failure allows: designs of the best first objective whose probability is just small enough.
+
+A design of the search has some hundred simulations, from which a probability of 1e-3 is extrapolated
+(`hpcclear.statistics.random.tail`). A model of such indices over designs knows which way is safer, but not where the threshold
+is. So the best design that it allows is simulated until its probability is known, the model is shifted by what it was wrong
+there, and the best design is sought anew (sequential optimisation and reliability assessment).
+
+Source: X. Du and W. Chen, "Sequential optimization and reliability assessment method for efficient probabilistic design",
+J. Mech. Design 126 (2004) 225-233, doi:10.1115/1.1649968.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.scene.cases import Case
+from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.formula import value_of
+from hpcclear.scene.study import Study
+from hpcclear.statistics.random.tail import of_share
+from hpcclear.statistics.search.infill import TwoScales
+from hpcclear.statistics.search.mopso import minimise
+from hpcclear.statistics.search.settings import SwarmSettings
+from hpcclear.study import goals, rare, truth, verdicts
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.verdicts import Standing
+
+ROUNDS = 4
+"""Designs that are tried at the edge of a case, at most."""
+
+AIM, LESS = 0.8, 0.75
+"""Probability that is sought, over the largest that is allowed: so much below it can be shown; and what is sought of that after
+a design that could not be decided."""
+
+NEAR = 0.65
+"""Of the allowed probability: a design that surely keeps it and has more is near enough."""
+
+PARTICLES, ITERATIONS = 48, 60
+STEPS, LOCAL = (0.1, 0.03, 0.01, 0.003), 256
+"""Parts of each range that the best design is moved by at last, and how often."""
+
+Judge = Callable[[Array], tuple[Array, Array]]
+
+
+def cases_of(study: Study) -> list[Case]:
+    """Cases that keep a probability of failure small."""
+    return [case for case in study.cases if any(one.statistic == "exceedance" for one in case.kept)]
+
+
+def simulations(study: Study) -> int:
+    """Simulations of all rounds, at most."""
+    if study.verification.infill_rounds == 0:
+        return 0
+    each = truth.expected(study)
+    return sum(
+        ROUNDS * (each + verdicts.usual_in(case, study.verification)) for case in cases_of(study)
+    )
+
+
+def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> Result:
+    """Designs at the edge of each case, from what the search knows of it.
+
+    Parameters
+    ----------
+    run : StudyRun
+    known : mapping of case to arrays
+        Sampling coordinates (n, d), what the case makes small (n, goals), what steers to its constraints (n,).
+
+    Returns
+    -------
+    dict of arrays
+        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that surely
+        break a constraint left out.
+    """
+    found: list[Choice] = []
+    for case in cases_of(run.study):
+        found += _of_case(run, case, *known[case.name])
+    names = run.study.optimisation
+    rows = [[one.design.get(name, np.nan) for name in names] for one in found]
+    return {
+        "case": np.array([one.case for one in found], "U64"),
+        "design": np.reshape(rows, (-1, len(names))),
+    }
+
+
+def _of_case(
+    run: StudyRun, case: Case, coordinates: Array, values: Array, excess: Array
+) -> list[Choice]:
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+    names = run.study.design_variables(case.name)
+    region, rng = box(run.scene, names), run.rng("edge", case.name)
+    bounds = np.column_stack([region.lower, region.upper])
+    kept: list[Choice] = []
+    shift, aim = 0.0, AIM
+    try:
+        with threadpool_limits(limits=1, user_api="blas"):
+            model = TwoScales(coordinates, excess, bounds, rng)
+            objectives = [
+                _objective(
+                    run, case, names, column, TwoScales(coordinates, values[:, column], bounds, rng)
+                )
+                for column in range(2)
+            ]
+    except InputError:  # too few designs that did not fail for a model
+        return kept
+    for _ in range(ROUNDS):
+
+        def judged(points: Array, off: float = shift + _gap(case, aim)) -> tuple[Array, Array]:
+            least = np.column_stack([one(points) for one in objectives])
+            return least, np.maximum(model.predict(points) + off, 0.0)
+
+        with threadpool_limits(limits=1, user_api="blas"):
+            place = _best(
+                judged,
+                bounds,
+                coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]],
+                rng,
+            )
+            guess = float(model.predict(place[None])[0])
+        row = to_physical(run.scene, names, place[None])[0]
+        choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
+        try:
+            true = _simulated(run, choice)
+        except InputError:  # it fails with all inputs, or makes no mechanism with some
+            break
+        standing = float(true["standing"][0, : len(case.kept)].max())
+        now = _precise(case, true)
+        if standing < Standing.BROKEN:
+            kept.append(choice)
+        if standing == Standing.KEPT and now > -_gap(case, NEAR):
+            break
+        shift, aim = now - guess, aim * (LESS if standing == Standing.UNDECIDED else 1.0)
+    return kept
+
+
+def _objective(
+    run: StudyRun, case: Case, names: Sequence[str], column: int, model: TwoScales
+) -> Callable[[Array], Array]:
+    """What a case makes small of designs, (n, d) to (n,): a formula as it is, else by a model of what was simulated."""
+    formula = case.goals[column].formula
+    if formula is None:
+        return model.predict
+
+    def exact(points: Array) -> Array:
+        rows = to_physical(run.scene, names, points)
+        found = value_of(formula, dict(zip(names, rows.T, strict=True)))
+        return np.asarray(np.broadcast_to(found, len(points)))
+
+    return exact
+
+
+def _best(judged: Judge, bounds: Array, start: Array, rng: np.random.Generator) -> Array:
+    """The design with the least first objective of those allowed, or the one that comes nearest, (d,)."""
+    settings = SwarmSettings(particles=PARTICLES)
+    front = minimise(
+        judged,
+        bounds,
+        iterations=ITERATIONS,
+        rng=rng,
+        size=PARTICLES,
+        settings=settings,
+        start=start,
+    )
+    points = np.concatenate([front.points, start])
+    place = _least(judged, points)
+    width = bounds[:, 1] - bounds[:, 0]
+    for step in STEPS:
+        moves = step * width * rng.uniform(-1.0, 1.0, (LOCAL, len(width)))
+        moves *= rng.random(moves.shape) < 0.7  # along some axes only, so that bounds are kept
+        place = _least(
+            judged,
+            np.concatenate([place[None], np.clip(place + moves, bounds[:, 0], bounds[:, 1])]),
+        )
+    return place
+
+
+def _least(judged: Judge, points: Array) -> Array:
+    values, broken = judged(points)
+    return np.asarray(points[np.lexsort((values[:, 1], values[:, 0], broken))[0]])
+
+
+def _gap(case: Case, share: float) -> float:
+    """How much larger the index of a share of the allowed probability is, at most over the constraints of a case."""
+    rates = [one.most for one in case.kept if one.statistic == "exceedance"]
+    return max(of_share(share * most) - of_share(most) for most in rates)
+
+
+def _simulated(run: StudyRun, choice: Choice) -> Result:
+    """A design, simulated until its constraints are decided, on scatter of its own."""
+    settings = run.study.verification
+    length = truth.first_length(settings)
+    if settings.draws is not None:
+        length = truth.scrambled_length(settings.draws)
+    most = settings.most_samples if settings.draws is None else settings.draws
+    true = truth.sequences(run, [choice], "edge", "edge", length, most)
+    return rare.decided(run, [choice], true, "edge")
+
+
+def _precise(case: Case, true: Result) -> float:
+    """What steers to the constraints, from the probabilities themselves where some exceedances were met."""
+    values = true["goal"][0, len(case.goals) :]
+    found = []
+    for goal, value in zip(case.kept, values, strict=False):
+        if goal.statistic != "exceedance":
+            found.append(float(goals.excess([goal], np.array([[value]]))[0]))
+        elif value > 0.0:
+            found.append(of_share(goal.most) - of_share(value))
+        else:
+            found.append(float(true["excess"][0]))
+    return max(found)
+
+
+def choices_of(run: StudyRun, found: Result) -> list[Choice]:
+    """The designs of `approach`."""
+    chosen = []
+    for case, row in zip(found["case"], found["design"], strict=True):
+        own = run.study.design_variables(str(case))
+        design = {n: float(x) for n, x in zip(run.study.optimisation, row, strict=True) if n in own}
+        chosen.append(Choice("", str(case), design))
+    return chosen

@@ -1,0 +1,216 @@
+"""Rare failures of designs: probabilities too small for plain sampling, by importance sampling until they are decided.
+
+Of a probability of 1e-4 a hundred thousand samples show ten. Where a constraint allows less than `RARE`, designs that plain
+samples do not decide are sampled where they fail (`hpcclear.statistics.random.importance`), for all of them at once; longer and
+longer while a verdict is open and `most_samples` allows. Where plain and weighted samples contradict each other, both count.
+"""
+
+from collections.abc import Generator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.errors import InputError
+from hpcclear.scene.goals import Constraint
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import offsets
+from hpcclear.statistics.random.importance import REPEATS, Rare
+from hpcclear.statistics.random.replicates import Limited
+from hpcclear.study import goals, verdicts
+from hpcclear.study.goals import Told
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+from hpcclear.study.verdicts import Standing
+
+NEGLIGIBLE = 0.05
+"""Of the allowed probability: less of it is not looked at closely."""
+
+LENGTH = 128
+"""Draws of each repeat at first."""
+
+_LEAST = 2.0**-54
+
+
+class Failing(NamedTuple):
+    """A design and the probability that it must keep small."""
+
+    choice: Choice
+    goal: Constraint
+
+
+class Found(NamedTuple):
+    """What is known of such a probability: by itself, and as one of many."""
+
+    own: Limited
+    sure: Limited
+    simulations: int
+    length: int
+    """Draws of all repeats, without pilots."""
+
+
+def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
+    """What is known of verified designs (`hpcclear.study.truth.simulate`), rare failures that are open in it decided as far as
+    they can be; besides ``rare_samples``, (n,): the simulations that took."""
+    true["rare_samples"] = np.zeros(len(choices), np.int64)
+    where = [
+        (row, k, Failing(choice, goal))
+        for row, choice in enumerate(choices)
+        for k, goal in enumerate(run.study.case(choice.case).kept)
+        if verdicts.rare(goal, run.study.verification)
+        and true["standing"][row, k] == Standing.UNDECIDED
+    ]
+    many = verdicts.rivals(choices)
+    found = probabilities(
+        run, [one for *_, one in where], [many[row] for row, *_ in where], stage, stage
+    )
+    for (row, k, one), its in zip(where, found, strict=True):
+        column = len(run.study.case(one.choice.case).goals) + k
+        _replace(true, row, its.own, ("goal_lower", "goal_upper"), column)
+        _replace(true, row, its.sure, ("sure_lower", "sure_upper"), k)
+        true["goal"][row, column] = np.clip(
+            its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
+        )
+        true["counted"][row, k] = its.length
+        true["rare_samples"][row] += its.simulations
+    return verdicts.decided(run, choices, true)
+
+
+def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
+    """Limits by weighted samples in place of those by plain ones; both together where they do not meet."""
+    lower, upper = (true[name][row, column] for name in names)
+    apart = one.lower > upper or one.upper < lower
+    ends = (min(one.lower, lower), max(one.upper, upper)) if apart else (one.lower, one.upper)
+    true[names[0]][row, column], true[names[1]][row, column] = ends
+
+
+def probabilities(
+    run: StudyRun, asked: Sequence[Failing], many: Sequence[int], stage: str, purpose: str
+) -> list[Found]:
+    """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long."""
+    rates = [
+        Rare(len(run.study.case(one.choice.case).random), _limit(one), NEGLIGIBLE * one.goal.most)
+        for one in asked
+    ]
+    begun = [
+        one.prepared(run.rng("rare", purpose, "pilot")) for one in rates
+    ]  # all meet the same draws
+    _together(run, asked, begun, stage)
+    open_, round_ = list(range(len(asked))), 0
+    while open_:
+        rngs = [_streams(run, purpose, round_) for _ in open_]
+        going = [
+            rates[k].lengthened(max(rates[k].f.shape[1], LENGTH), own)
+            for k, own in zip(open_, rngs, strict=True)
+        ]
+        _together(run, [asked[k] for k in open_], going, stage)
+        round_ += 1
+        open_ = [
+            k for k in open_
+            if rates[k].begun_anew() or not _enough(run, asked[k], rates[k], many[k])
+        ]  # fmt: skip
+    return [
+        Found(
+            one.told(run.study.verification.confidence),
+            one.told(verdicts.level(run.study.verification, number, one.f.size)),
+            one.simulations,
+            one.f.size,
+        )
+        for one, number in zip(rates, many, strict=True)
+    ]
+
+
+def _limit(one: Failing) -> float:
+    assert one.goal.limit is not None  # by validation
+    return one.goal.limit
+
+
+def _streams(run: StudyRun, purpose: str, round_: int) -> list[np.random.Generator]:
+    """Random numbers of each repeat in a round, the same for all designs."""
+    return [run.rng("rare", purpose, str(round_), str(k)) for k in range(REPEATS)]
+
+
+def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
+    settings = run.study.verification
+    if 2 * rate.f.size > max(settings.most_samples, LENGTH * REPEATS):
+        return True
+    sure = verdicts.level(settings, many, rate.f.size)
+    if (
+        verdicts.of_limits(one.goal, _told(rate.told(sure)), rate.f.size, sure).standing
+        is not Standing.UNDECIDED
+    ):
+        return True
+    return goals.accurate(one.goal, _told(rate.told(settings.confidence)), run.study.wanted)
+
+
+def _told(one: Limited) -> Told:
+    return Told(one.value, one.lower, one.upper, one.shifts)
+
+
+def _together(
+    run: StudyRun,
+    asked: Sequence[Failing],
+    going: Sequence[Generator[Array, Array, None]],
+    stage: str,
+) -> None:
+    """Answer procedures of several designs by f, all they ask for at a time in one batch."""
+    wanted = {k: next(one) for k, one in enumerate(going)}
+    while wanted:
+        parts = _simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
+        fresh = {}
+        for k, part in zip(wanted, parts, strict=True):
+            try:
+                fresh[k] = going[k].send(part)
+            except StopIteration:
+                continue
+        wanted = fresh
+
+
+def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
+    """f of designs at standard normals, (n,) each; NaN where it failed, or where inputs so far out make no mechanism."""
+    rows = [_rows(run, choice, u) for choice, u in where]
+    makes = [_valid(run, names, values) for names, values in rows]
+    batches = [
+        run.simulations.filled(names, values[good])
+        for (names, values), good in zip(rows, makes, strict=True)
+    ]
+    values = np.concatenate([one.values for one in batches])
+    points = Points(batches[0].names, values, batches[0].paths)
+    f = np.empty(0)
+    if len(values):
+        f = run.simulations.objective(run.simulations.records(points, stage))
+    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1])
+    found = []
+    for good, part in zip(makes, parts, strict=True):
+        whole = np.full(len(good), np.nan)
+        whole[good] = part
+        found.append(whole)
+    return found
+
+
+def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
+    """Which rows make a mechanism, (n,)."""
+    try:
+        run.simulations.filled(names, values)
+    except InputError:
+        if len(values) == 1:
+            return np.zeros(1, bool)
+        middle = len(values) // 2
+        halves = (_valid(run, names, part) for part in (values[:middle], values[middle:]))
+        return np.concatenate(list(halves))
+    return np.ones(len(values), bool)
+
+
+def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
+    """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
+    random = run.study.case(choice.case).random
+    moved = offsets(run.scene, random, list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T))
+    design = dict(choice.design)
+    for name, values in moved.items():
+        row = run.study.random_input(name)
+        centre = design.get(name, run.scene.number(row.paths[0]))
+        design[name] = values if row.absolute else centre + values  # type: ignore[assignment]
+    names = tuple(design)
+    columns = [np.broadcast_to(design[name], len(u)) for name in names]
+    return names, np.column_stack(columns)

@@ -1,0 +1,204 @@
+"""Whether designs satisfy their constraints: decided by confidence limits that hold for all designs and all looks at once.
+
+A design is verified by more and more simulations, and is looked at after each doubling; and the best of those that satisfy a
+constraint is recommended. Both favour luck: of many designs near a threshold some look better than they are. So each verdict
+takes a share of the error that is allowed: designs share it evenly (Bonferroni), looks by halves, most of it for the last
+(spending of error; K. K. G. Lan and D. L. DeMets, "Discrete sequential boundaries for clinical trials", Biometrika 70 (1983),
+doi:10.1093/biomet/70.3.659). What is printed beside it is the usual interval of each design by itself.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.report.figures.labels import between, quantity
+from hpcclear.scene.cases import Case
+from hpcclear.scene.goals import Constraint
+from hpcclear.scene.stages import Verification
+from hpcclear.scene.study import Study
+from hpcclear.study import goals
+from hpcclear.study.goals import Told
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import Result, StudyRun
+
+
+class Standing(IntEnum):
+    """How a design stands to a constraint, the best first."""
+
+    KEPT = 0
+    UNDECIDED = 1
+    BROKEN = 2
+
+    @property
+    def words(self) -> str:
+        """Its word in the files."""
+        return ("kept", "cannot be told", "broken")[self]
+
+
+class Verdict(NamedTuple):
+    """A constraint of one design."""
+
+    standing: Standing
+    price: float
+    """Simulations of the design that would decide, NaN where it is decided or where no number would."""
+
+
+def rivals(choices: Sequence[Choice]) -> list[int]:
+    """How many verdicts each design shares its error with: designs of its case."""
+    counted = Counter(choice.case for choice in choices)
+    return [counted[choice.case] for choice in choices]
+
+
+def level(settings: Verification, many: int, simulations: int) -> float:
+    """Two-sided confidence of one verdict of `many`, after so many simulations of a design.
+
+    The last look that a design may get has half of its error, the one before a quarter, and so on.
+    """
+    left = (
+        0
+        if settings.draws is not None
+        else math.log2(max(settings.most_samples / simulations, 1.0))
+    )
+    return 1.0 - (1.0 - settings.confidence) / many * 0.5 ** (1 + int(left))
+
+
+def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
+    """What is known of designs, with the verdicts on their constraints from ``sure_lower`` and ``sure_upper``.
+
+    ``counted`` are the simulations behind each constraint. Added are ``standing`` (`Standing`) and ``price``, (n, constraints):
+    the simulations of a design that would decide, NaN where it is decided or where no number would.
+    """
+    true["standing"], true["price"] = np.full((2, *true["sure_lower"].shape), np.nan)
+    many = rivals(choices)
+    for row, choice in enumerate(choices):
+        case = run.study.case(choice.case)
+        for k, goal in enumerate(case.kept):
+            simulations = int(true["counted"][row, k])
+            sure = level(run.study.verification, many[row], simulations)
+            value = true["goal"][row, len(case.goals) + k]
+            limits = true["sure_lower"][row, k], true["sure_upper"][row, k]
+            found = of_limits(goal, Told(value, *limits, _NOTHING), simulations, sure)
+            true["standing"][row, k], true["price"][row, k] = found
+    return true
+
+
+_NOTHING = np.empty(0)
+
+
+def of_limits(goal: Constraint, one: Told, simulations: int, confidence: float) -> Verdict:
+    """How a design stands to a constraint, from limits at a two-sided confidence by so many simulations, and its price."""
+    if one.upper <= goal.most:
+        return Verdict(Standing.KEPT, np.nan)
+    if one.lower > goal.most:
+        return Verdict(Standing.BROKEN, np.nan)
+    return Verdict(Standing.UNDECIDED, _price(goal, one, simulations, confidence))
+
+
+def _price(goal: Constraint, one: Told, simulations: int, confidence: float) -> float:
+    """Simulations after which limits are as near to a value as the threshold is: they approach by the root of the number."""
+    gap = abs(goal.most - one.value)
+    if goal.statistic == "exceedance" and one.value == 0.0:
+        needed = without_any(goal.most, confidence)  # limits fall as one over the number
+    elif not (gap > 0.0 and np.isfinite([one.value, one.lower, one.upper]).all()):
+        return np.nan
+    else:
+        reach = one.upper - one.value if one.value <= goal.most else one.value - one.lower
+        needed = simulations * (reach / gap) ** 2
+    return float(2.0 ** math.ceil(math.log2(max(needed, simulations + 1.0))))
+
+
+def without_any(most: float, confidence: float) -> float:
+    """Simulations without any exceedance that keep the upper limit of a probability at `most` (Clopper and Pearson)."""
+    return math.log((1.0 - confidence) / 2.0) / math.log1p(-min(most, 1.0 - 1e-9))
+
+
+RARE = 5e-3
+"""Probability below which a constraint is decided by importance sampling where plain samples do not decide it."""
+
+
+def rare(goal: Constraint, settings: Verification) -> bool:
+    """Whether a constraint is a probability of failure for importance sampling; a fixed number of draws leaves none."""
+    return goal.statistic == "exceedance" and goal.most < RARE and settings.draws is None
+
+
+HITS = 16
+"""Exceedances after which a probability of half or twice what is allowed is told from it."""
+
+
+WEIGHTED = 12288
+"""Simulations of a design by importance sampling that decide a rare failure as a rule."""
+
+
+def usual(goal: Constraint, settings: Verification) -> float:
+    """Simulations that decide a constraint of a design that is not too near its threshold; 0 of what is no probability."""
+    if rare(goal, settings):
+        return float(min(WEIGHTED, 2 * settings.most_samples))
+    return HITS / goal.most if goal.statistic == "exceedance" and goal.most > 0.0 else 0.0
+
+
+def usual_in(case: Case, settings: Verification) -> int:
+    """Simulations of a design for the rare failures of its case, beside those for mean and deviation."""
+    return int(sum(usual(one, settings) for one in case.kept if rare(one, settings)))
+
+
+def costs(study: Study, unit: str) -> Iterator[str]:
+    """What each probability that is kept small takes of a design, a sentence each."""
+    settings = study.verification
+    for case in study.cases:
+        for goal in case.kept:
+            rate = usual(goal, settings)
+            if rate == 0.0:
+                continue
+            given = settings.draws or settings.most_samples
+            least = without_any(goal.most, settings.confidence)
+            text = (
+                f"{goal.words(unit)} at most {goal.most:g}: {least:.0f} simulations of a design without an exceedance would "
+                f"show it; about {rate:.0f} decide a design near it"
+            )
+            if rare(goal, settings):
+                text += " by importance sampling"
+            elif least > given:
+                key = "most_samples" if settings.draws is None else "samples"
+                text += f"; study.verification.{key} allows {given}, too few to decide: raise it"
+            yield text
+
+
+def settled(
+    goal: Constraint, values: Array, choice: Choice, settings: Verification, many: int
+) -> bool:
+    """Whether a constraint of a design is decided, as one of `many`."""
+    sure = level(settings, many, values.size)
+    one = goals.told(goal, values, choice.design, sure)
+    return of_limits(goal, one, values.size, sure).standing is not Standing.UNDECIDED
+
+
+def words(case: Case, unit: str, told: Sequence[Array], standings: Array, prices: Array) -> str:
+    """How a design stands to its constraints: "share with f above 0.3 mm 0.012 (95 % CI 0.01 to 0.014) at most 0.05: kept".
+
+    Parameters
+    ----------
+    case : Case
+    unit : str
+        Of f.
+    told : sequence of arrays, shape (goals,)
+        Values, lower and upper limits of what its case makes small and, behind these, of its constraints.
+    standings, prices : array, shape (constraints,)
+    """
+    texts = []
+    rows = zip(
+        case.kept, *(one[len(case.goals) :] for one in told), standings, prices, strict=False
+    )
+    for goal, value, low, high, standing, price in rows:
+        own = goal.unit(unit)
+        text = f"{goal.words(unit)} {quantity(value, own)}"
+        text += f" (95 % CI {between(low, high, own)})" if low < high else ""
+        text += f" at most {quantity(goal.most, own)}: {Standing(int(standing)).words}"
+        if np.isfinite(price):
+            text += f" (about {price:.0f} simulations would decide)"
+        texts.append(text)
+    return "; ".join(texts)

@@ -1,0 +1,81 @@
+"""Recipes with the version, the checksum and the dependencies of a source distribution.
+
+python packaging/render.py DIST     writes DIST/packaging
+"""
+
+import hashlib
+import re
+import shutil
+import sys
+import tarfile
+import tomllib
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+
+
+def conda(requirement: str) -> str:
+    """`numpy>=2.0` as conda writes it."""
+    name, bounds = parts(requirement)
+    return f"- {name} {bounds}".rstrip()
+
+
+def spack(requirement: str, kind: str) -> str:
+    """`numpy>=2.0` as Spack writes it; of its bounds the lowest, which are the ones that this package has."""
+    name, bounds = parts(requirement)
+    lowest = re.search(r">=([\d.]+)", bounds)
+    return f'depends_on("py-{name.lower()}{f"@{lowest[1]}:" if lowest else ""}", type={kind})'
+
+
+def parts(requirement: str) -> tuple[str, str]:
+    """Name and bounds of a requirement without extras."""
+    found = re.fullmatch(r"([A-Za-z0-9_.-]+)\s*(.*)", requirement)
+    if found is None:
+        raise SystemExit(f"{requirement}: no name and bounds")
+    return found[1], found[2]
+
+
+def rendered(text: str, words: dict[str, str | list[str]]) -> str:
+    """Words of the text between at signs by their values; a list takes a line each, indented as the word is."""
+    for word, value in words.items():
+        if isinstance(value, str):
+            text = text.replace(f"@{word}@", value)
+            continue
+        line = re.compile(rf"^( *)(?:- )?@{word}@$", re.M)
+        text = line.sub(lambda found, lines=value: "\n".join(found[1] + one for one in lines), text)
+    if left := re.search(r"@[A-Z]+\d*@", text):
+        raise SystemExit(f"{left[0]} is left in a recipe")
+    return text
+
+
+def main(dist: Path) -> None:
+    source = next(dist.glob("hpcclear-*.tar.gz"))
+    version = source.name.removeprefix("hpcclear-").removesuffix(".tar.gz")
+    with tarfile.open(source) as archive:
+        member = archive.extractfile(f"hpcclear-{version}/pyproject.toml")
+        assert member is not None
+        project = tomllib.loads(member.read().decode())
+    build, run = project["build-system"]["requires"], project["project"]["dependencies"]
+    fixed = {"VERSION": version, "SHA256": hashlib.sha256(source.read_bytes()).hexdigest()}
+    place = dist / "packaging"
+    shutil.rmtree(place, ignore_errors=True)
+    shutil.copytree(
+        HERE, place, ignore=shutil.ignore_patterns("render.py", "README.md", "__pycache__")
+    )
+    lists: dict[str, dict[str, str | list[str]]] = {
+        "conda-forge/recipe.yaml": {"BUILD": [*map(conda, build)], "RUN": [*map(conda, run)]},
+        "spack/packages/py-hpcclear/package.py.in": {
+            "BUILD": [spack(one, '"build"') for one in build],
+            "RUN": [spack(one, '("build", "run")') for one in run],
+        },
+    }
+    for name, words in lists.items():
+        path = place / name
+        text = rendered(path.read_text(encoding="utf-8"), fixed | words)
+        path.unlink()
+        path.with_name(path.name.removesuffix(".in")).write_text(text, encoding="utf-8")
+        print(path)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

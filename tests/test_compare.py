@@ -1,0 +1,114 @@
+"""A response beside measurements: found again where it was shifted, and errors measured as they were made."""
+
+import re
+
+import numpy as np
+import pytest
+import report_data as data
+import xarray as xr
+from click.testing import CliRunner
+
+from hpcclear.base.errors import InputError
+from hpcclear.cli import cli
+from hpcclear.report import overlay_figure
+from hpcclear.report.compare import compare, read_columns
+from hpcclear.results import dataset
+
+
+@pytest.fixture(scope="module")
+def response() -> xr.Dataset:
+    return data.response()
+
+
+def table(path, columns: dict[str, np.ndarray]):
+    """A CSV file of these columns."""
+    cells = zip(*(map(repr, values.tolist()) for values in columns.values()), strict=True)
+    rows = [",".join(columns), *map(",".join, cells)]
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def measured(response, path, axis, *, gain=1.0, noise=0.0, shift=0.0):
+    """What a gauge might give of the last revolutions: every third instant, in kN."""
+    shown = response.isel(time=slice(-400, -50, 3))
+    milliseconds = 1e3 * shown["time"] - shift
+    across = milliseconds if axis == "time [ms]" else np.degrees(shown["crank_angle"]) % 360.0
+    force = 1e-3 * shown["contact_force"].sel(joint="crank_rod").to_numpy()
+    dice = np.random.default_rng(0).normal(0.0, noise, len(force))
+    return table(
+        path, {axis: np.asarray(across), "contact_force crank_rod [kN]": gain * force + dice}
+    )
+
+
+@pytest.mark.parametrize("axis", ["time [ms]", "crank_angle (deg)"])
+def test_a_series_of_the_response_itself_is_met_without_error(response, tmp_path, axis):
+    found = compare(response, measured(response, tmp_path / "m.csv", axis))
+    (one,) = found.quantities
+    assert found.axis == axis.partition(" ")[0].removeprefix("crank_")
+    assert one.norms["correlation"] == pytest.approx(1.0, abs=1e-6)
+    assert one.norms["relative_rms"] < (1e-9 if found.axis == "angle" else 1e-2)
+
+
+def test_a_shifted_series_is_found_again_by_its_correlation(response, tmp_path):
+    path = measured(response, tmp_path / "m.csv", "time [ms]", shift=7.3)
+    aligned, as_it_stands = compare(response, path), compare(response, path, "none")
+    turn = float(response["time"][-1]) / 4
+    assert (aligned.shift - 7.3e-3 + turn / 2) % turn - turn / 2 == pytest.approx(0.0, abs=1e-5)
+    assert aligned.quantities[0].norms["rms"] < 0.05 * as_it_stands.quantities[0].norms["rms"]
+
+
+def test_norms_are_those_of_the_errors_that_were_made(response, tmp_path):
+    path = measured(response, tmp_path / "m.csv", "crank_angle [deg]", gain=1.1)
+    (one,) = compare(response, path).quantities
+    truth = one.measured / 1.1
+    np.testing.assert_allclose(one.norms["rms"], 0.1 * np.sqrt(np.mean(truth**2)), rtol=1e-6)
+    np.testing.assert_allclose(one.norms["largest"], 0.1 * truth.max(), rtol=1e-6)
+    np.testing.assert_allclose(one.norms["mean"], -0.1 * truth.mean(), rtol=1e-6)
+    np.testing.assert_allclose(one.norms["peak"], -0.1 * truth.max(), rtol=1e-6)
+    assert one.unit == "N"
+
+
+@pytest.mark.parametrize(
+    ("head", "reason"),
+    [
+        ("speed [rpm],crank_moment [N m]", "neither time nor angle"),
+        ("time [mm],crank_moment [N m]", "does not fit"),
+        ("time [s],crank_moment [kN]", "does not fit"),
+        ("time [s],contact_force", "Use one of: contact_force crank_rod, contact_force rod_slider"),
+        ("time [s],crank_momnt", "Did you mean 'crank_moment'"),
+        ("time [s]", "no series"),
+    ],
+)
+def test_a_table_that_cannot_be_compared_is_refused(response, tmp_path, head, reason):
+    row = ",".join("1" for _ in head.split(","))
+    (tmp_path / "m.csv").write_text(f"{head}\n{row}\n{row}\n{row}\n")
+    with pytest.raises(InputError, match=re.escape(reason)):
+        compare(response, tmp_path / "m.csv")
+
+
+def test_a_cell_that_is_no_number_is_named(tmp_path):
+    (tmp_path / "m.csv").write_text("time [s],crank_moment\n0,1\n1,x\n2,3\n")
+    with pytest.raises(InputError, match=r"line 3, column crank_moment = 'x'"):
+        read_columns(tmp_path / "m.csv")
+
+
+def test_the_command_prints_norms_in_the_units_of_the_measurement_and_draws(response, tmp_path):
+    dataset.write(response, tmp_path / "r.nc")
+    path = measured(response, tmp_path / "m.csv", "crank_angle [deg]", gain=2.0)
+    path.write_text(path.read_text().replace("contact_force crank_rod", "gauge 1"))
+    words = [
+        "compare",
+        str(tmp_path / "r.nc"),
+        str(path),
+        "--name",
+        "gauge 1=contact_force crank_rod",
+    ]
+    done = CliRunner().invoke(cli, [*words, "-o", str(tmp_path / "o.svg")])
+    assert done.exit_code == 0, done.output
+    assert re.search(r"RMS error +[\d.e-]+ kN, 0.5 of the measured RMS", done.output)
+    assert "by crank angle" in done.output
+    assert (tmp_path / "o.svg").read_bytes().startswith(b"<?xml")
+    panel = overlay_figure(
+        compare(response, path, names={"gauge 1": "contact_force crank_rod"})
+    ).axes[0]
+    assert "kN" in panel.get_ylabel()

@@ -1,0 +1,235 @@
+"""Constraints are decided honestly: verdicts over looks and designs, what an answer says of them, what a decision costs."""
+
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from margins import most
+from scipy import stats
+
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.answer import answer
+from hpcclear.results import dataset
+from hpcclear.scene import load_scene
+from hpcclear.scene.goals import Constraint, Goal
+from hpcclear.scene.stages import MomentAccuracy, Verification
+from hpcclear.study import goals, run_study, verdicts
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.verdicts import Standing
+from hpcclear.study.verification import _nearest
+
+sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
+
+import formula
+
+# -- verdicts ---------------------------------------------------------------------------------------
+
+
+def test_the_accuracy_of_a_probability_follows_what_is_allowed():
+    rare = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
+    assert goals.wanted(rare, MomentAccuracy()) == (2e-5, False)
+    assert goals.wanted(rare, MomentAccuracy(exceedance=0.02)) == (0.02, False)
+    assert goals.wanted(Goal(statistic="exceedance", limit=1.0), MomentAccuracy()) == (0.01, False)
+
+
+def test_looks_and_designs_share_the_error():
+    settings = Verification(most_samples=4096)
+    spent = [1.0 - verdicts.level(settings, 10, 512 * 2**k) for k in range(4)]
+    assert sum(spent) <= 0.05 / 10
+    assert spent[-1] == pytest.approx(0.05 / 20)
+    assert verdicts.rivals([Choice("", "a", {}), Choice("", "b", {}), Choice("", "a", {})]) == [
+        2,
+        1,
+        2,
+    ]
+
+
+@pytest.mark.parametrize("share", [0.011, 0.05])
+def test_what_breaks_a_constraint_is_hardly_ever_called_kept(share, shift):
+    """Of 12 designs that all break it, looked at up to six times, in 300 studies: at most as often as the confidence says."""
+    settings, limit = Verification(most_samples=16384), float(stats.norm.isf(share))
+    goal = Constraint(statistic="exceedance", limit=limit, most=0.01)
+    wrong = 0
+    for study in range(300):
+        rng = np.random.default_rng(1000 * shift + study)
+        shares = rng.binomial(1024, share, (12, 16, 1))  # hits of 1024 values of each replicate
+        for hits in shares:
+            values = np.where(np.arange(1024) < hits, limit + 1.0, limit - 1.0)
+            values = rng.permuted(values, axis=1)
+            for length in (32, 64, 128, 256, 512, 1024):
+                seen = values[:, :length]
+                if verdicts.settled(goal, seen, Choice("", "", {}), settings, 12):
+                    told = goals.told(goal, seen, {}, verdicts.level(settings, 12, seen.size))
+                    wrong += (
+                        verdicts.of_limits(goal, told, seen.size, 0.9).standing is Standing.KEPT
+                    )
+                    break
+    assert wrong <= most(300, 0.05), wrong
+
+
+def test_what_is_not_decided_has_a_price():
+    """Half the reach needs four times the simulations; where nothing was exceeded the upper limit falls as one over them."""
+    goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
+    one = goals.Told(0.008, 0.004, 0.012, np.zeros(16))
+    assert verdicts.of_limits(goal, one, 2048, 0.95) == (Standing.UNDECIDED, 8192.0)
+    none = goals.told(goal, np.zeros((16, 8)), {}, 0.95)
+    found = verdicts.of_limits(goal, none, 128, 0.95)
+    assert found == (Standing.UNDECIDED, 512.0)  # 368, by doubling
+    enough = goals.told(goal, np.zeros((16, 32)), {}, 0.95)
+    assert verdicts.of_limits(goal, enough, 512, 0.95).standing is Standing.KEPT
+    at = goals.Told(0.01, 0.004, 0.012, np.zeros(16))
+    assert np.isnan(verdicts.of_limits(goal, at, 2048, 0.95).price)
+
+
+def test_designs_that_surely_satisfy_all_constraints_come_first():
+    kept, open_, broken = map(float, Standing)
+    rows, none = [0, 1, 2], np.zeros(3)
+    assert _nearest(rows, np.array([open_, kept, kept]), none) == [1, 2]
+    assert _nearest(rows, np.array([open_, open_, broken]), np.array([-0.1, 0.2, 0.1])) == [0]
+    assert _nearest(rows, np.array([broken, open_, open_]), np.array([2.0, 0.2, 0.1])) == [2]
+    assert _nearest(rows, np.array([broken] * 3), np.array([0.3, 0.2, 0.5])) == [1]
+
+
+# -- the answer -------------------------------------------------------------------------------------
+
+
+def verified(verdict: str, excess: list[float]):
+    """Two designs and the baseline of one case, whose constraints all stand so."""
+    names = ["robust alpha", "robust beta", "robust original"]
+    values = np.array([1.0, 2.0, 3.0])
+    columns = {
+        "case": np.array(["robust"] * 3),
+        "mean_true": values, "deviation_true": 0.1 * values,
+        "first_goal": np.array(["mean of f"] * 3), "second_goal": np.array(["m2"] * 3),
+        "first_unit": np.array(["m"] * 3), "second_unit": np.array([""] * 3),
+        "constraints": np.array([f"share with f above 1 m 0.06 at most 0.05: {verdict}"] * 3),
+        "constraint_excess": np.array(excess),
+    }  # fmt: skip
+    for name in ("first", "second"):
+        columns |= {f"{name}_{end}": values for end in ("true", "lower", "upper")}
+    content = dataset.dataset("verification", {"design": np.array(names)}, columns)
+    content.attrs["method"] = "qmc"
+    return content
+
+
+@pytest.mark.parametrize(
+    ("verdict", "excess", "nearest"),
+    [
+        ("broken", [0.2, 0.1, 0.3], "robust beta"),
+        ("cannot be told (about 8192 simulations would decide)", [0.2, 0.1, 0.3], "robust beta"),
+        ("cannot be told (about 8192 simulations would decide)", [-0.1, -0.2, 0.3], "robust alpha"),
+    ],
+)
+def test_no_design_is_recommended_within_constraints_that_it_may_break(verdict, excess, nearest):
+    lines = answer({"verification": verified(verdict, excess)}, "out")
+    text = dict(lines)
+    assert text["recommended"].startswith("none: ")
+    assert text["recommended"].endswith(f"nearest: {nearest}")
+    assert "within the constraints" not in " ".join(one.text for one in lines)
+    decides = "study.verification.most_samples=8192 to decide the constraints"
+    assert (decides in text["next steps"]) is ("8192" in verdict)
+
+
+def test_a_design_that_surely_satisfies_them_is_recommended():
+    text = dict(answer({"verification": verified("kept", [-0.1, -0.2, -0.3])}, "out"))
+    assert text["recommended"] == "robust alpha"
+    assert text["criterion"].startswith("lowest mean of f within the constraints of 3")
+    assert text["constraint"].endswith(": satisfied")
+
+
+# -- a study ----------------------------------------------------------------------------------------
+
+STUDY = """
+[study]
+seed = 3
+samples = 20
+test_samples = 8
+[study.variables]
+m2 = { range = [0.105, 0.42] }
+C = { range = ["0.3 mm", "1 mm"] }
+[study.random]
+C = { distribution = "uniform", range = ["0.4 mm", "0.9 mm"] }
+[study.cases.light]
+random = ["C"]
+objectives = [{ formula = "m2" }, "mean"]
+constraints = [{ statistic = "exceedance", limit = "0.47 mm", most = "0.1 %" }]
+[study.sensitivity]
+groups = []
+[study.surrogate]
+r2 = 0.5
+restarts = 0
+[study.swarm]
+particles = 10
+iterations = 5
+runs = 1
+archive = 8
+[study.verification]
+designs = 2
+most_samples = 8192
+infill_rounds = 2
+infill_designs = 4
+response_windows = 2
+response_copies = 2
+"""
+
+
+def share_above(m2: float, limit: float = 0.47e-3) -> float:
+    """Exactly, by the formula of the study: f is linear in C."""
+    constant = 1e-4 * (4 - 5 * m2 + 3 * 0.14 - 10 * 0.06 + 500 * 2.6e-4)
+    least = (limit - constant) / (0.1 + 0.5 * m2)
+    return float(np.clip((0.9e-3 - least) / 0.5e-3, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    place = tmp_path_factory.mktemp("decided") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        formula.replace_dynamics(patch.setattr)
+        run_study(
+            load_scene(tomllib.loads(formula.PHYSICS + STUDY)),
+            place,
+            alone(),
+            progress_style="quiet",
+        )
+    kinds = ("verification", "contributions")
+    return {kind: dataset.read(place / f"{kind}.nc", kind) for kind in kinds}
+
+
+def test_what_scatters_at_the_recommended_design_makes_all_of_its_scatter(done):
+    """f is linear in C: all of the variance is its own, and half its scatter is half the deviation."""
+    own = done["contributions"].sel(design="light alpha", input="C")
+    assert float(own["contribution"]) == pytest.approx(1.0, abs=1e-3)
+    assert float(own["halved"]) == pytest.approx(0.5, abs=1e-3)
+    assert float(own["unexplained"]) == pytest.approx(0.0, abs=1e-9)
+    lines = dict(answer(done, "out"))
+    assert "C 100% ±" in lines["contributions"]
+    assert "m2" not in lines["contributions"].partition(":")[2]
+    assert "C 50% ±" in lines["tolerances"]
+
+
+def test_verdicts_of_a_study_agree_with_the_truth(done):
+    done = done["verification"]
+    shares = [share_above(float(m2)) for m2 in done["m2"]]
+    assert min(shares) < 0.001 < max(shares)
+    for share, text in zip(shares, done["constraints"].to_numpy(), strict=True):
+        assert not (": kept" in str(text) and share > 0.001)
+        assert not (": broken" in str(text) and share < 0.001)
+        assert "95 % CI 0 to " in str(text) or " 0 at most" not in str(text)
+    best = done.sel(design="light alpha")
+    assert ": kept" in str(best["constraints"].item())
+    assert (
+        int(best["samples"]) > 512
+    )  # as many as the rare failure needs, not as mean and deviation do
+
+
+def test_check_states_what_a_rare_failure_costs():
+    study = load_scene(tomllib.loads(formula.PHYSICS + STUDY)).required_study
+    (text,) = verdicts.costs(study, "m")
+    assert (
+        "share with f above 0.00047 m at most 0.001: 3687 simulations of a design without" in text
+    )
+    assert "12288 decide a design near it by importance sampling" in text
+    few = study.model_copy(update={"verification": Verification(samples=1024)})
+    assert "samples allows 1024, too few to decide" in next(verdicts.costs(few, "m"))

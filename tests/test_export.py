@@ -1,0 +1,177 @@
+"""Tables of results: what they hold, and that other programs read from every format what was written."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import report_data as data
+import xarray as xr
+from click.testing import CliRunner
+from scipy.io import loadmat
+
+import hpcclear
+from hpcclear.base.errors import InputError
+from hpcclear.cli import cli
+from hpcclear.report.export import FORMATS, export
+from hpcclear.report.tables import ROWS, to_table
+from hpcclear.results import dataset
+from hpcclear.results.names import KINDS
+
+IDEAL = ['joints.crank_rod={kind="ideal"}', 'joints.rod_slider={kind="ideal"}', "effects.friction=none"]  # fmt: skip
+SHORT = ["numerics.transient_revolutions=0", "output.instants_per_revolution=60"]
+
+
+@pytest.fixture(scope="module")
+def ideal() -> xr.Dataset:
+    """The response of a mechanism without clearance, which takes no kernel."""
+    return hpcclear.simulate(hpcclear.load_scene("jobs/slider_crank.toml", [*IDEAL, *SHORT]))
+
+
+def test_every_kind_of_result_has_rows():
+    assert ROWS.keys() == KINDS.keys()
+    for kind, rows in ROWS.items():
+        assert set(rows) <= {dim for column in KINDS[kind].coords.values() for dim in column.dims}
+
+
+def test_a_response_without_clearance_has_a_row_for_each_instant(ideal):
+    table = to_table(ideal, ("SI",))
+    assert len(table) == ideal.sizes["time"] > 100
+    np.testing.assert_array_equal(table["time [s]"], ideal["time"])
+    np.testing.assert_array_equal(table["slider_position [m]"], ideal["slider_position"])
+    assert table.attrs["objective [m]"] == 0.0
+    assert table.attrs["status"] == "ok"
+
+
+def test_a_sample_has_one_row_with_its_joints_as_columns_and_words_for_codes():
+    samples = data.samples()
+    table = to_table(samples)
+    assert len(table) == samples.sizes["sample"]
+    assert "peak_contact_force crank_rod [N]" in table
+    assert list(table["status"][-4:]) == ["ok", *["step_cap"] * 3]
+    assert table["flags"][0] == "latched+beyond_hertz"
+    assert table["objective [m]"][-3:].isna().all()
+
+
+@pytest.mark.parametrize(
+    ("line", "units", "heading", "factor"),
+    [
+        ('x = "0.3 mm"', (), "C [mm]", 1e3),
+        ('x = "0.3 mm"\n[study.variables]\nC = { range = ["300 um", "1 mm"] }', (), "C [um]", 1e6),
+        ('# set: joints.o2.clearance=0.3 mm\nx = "20 rpm"', (), "C [mm]", 1e3),
+        ("x = 3e-4", (), "C [m]", 1.0),
+        ('x = "0.3 mm"', ("SI",), "C [m]", 1.0),
+        ('x = "0.3 mm"', ("kN", "um"), "C [um]", 1e6),
+    ],
+)
+def test_units_are_those_asked_for_else_those_of_the_scene(line, units, heading, factor):
+    samples = data.samples().assign_attrs(scene=line)
+    table = to_table(samples, units)
+    np.testing.assert_allclose(table[heading], factor * samples["C"], rtol=1e-15)
+    if "kN" in units:
+        np.testing.assert_allclose(table["peak_contact_force crank_rod [kN]"][0], 5.0)
+
+
+def test_a_unit_that_fits_nothing_is_refused_with_those_that_do():
+    with pytest.raises(InputError, match=r"--unit = 'rpm'.*fits no quantity.*N, kg, kg m\^2, m$"):
+        to_table(data.samples(), ["rpm"])
+    with pytest.raises(InputError, match="no result"):
+        to_table(xr.Dataset())
+
+
+def test_places_of_a_grid_that_nothing_fills_have_no_row():
+    front = data.front()
+    assert len(to_table(front)) == int(front["mean"].notnull().sum()) < front["mean"].size
+
+
+def _read(path):
+    """Columns of a file, by heading, as another program reads them."""
+    if path.suffix == ".csv":
+        return pd.read_csv(path, keep_default_na=True)
+    if path.suffix == ".xlsx":
+        return pd.read_excel(path, sheet_name="data")
+    if path.suffix == ".parquet":
+        return pd.read_parquet(path)
+    content = loadmat(path)
+    return {name: values.ravel() for name, values in content.items() if not name.startswith("__")}
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("kind", ["samples", "response", "verification"])
+def test_what_is_read_back_equals_what_was_written(tmp_path, ideal, kind, ending):
+    made = {"samples": data.samples, "response": lambda: ideal, "verification": data.verification}
+    dataset.write(made[kind](), tmp_path / "r.nc")
+    table = export(tmp_path / "r.nc", tmp_path / f"r{ending}")
+    first = (tmp_path / f"r{ending}").read_bytes()
+    export(tmp_path / "r.nc", tmp_path / f"r{ending}")  # replaces its own file
+    assert (tmp_path / f"r{ending}").read_bytes() == first
+    found = _read(tmp_path / f"r{ending}")
+    if ending != ".mat":
+        assert list(found.columns) == list(table.columns)
+    for heading in table:
+        own = heading if ending != ".mat" else heading.partition(" [")[0]
+        values = found[own.replace(" ", "_") if ending == ".mat" else own]
+        if table[heading].dtype.kind in "fi":
+            np.testing.assert_array_equal(np.asarray(values, float), table[heading])
+        elif ending != ".mat":
+            assert pd.Series(values).fillna("").astype(str).tolist() == table[heading].tolist()
+        else:
+            assert ["".join(one.ravel()) for one in values] == table[heading].tolist()
+
+
+def test_files_say_their_units_and_their_scene(tmp_path):
+    from pyarrow import parquet
+
+    dataset.write(data.samples(), tmp_path / "s.nc")
+    for ending in (".mat", ".parquet", ".xlsx"):
+        export(tmp_path / "s.nc", tmp_path / f"s{ending}", ("mm",))
+    content = loadmat(tmp_path / "s.mat", squeeze_me=True)
+    assert str(content["units"]["objective"]) == "mm"
+    assert "mean distance" in str(content["long_names"]["objective"])
+    assert str(content["about_scene_hash"]) == "0" * 64
+    about = parquet.read_metadata(tmp_path / "s.parquet").metadata
+    assert json.loads(about[b"units"])["C [mm]"] == "mm"
+    listed = pd.read_excel(tmp_path / "s.xlsx", sheet_name="quantities").set_index("heading")
+    assert listed.loc["m2 [kg]", "unit"] == "kg"
+    assert (pd.read_excel(tmp_path / "s.xlsx", sheet_name="about")["value"] == "0" * 64).any()
+
+
+def test_text_of_a_cell_is_never_a_formula_nor_markup(tmp_path):
+    from openpyxl import load_workbook
+
+    hostile = data.claims()
+    hostile["text"][0] = "=1+1 <b>&\x01"
+    dataset.write(hostile, tmp_path / "c.nc")
+    export(tmp_path / "c.nc", tmp_path / "c.xlsx")
+    cell = load_workbook(tmp_path / "c.xlsx")["data"]["B2"]
+    assert (cell.value, cell.data_type) == ("=1+1 <b>& ", "s")
+
+
+def test_what_somebody_else_wrote_is_not_replaced(tmp_path):
+    dataset.write(data.samples(), tmp_path / "s.nc")
+    for ending in FORMATS:
+        (tmp_path / f"s{ending}").write_text("mine")
+        done = CliRunner().invoke(
+            cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / f"s{ending}")]
+        )
+        assert isinstance(done.exception, InputError)
+        assert (tmp_path / f"s{ending}").read_text() == "mine"
+
+
+def test_the_command_says_what_it_wrote_and_which_formats_there_are(tmp_path):
+    dataset.write(data.samples(), tmp_path / "s.nc")
+    done = CliRunner().invoke(
+        cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / "s.csv")]
+    )
+    assert "60 rows" in done.output
+    done = CliRunner().invoke(
+        cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / "s.doc")]
+    )
+    assert ".csv or .xlsx or .mat or .parquet" in str(done.exception)
+
+
+@pytest.mark.parametrize("command", ["simulate", "sample"])
+def test_a_command_that_is_to_write_a_table_names_export(command):
+    done = CliRunner().invoke(cli, [command, "jobs/quickstart.toml", "-o", "x.xlsx"])
+    assert done.exit_code == 2
+    assert "hpcclear export x.nc -o x.xlsx" in " ".join(done.output.split())

@@ -1,0 +1,145 @@
+"""Statistics of samples: limits that hold as often as they say, and nothing stated that samples do not determine."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_data as data
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP, OURS
+from hpcclear.base.outcome import Flag
+from hpcclear.report import spread
+from hpcclear.report.html.page import write_report
+from hpcclear.results import dataset
+from hpcclear.statistics.random.survival import fewest, order_limits
+
+
+def drawn(count=60, failed=0, method="monte-carlo", **more) -> xr.Dataset:
+    """Samples of a method, with some failures."""
+    return data.samples(count, failed or 1).assign_attrs(sampling=method, **more)
+
+
+def text(lines, label):
+    return dict(lines)[label]
+
+
+@pytest.mark.parametrize("level", [0.05, 0.5, 0.95, 0.99])
+def test_limits_of_a_quantile_hold_and_end_where_the_values_do(level):
+    count = fewest(level)
+    values = np.arange(count, dtype=float)
+    assert np.isfinite(order_limits(values, level)).all()
+    assert not np.isfinite(order_limits(values[1:], level)).all()
+    rng = np.random.default_rng(1)
+    ranked = rng.random((2000, count + 40))  # of a uniform distribution the quantile is its level
+    ends = np.array([order_limits(row, level) for row in ranked])
+    held = (ends[:, 0] <= level) & (level <= ends[:, 1])
+    assert held.mean() > 0.95 - 3 * np.sqrt(0.05 * 0.95 / 2000)
+
+
+def test_limits_of_a_quantile_hold_wherever_unknown_values_lie():
+    values = np.random.default_rng(2).random(500)
+    low, high = order_limits(values, 0.5, unknown=20)
+    for elsewhere in (-1.0, 2.0):
+        own = order_limits(np.append(values, np.full(20, elsewhere)), 0.5)
+        assert low <= own[0] < own[1] <= high
+    assert np.isnan(order_limits(np.array([]), 0.5)).all()
+
+
+def test_quantiles_are_stated_only_where_the_samples_reach_them():
+    few, many = (spread.statistics(drawn(count)) for count in (60, 500))
+    assert text(few, "P50 of f").count("mm") == 3
+    assert text(few, "P95 of f") == "not stated: it takes 72 samples"
+    assert text(few, "P99 of f") == "not stated: it takes 368 samples"
+    assert "to" in text(many, "P99 of f")
+    assert "failed" in dict(few)
+    failing = spread.statistics(drawn(500, 60))  # these might all be above
+    assert text(failing, "P95 of f") == "not stated: too many samples failed"
+    assert text(failing, "failed").startswith("60 of 500")
+
+
+def test_moments_are_those_of_the_samples():
+    samples = drawn(500)
+    f = samples["objective"].to_numpy()
+    mean = re.fullmatch(r"([\d.]+) ± ([\d.]+) mm", text(spread.statistics(samples), "mean of f"))
+    np.testing.assert_allclose(float(mean[1]), 1e3 * np.nanmean(f), rtol=1e-2)
+    expected = 1.965 * np.nanstd(f) / np.sqrt(499)
+    assert expected <= 1e-3 * float(mean[2]) < 1.2 * expected  # rounded up
+
+
+def test_designs_that_somebody_chose_have_no_intervals():
+    lines = spread.statistics(data.samples())
+    assert text(lines, "intervals") == spread.CHOSEN
+    assert not any(mark in line.text for line in lines for mark in ("±", " to "))
+    assert "P95 of f" not in dict(lines)
+    assert spread.statistics(data.samples(4, 3)) == []
+    assert text(spread.statistics(drawn(method="lhs")), "intervals") == spread.USUALLY_WIDER
+
+
+def test_a_share_beyond_a_threshold_counts_failures_for_and_against():
+    samples = drawn(100, 10)
+    units = spread.units_of(MEAN_GAP)
+    all_above = spread.beyond(units, "peak_contact_force=1 kN")
+    none_above = spread.beyond(units, "peak_contact_force=1e6")
+    lines = dict(spread.statistics(samples, [all_above, none_above]))
+    least = float(re.search(r"\(([\d.]+) %", lines["peak contact force > 1 kN"])[1])
+    most = float(re.search(r"to ([\d.]+) %", lines["peak contact force > 1 MN"])[1])
+    assert least < 90.0
+    assert most > 10.0
+    absent = spread.Beyond("mean_contact_force", 1.0)
+    assert "not recorded" in dict(spread.statistics(samples, [absent]))["mean_contact_force"]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("0.3 mm", ("objective", 3e-4)),
+        ("3e-4", ("objective", 3e-4)),
+        ("peak_contact_force=3kN", ("peak_contact_force", 3000.0)),
+        ("peak_contact_force = 3000", ("peak_contact_force", 3000.0)),
+    ],
+)
+def test_a_threshold_is_read_in_the_unit_of_its_result(words, expected):
+    assert spread.beyond(spread.units_of(MEAN_GAP), words) == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("3 kN", "a quantity in m"),
+        ("nan", "not a number"),
+        ("peak_force=3", "no result 'peak_force'.*Did you mean 'peak_"),
+        ("status=1", "no result 'status'"),
+    ],
+)
+def test_a_threshold_that_is_none_is_refused(words, reason):
+    with pytest.raises(InputError, match=reason):
+        spread.beyond(spread.units_of(MEAN_GAP), words)
+    assert spread.beyond(spread.units_of(OURS["peak-contact-force"]), "3 kN").value == 3000.0
+
+
+def test_warnings_are_those_of_a_response_with_their_numbers_of_samples():
+    samples = drawn(60)
+    remarks = spread.remarks(samples)
+    assert len(remarks) == 2
+    assert remarks[0].startswith("20 of 60 samples: a joint stayed in contact")
+    assert remarks[1].startswith("5 of 60 samples: indentation")
+    unsure = samples.copy()
+    unsure["objective_uncertainty"] = 0.5 * samples["objective"]
+    assert "59 of 60 samples: f is sensitive" in spread.remarks(unsure)[0]
+    calm = samples.assign(flags=samples["flags"] * 0 + int(Flag.STIFF))
+    assert spread.remarks(calm) == []
+
+
+def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
+    scene = Path("jobs/quickstart.toml").read_text()
+    case = '[study.cases.rare]\nrandom = ["C"]\nobjectives = ["mean", { statistic = "exceedance", limit = "0.5 mm" }]'
+    scene = re.sub(r"\[study.cases\].*?\n\n", f"{case}\n\n", scene, flags=re.S)
+    dataset.write(drawn(500, scene=scene), tmp_path / "samples.nc")
+    page = write_report(tmp_path).read_text()
+    assert "Statistics of the samples" in page
+    assert "P99 of f" in page
+    assert "f &gt; 0.5 mm" in page
+    assert "5 of 500 samples: indentation" in page

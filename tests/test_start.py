@@ -1,0 +1,72 @@
+"""How much a command loads before it works: counted in modules, as seconds depend on the machine."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from light import loaded_by
+from patience import crowded
+
+SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
+HEAVY = {
+    "h5py",
+    "matplotlib",
+    "mpi4py",
+    "numba",
+    "numpy",
+    "pandas",
+    "pint",
+    "pydantic",
+    "rich",
+    "scipy",
+    "sklearn",
+    "xarray",
+}
+
+
+def command(*words: str) -> str:
+    """A statement that carries out a command and leaves its modules loaded."""
+    return (
+        "import contextlib, io\nfrom hpcclear.cli import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
+        f"    main({list(words)!r})"
+    )
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["run", "--help"], ["cite"]])
+def test_help_loads_no_library_of_numbers(words):
+    light = HEAVY if words != ["cite"] else {"numba", "xarray", "scipy"}
+    assert not loaded_by(command(*words), light)
+
+
+def test_a_response_that_is_compiled_loads_nothing_that_only_compiling_needs(tmp_path):
+    words = [
+        "simulate",
+        str(SCENE),
+        "-o",
+        str(tmp_path / "a.nc"),
+        "--set",
+        "numerics.averaged_revolutions=1",
+    ]
+    program = [sys.executable, "-m", "hpcclear", *words]
+    subprocess.run(program, check=True, capture_output=True, timeout=crowded(600.0))  # compiles
+    compiling = {
+        "numba.np.linalg",
+        "numba.np.arraymath",
+        "numba.np.npdatetime",
+        "numba.core.inline_closurecall",
+        "scipy.linalg",
+    }
+    others = {
+        "cffi",
+        "matplotlib.pyplot",
+        "mpi4py.MPI",
+        "numba",
+        "pint",
+        "scipy.special",
+        "scipy.stats",
+        "sklearn",
+        "xarray",
+    }
+    assert loaded_by(command(*words), compiling | others) == {"numba", "xarray"}

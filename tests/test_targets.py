@@ -1,0 +1,53 @@
+"""Settings for an error of f, from what the accuracy command measured."""
+
+import numpy as np
+import pytest
+import report_data as data
+
+from hpcclear.report import targets
+from hpcclear.scene.loading import load_scene
+
+SCENE = load_scene("jobs/slider_crank.toml").to_toml()
+
+
+@pytest.fixture
+def found():
+    content = data.accuracy()
+    return content.assign_attrs(scene=SCENE)
+
+
+def test_the_cheapest_settings_reach_their_target_and_cheaper_ones_do_not(found):
+    ways = targets.ways(found)
+    for target in (0.1, 3e-2, 1e-2):
+        best = targets.cheapest(found, target)
+        assert best is not None
+        assert best.error <= target
+        assert min(way.seconds for way in ways if way.error <= target) == best.seconds
+    errors = [way.error for way in targets.front(found)]
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_a_bias_is_never_taken_for_less_than_that_of_a_tighter_tolerance(found):
+    """By chance the loosest tolerance agrees with the reference; what a tighter one is off by holds for it too."""
+    lucky = found.assign(tolerance_bias=("tolerance", [0.0, 0.05, np.nan, np.nan]))
+    lucky["tolerance_bias_error"] = ("tolerance", [0.0, 0.0, np.nan, np.nan])
+    best = targets.cheapest(lucky, 0.02)
+    assert best is None or not best.words.startswith("rtol 1e-3")
+    unknown = found.assign(tolerance_bias=("tolerance", np.full(4, 0.05)))
+    assert targets.cheapest(unknown, 1e-2) is None
+    assert "no measured setting reaches it" in targets.sentences(unknown)[0]
+
+
+def test_the_scenes_own_settings_are_placed_between_the_measured_ones(found):
+    own = targets.settings(found)
+    assert own is not None
+    assert "rtol 1e-6" in own.words
+    price = float(found["tolerance_seconds"][3])
+    assert own.seconds == pytest.approx(10 * price)
+    loose = targets.settings(
+        found.assign_attrs(scene=SCENE.replace("rtol = 1e-06", "rtol = 1e-03"))
+    )
+    assert loose is not None
+    assert loose.error > own.error
+    assert loose.error > 0.19  # the bias of that tolerance
+    assert targets.settings(found.assign_attrs(scene="[effects")) is None
