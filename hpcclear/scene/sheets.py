@@ -242,9 +242,8 @@ def _cells(path: Path, what: str, text: str) -> tuple[Rows, str]:
     """Rows of a text that are not empty, and the separator of their cells."""
     lines, comments, separator = Lines(), Lines(), ""
     number, counted = 1, 0
-    for found in re.finditer(
-        r"[^\n]*[^\s][^\n]*", text
-    ):  # one after the other: a file may be of line ends alone
+    # one after the other: a file may be of line ends alone
+    for found in re.finditer(r"[^\n]+", text):
         line = found[0]
         number, counted = number + text.count("\n", counted, found.start()), found.start()
         if len(line) > LONGEST_LINE:
