@@ -312,8 +312,8 @@ def test_a_sketch_draws_each_table():
         JOBS / "slider_crank.toml",
         ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
     )
-    for scene, poses, peak in ((linkage, poses_at_start(linkage), None), (with_load, None, 1.0)):
-        figure = sketch_figure(scene, poses)
+    for scene, peak in ((linkage, None), (with_load, 1.0)):
+        figure = sketch_figure(scene, poses_at_start(scene))
         curve = figure.axes[-1]
         (line,) = curve.get_lines()
         angles, values = line.get_data()
