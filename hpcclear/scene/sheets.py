@@ -325,7 +325,7 @@ def _sheet(path: Path, what: str, rows: Rows, found: str, separator: str, headed
     rows = [(line, list(cells)) for line, cells in rows]
     if len(rows) < 2:
         remedy = "Write a row of names, then a row for each point or value"
-        raise InputError(what, str(path), f"holds no points ({found})", remedy)
+        raise InputError(what, str(path), f"contains no points ({found})", remedy)
     width = max(len(cells) for _, cells in rows)
     while width > 1 and all(len(cells) < width or not cells[width - 1] for _, cells in rows):
         width -= 1  # separators at the end of each line
@@ -355,7 +355,7 @@ def _sheet(path: Path, what: str, rows: Rows, found: str, separator: str, headed
     ]
     if not cells:
         raise InputError(
-            what, str(path), f"holds no points ({found})", "Write a row for each point or value"
+            what, str(path), f"contains no points ({found})", "Write a row for each point or value"
         )
     columns = []
     for place, heading in enumerate(header):
