@@ -15,6 +15,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.recorded import Recording, Steps
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Outcome
@@ -52,6 +53,13 @@ def scene_with(changes=None, revolutions=1, rtol=1e-8) -> Scene:
         "numerics.rtol": rtol,
     }
     return load_scene(SCENE).with_(numerics | (changes or {}))
+
+
+def integrate(scene: Scene):
+    """All steps of a response, its outcome record (1,) and parameters, SI."""
+    recording = Recording(scene)
+    steps = Steps.of(np.concatenate(list(recording.chunks())))
+    return steps, recording.record(), recording.par
 
 
 def kept_steps(problem, par, start, rows: int, budget: int) -> list[np.ndarray]:
