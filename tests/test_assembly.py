@@ -21,7 +21,7 @@ from linkages import (
 )
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.assembly import assemble, open_gaps
+from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import Body, ConstantSpeed, Slide
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
@@ -59,6 +59,17 @@ def test_every_linkage_is_assembled_as_it_was_meant(name):
         if isinstance(mechanism.drive_of(body.name), ConstantSpeed):
             assert assembly.angle(body.name) == pytest.approx(body.start_angle)
     assert len(assembly.report()) == len(mechanism.bodies)
+
+
+def open_gaps(assembly):
+    """How far journals stand off their bearings' centres at the start, m, by joint."""
+    loops = assembly.loops
+    error = loops.at(assembly.q, assembly.v, 0.0).error
+    rows = {
+        joint.name: [r for r, owner in enumerate(loops.owners) if owner == f"joints.{joint.name}"]
+        for joint in loops.mechanism.clearances
+    }
+    return {name: float(np.hypot(*error[own])) for name, own in rows.items()}
 
 
 def test_journals_start_where_they_are_put():

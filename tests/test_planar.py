@@ -15,9 +15,11 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.planar.tables import mechanism_of, planar_mechanism
+from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.start import start_states
+from hpcclear.scene.planar import Planar
 from hpcclear.scene.points import Points
+from hpcclear.scene.validation import validated
 
 TEXT = """
 kind = "planar"
@@ -104,7 +106,7 @@ def changed(path, value):
 
 
 def test_tables_are_read_into_data_and_assembled():
-    mechanism = planar_mechanism(TABLES)
+    mechanism = mechanism_of(validated(Planar, TABLES))
     assert [body.name for body in mechanism.bodies] == ["crank", "coupler", "rocker"]
     crank, coupler, rocker = mechanism.bodies
     assert (crank.mass, crank.center) == (0.2, (0.02, 0.0))
@@ -149,8 +151,8 @@ def test_tables_are_read_into_data_and_assembled():
 )
 def test_wrong_tables_are_refused_by_name(path, value, key, said):
     with pytest.raises(InputError) as caught:
-        planar_mechanism(changed(path, value))
-    assert caught.value.key == key
+        mechanism_of(validated(Planar, changed(path, value)))
+    assert caught.value.key.removeprefix("mechanism.") == key
     assert said in str(caught.value)
 
 

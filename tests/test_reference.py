@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running import kept_steps
+from running import integrate, kept_steps
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import evaluator
@@ -14,7 +14,6 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.response import integrate
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record
 from hpcclear.dynamics.views import Outcome

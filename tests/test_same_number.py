@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from running import integrate
 
 import hpcclear
 from hpcclear.cli import cli
@@ -13,7 +14,7 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import coordinate_count, problem_of
-from hpcclear.dynamics.response import integrate, simulate
+from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options

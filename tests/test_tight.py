@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from running import HUNT_CROSSLEY, LATCHED, energy_residual, kept_steps, run, scene_with
+from running import HUNT_CROSSLEY, LATCHED, energy_residual, integrate, kept_steps, run, scene_with
 
 from hpcclear.base import remarks
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import integrator_of, problem_of
-from hpcclear.dynamics.response import integrate
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.stepping import record
 from hpcclear.dynamics.views import Outcome

@@ -21,9 +21,11 @@ from hpcclear.cli.options import (
 from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
     from hpcclear.report.compare import Quantity
+    from hpcclear.report.html.content import Content
 
 FILE = click.argument("file", type=PATH)
 UNITS = click.option(
@@ -189,11 +191,9 @@ def plot(
 
     content = read(place)
     if animation is not None:
-        one = content.response
-        if one is None:
-            reason = "it holds no response, so there is no motion to show"
-            raise InputError("file", str(place), reason, "Make one with hpcclear simulate")
-        show(f"film     {animate(one, place_of(animation), seconds, revolutions)}")
+        show(
+            f"film     {animate(_moving(content, place), place_of(animation), seconds, revolutions)}"
+        )
     with trusting(trust):
         every = drawings(content.files, content.responses)
         if output is not None:
@@ -201,6 +201,14 @@ def plot(
         elif animation is None:
             show(f"figures of {place}: {', '.join(every)}")
     return Exit.DONE
+
+
+def _moving(content: "Content", place: Path) -> "xr.Dataset":
+    """The response that a film shows."""
+    if content.response is None:
+        reason = "it holds no response, so there is no motion to show"
+        raise InputError("file", str(place), reason, "Make one with hpcclear simulate")
+    return content.response
 
 
 def known(name: str, every: "Mapping[str, Callable[[], Figure]]") -> "Callable[[], Figure]":

@@ -21,7 +21,7 @@ from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
-from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, Steps, pieces
+from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.telling import recorded
 from hpcclear.results import dataset
@@ -30,13 +30,6 @@ from hpcclear.scene.planar import turns_of
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
-
-
-def integrate(scene: Scene, copy: int = 0) -> tuple[Steps, Records, Array]:
-    """Integrate a scene, or a perturbed replica; all its steps, outcome record (1,) and parameters (PARAMETERS,), all in SI."""
-    recording = Recording(scene, copy)
-    steps = Steps.of(np.concatenate(list(recording.chunks())))
-    return steps, recording.record(), recording.par
 
 
 def _between(piece: Piece, cycle: float) -> tuple[Array, Array, Array]:

@@ -232,17 +232,9 @@ class Parameters(View):
     @property
     def contact_numbers(self) -> Array:
         """Numbers of the law of contact, shape (..., MAX_JOINTS, LAW_NUMBERS), in the order of its ``read``."""
-        return self._law_numbers(at.CONTACT_NUMBERS)
-
-    @property
-    def friction_numbers(self) -> Array:
-        """Numbers of the law of friction, likewise."""
-        return self._law_numbers(at.FRICTION_NUMBERS)
-
-    def _law_numbers(self, first: int) -> Array:
         blocks = self.rows[..., at.JOINT_BLOCKS : at.OWN]
         blocks = blocks.reshape(*blocks.shape[:-1], at.MAX_JOINTS, at.JOINT_ROWS)
-        found: Array = blocks[..., first : first + at.LAW_NUMBERS]
+        found: Array = blocks[..., at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + at.LAW_NUMBERS]
         return found
 
 

@@ -171,7 +171,7 @@ def compare(
 
 
 def read_columns(path: Path) -> list[Column]:
-    """Return the columns of numbers of a measured table, each with its unit."""
+    """Return the columns of numbers of a measured table, each with its unit; raises InputError where there is no series."""
     sheet = read(path, "measured table")
     columns = [one for one in sheet.columns if not sheet.is_text(one)]
     if len(columns) < 2 or len(sheet.lines) < 3:

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from fractions import Fraction
 from functools import lru_cache
-from math import isfinite, pi
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 from hpcclear.scene.unit_names import (
@@ -63,7 +63,7 @@ class _NoUnit(ValueError):
 
 
 @lru_cache(maxsize=1)
-def _registry() -> "UnitRegistry":
+def _registry() -> "UnitRegistry[Any]":
     # Imported here because it costs about half a second, and most scenes need the names of `unit_names` alone. Exact
     # fractions make "0.3 mm" the same float as 3e-4, so that the spelling of a number cannot change
     # a result.
@@ -343,10 +343,3 @@ def _mended(number: str, rest: str) -> str:
     if _GROUPED.match(rest) or rest[:1].isdigit():
         return "Write the digits of a number without signs or spaces between them"
     return ""
-
-
-def decimal(text: str) -> float:
-    """A decimal number without a unit; raises UnitError (for "nan" and "inf" too)."""
-    if re.fullmatch(_NUMBER, text) is None or not isfinite(float(text)):
-        raise UnitError("is not a finite decimal number", "Write a number such as 0.21")
-    return float(text)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 
 LARGEST = 20_000_000
 """Bytes of a workbook, which is packed."""
@@ -26,7 +27,7 @@ def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> list[tupl
     except ImportError:
         raise InputError(
             what, str(path), "reading an Excel workbook takes the package openpyxl",
-            "pip install 'hpcclear[tables]', or save it as CSV",
+            f"{installing('tables')}, or save it as CSV",
         ) from None  # fmt: skip
     if len(data) > LARGEST:
         raise InputError(what, str(path), f"is larger than {LARGEST} bytes", "Save it as CSV")

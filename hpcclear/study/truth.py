@@ -90,7 +90,7 @@ def simulate(
 def explained(
     run: StudyRun, choices: Sequence[Choice], made: Sequence[Array], purpose: str = "verification"
 ) -> Result:
-    """What makes the scatter of designs (`hpcclear.study.contributions.of_designs`), from what was made of them."""
+    """What makes the scatter of designs (`hpcclear.study.contributions.of_designs`), from f of each, (rows, n) or (n,)."""
 
     def drawn(choice: Choice, f: Array) -> Points:
         if run.study.verification.draws is not None:

@@ -11,7 +11,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.loops import Loops, typical_length
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import GROUND, Clearance, Fixed, Slide, as_complex, split
+from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Slide, as_complex, split
 from hpcclear.dynamics.linkage.trees import forest
 
 MOST_STEPS = 40
@@ -276,19 +276,4 @@ def _smallest(rows: Array, n: int) -> Array:
     if not rows.shape[-2] or rows.shape[-2] > n:
         return np.full(rows.shape[:-2], float(not rows.shape[-2]))
     found: Array = np.asarray(np.linalg.svd(rows / _sizes(rows), compute_uv=False)[..., -1], float)
-    return found
-
-
-def open_gaps(assembly: Assembly) -> dict[str, float]:
-    """How far journals stand off their bearings' centres at the start, m, by joint."""
-    state = assembly.loops.at(assembly.q, assembly.v, 0.0)
-    found: dict[str, float] = {}
-    for joint in assembly.loops.mechanism.joints:
-        if isinstance(joint, Clearance):
-            rows = [
-                r
-                for r, owner in enumerate(assembly.loops.owners)
-                if owner == f"joints.{joint.name}"
-            ]
-            found[joint.name] = float(np.hypot(*state.error[rows]))
     return found

@@ -46,15 +46,6 @@ def product(flag, a, b):
 
 
 @lane_function
-def either_product(flag, other, a, b):
-    """`product` for an effect with two forms: constant and tabulated loads."""
-    if flag is not None:
-        return a * b
-    else:
-        return product(other, a, b)
-
-
-@lane_function
 def swept(spin, arm):
     """Speed at the end of an arm, 0 of what never turns (None)."""
     return product(spin, spin, arm)

@@ -29,15 +29,6 @@ class Here(NamedTuple):
 
 
 @lane_function
-def turns_if(flag, turns):
-    """Cosines and sines that waves turn with, where there are any."""
-    if flag is not None:
-        return turns
-    else:
-        return None
-
-
-@lane_function
 def less(flag, a, b):
     """a - b, or a with the effect off."""
     if flag is not None:

@@ -1,6 +1,5 @@
 """From the tables of a linkage to the mechanism as data."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -29,22 +28,10 @@ from hpcclear.scene.planar import (
     PlanarSlide,
 )
 from hpcclear.scene.points import Points
-from hpcclear.scene.validation import validated
-
-
-def planar_mechanism(content: Mapping[str, Any]) -> Mechanism:
-    """The mechanism of the tables ``bodies``, ``ground``, ``joints``, ``drives`` and ``loads``.
-
-    Raises
-    ------
-    InputError
-        If an entry is wrong, or they make no mechanism; it names the entry, the joint, the body or the drive.
-    """
-    return Mechanism(**_tables(validated(Planar, content)))
 
 
 def mechanism_of(planar: Planar) -> Mechanism:
-    """The mechanism of a scene's tables; raises InputError as `planar_mechanism`, below ``mechanism``."""
+    """The mechanism of a scene's tables; InputError names the entry below ``mechanism``."""
     try:
         return Mechanism(**_tables(planar))
     except InputError as error:

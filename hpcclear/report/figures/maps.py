@@ -40,7 +40,7 @@ def map_figure(content: xr.Dataset) -> "Figure":
 
 
 def entry(variable: xr.DataArray) -> tuple[Array, str]:
-    """Values of an entry of the scene in a readable unit, and the label of its axis; angular speeds in rpm."""
+    """Values (n,) of an entry of the scene in a readable unit, and the label of its axis; angular speeds in rpm."""
     unit = RPM if variable.attrs.get("units") == "rad/s" else labels.of(variable)
     words = labels.literal(labels.words(variable))
     label = unit.label(words) if unit.unit != "–" else words

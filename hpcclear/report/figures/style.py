@@ -147,7 +147,13 @@ def page(height: float) -> "Figure":
 
 
 def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
-    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`."""
+    """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`.
+
+    Raises
+    ------
+    InputError
+        If the caller gave another number of axes.
+    """
     if (given := _given.get()) is not None:
         if len(given) != rows * columns:
             reason = f"this figure has {rows * columns} panels"
