@@ -25,8 +25,8 @@ def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
     """Points of crank, rod and slider.
 
     The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
-    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths. So does the height
-    of the slider, from the rod's other end.
+    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths. So does the
+    height of the slider, from the rod's other end.
     """
     rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
     phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
