@@ -59,6 +59,11 @@ def summed(content: xr.Dataset) -> Iterator[float]:
         for name in ("objective", "rhs_evaluations"):
             yield from (float(content[name].min()), float(content[name].max()))
         yield float(content["rhs_evaluations"].sum())
+        f = content["objective"].to_numpy()
+        f = f[np.isfinite(f)]
+        if len(f) > 1:
+            yield from (float(f.mean()), float(f.std(ddof=1)))
+            yield float(np.quantile(f, 0.5, method="hazen"))
     if kind == "verification":
         for name in ("mean", "deviation"):  # half as wide as limits, and against the original
             yield from np.ravel(0.5 * (content[f"{name}_upper"] - content[f"{name}_lower"]))

@@ -104,6 +104,7 @@ installed() {
     hpcclear check engine.toml --no-cost
     hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     hpcclear report results
+    hpcclear plot results/response.nc --figure orbit -o orbit.png
     hpcclear cite >hpcclear.bib
     test -s results/report.html
 }

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bending_by_lagrange import Rod
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
+from some_laws import row
 
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
@@ -78,8 +79,8 @@ def run(scene: Scene, effects=None, par_changes=None, shift=None, **options) -> 
     if effects:
         problem = replace(problem, effects=problem.effects._replace(**effects))
     par = parameters(scene)
-    for row, value in (par_changes or {}).items():
-        par[:, row] = value
+    for column, value in (par_changes or {}).items():
+        par[:, column] = value
     start = start_states(scene, par)
     n = problem.coordinates
     if shift is not None:
@@ -145,7 +146,7 @@ def bodies(scene: Scene, par, q, v):
     """
     if scene.numerics.formulation == "baumgarte":
         nine, rates = np.zeros(9), np.zeros(9)
-        nine[KERNEL_ORDER], rates[KERNEL_ORDER] = q, v
+        nine[KERNEL_ORDER], rates[KERNEL_ORDER] = q[scene.modes :], v[scene.modes :]
         return nine, rates
     free = scene.drive.kind == "torque"
     phi, omega = (q[-1], v[-1]) if free else (0.0, par[at.SPEED])
@@ -212,7 +213,8 @@ def energy(scene: Scene, par, q, v, active) -> float:
         if name in scene.clearance_joints():
             depth = max(abs(e) - par[base + at.CLEARANCE], 0.0)
             on = active[k] if latched else 1.0
-            total += 0.4 * par[base + at.CONTACT_NUMBERS] * on * depth**2.5
+            stiffness = par[base + row("contact", scene.effects.contact.law, "stiffness")]
+            total += 0.4 * stiffness * on * depth**2.5
     return float(total)
 
 

@@ -173,7 +173,7 @@ def _broken_calls(before: list[list[str]], now: list[list[str]]) -> Iterator[str
     for name, kind, default in before:
         if name not in known:
             yield f"parameter {name} is gone"
-        elif known[name] != [kind, default]:
+        elif known[name] != [kind, default] and (default or known[name][0] != kind):
             yield f"parameter {name}: {kind} {default} before, {' '.join(known[name])} now"
     names = [name for name, *_ in before]
     for name, kind, default in now:

@@ -109,7 +109,9 @@ def verified(verdict: str, excess: list[float]):
     }  # fmt: skip
     for name in ("first", "second"):
         columns |= {f"{name}_{end}": values for end in ("true", "lower", "upper")}
-    return dataset.dataset("verification", {"design": np.array(names)}, columns)
+    content = dataset.dataset("verification", {"design": np.array(names)}, columns)
+    content.attrs["method"] = "qmc"
+    return content
 
 
 @pytest.mark.parametrize(

@@ -40,12 +40,8 @@ def allowed(row):
             return False
         if row.get("film") is not None:
             return False
-        # closed-form, not integrated: tests/test_ideal.py
-        if (
-            row.get("drive") == "speed"
-            and row.get("formulation") == "minimal"
-            and row.get("bending", 2) is None
-        ):
+        # prescribed, not integrated: tests/test_ideal.py
+        if row.get("drive") == "speed" and row.get("bending", 2) is None:
             return False
     return True
 

@@ -24,9 +24,13 @@ WORKS = [
     "crate",
     "schema",
     "laws",
+    "export",
+    "compare",
+    "plot",
     "plan",
 ]
 STOPS = [
+    "bifurcation",
     "map",
     "wear",
     "effects",

@@ -3,19 +3,22 @@
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from margins import fewest
 from scipy import stats
 
+from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
+from hpcclear.scene.points import Points
 from hpcclear.statistics.random import tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare
-from hpcclear.study import run_study
+from hpcclear.study import rare, run_study
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
 
@@ -124,6 +127,28 @@ def test_values_that_failed_are_left_out_and_weights_are_bounded():
     share = stats.norm.sf(3.1)
     found = made.told(0.95)
     assert 0.5 * share < found.value < 3.0 * share
+
+
+def test_inputs_too_far_out_to_make_a_mechanism_count_as_failed():
+    """Importance sampling reaches further than any sample: a negative clearance ends no study."""
+
+    def filled(names: tuple[str, ...], values: np.ndarray) -> Points:
+        if (values < 0.0).any():
+            raise InputError("C", -1.0, "is negative", "Narrow its distribution")
+        return Points(names, values, (("joints.crank_rod.clearance",),))
+
+    def records(points: Points, stage: str) -> np.ndarray:
+        return points.values[:, 0]
+
+    simulations = SimpleNamespace(filled=filled, records=records, objective=lambda one: 2.0 * one)
+    run = SimpleNamespace(simulations=simulations)
+    values = np.array([[1.0], [-1.0], [2.0], [3.0], [-2.0]])
+    np.testing.assert_array_equal(rare._valid(run, ("C",), values), values[:, 0] > 0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rare, "_rows", lambda run, choice, u: (("C",), u))
+        first, second = rare._simulated(run, [(None, values), (None, -values[:1])], "stage")
+    np.testing.assert_array_equal(first, [2.0, np.nan, 4.0, 6.0, np.nan])
+    np.testing.assert_array_equal(second, [np.nan])
 
 
 # -- a study ----------------------------------------------------------------------------------------

@@ -12,6 +12,8 @@ import pytest
 import surface
 from patience import crowded
 
+from hpcclear import __version__
+
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -112,3 +114,13 @@ def test_calls_break_by_a_new_needed_parameter_and_not_by_one_with_a_default():
     assert surface.changes(before, now) == []  # by name only is b, wherever it stands
     now["Python"]["f"]["parameters"] = now["Python"]["f"]["parameters"][1:]
     assert surface.changes(before, now) == ["Python f: parameter b is gone"]
+
+
+def test_the_version_stands_in_one_place():
+    files = ["pyproject.toml", "CITATION.cff", ".zenodo.json", "README.md", "tests/release.sh"]
+    paths = [ROOT / name for name in files]
+    paths += [path for path in (ROOT / "packaging").rglob("*") if path.is_file()]
+    assert len(paths) > 8
+    for path in paths:
+        assert __version__ not in path.read_text(encoding="utf-8"), path
+    assert f'__version__ = "{__version__}"' in (ROOT / "hpcclear" / "__init__.py").read_text()

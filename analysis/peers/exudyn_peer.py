@@ -10,7 +10,17 @@ from collections.abc import Callable
 
 import exudyn as exu
 import exudyn.itemInterface as items
-from plain_loop import CRANK, FAR, FIRST, NEAR, ROD_INERTIA, ROD_MASS, SECOND, SLIDER_MASS
+from plain_loop import (
+    CRANK,
+    FAR,
+    FIRST,
+    NEAR,
+    ROD_INERTIA,
+    ROD_MASS,
+    SECOND,
+    SLIDER_MASS,
+    STIFFNESS,
+)
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
@@ -55,7 +65,7 @@ def _contact(mbs, p, joint: int, floor: float, journal, bearing) -> None:
             isHollowSphere1=True,
             dynamicFriction=p[joint + at.FRICTION_NUMBERS],
             frictionProportionalZone=1.0 / p[joint + at.INVERSE_RAMP],
-            contactStiffness=p[joint + at.CONTACT_NUMBERS],
+            contactStiffness=p[joint + STIFFNESS],
             contactStiffnessExponent=1.5,
             restitutionCoefficient=restitution,
             minimumImpactVelocity=floor,

@@ -388,7 +388,8 @@ def _next(
         yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
     prices = re.findall(r"about (\d+) simulations would decide", str(best.get("constraints", "")))
     if prices:
-        yield f"study.verification.most_samples={max(map(int, prices))} to decide the constraints"
+        key = "most_samples" if ours.attrs.get("method") == "qmc" else "samples"
+        yield f"study.verification.{key}={max(map(int, prices))} to decide the constraints"
     if "on_bounds" in best and str(best["on_bounds"].item()):
         yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):

@@ -57,8 +57,8 @@ def roles(verified: xr.Dataset) -> dict[str, list[Role]]:
     Returns
     -------
     dict of str to list of Role
-        Baseline, ends of the front, the recommended design, and the one with the lowest sum of the varied masses unless another
-        one is as light. Designs that the search only met on its way are left out.
+        Baseline, ends of the front, the recommended design, and the one with the lowest sum of the varied masses, unless one
+        of these is as light. Intermediate designs of the search are left out.
     """
     names = [str(name) for name in verified["design"].to_numpy()]
     best = recommended(verified)

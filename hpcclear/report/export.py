@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.report import xlsx
 from hpcclear.report.tables import identifier, to_table
 from hpcclear.results import dataset, files
@@ -134,7 +135,7 @@ def _arrow() -> tuple[Any, Any]:
         import pyarrow.parquet
     except ModuleNotFoundError:
         kind, reason = "parquet", "parquet files need the package pyarrow, which is not installed"
-        remedy = "Install it with: pip install 'hpcclear[tables]'; csv, xlsx and mat need nothing"
+        remedy = f"{installing('tables')}; csv, xlsx and mat need nothing"
         raise InputError("output", kind, reason, remedy) from None
     return pyarrow, pyarrow.parquet
 

@@ -63,7 +63,7 @@ class _NoUnit(ValueError):
 
 
 @lru_cache(maxsize=1)
-def _registry() -> "UnitRegistry":
+def _registry() -> "UnitRegistry[Any]":
     # Imported here because it costs about half a second, and most scenes need the names of `unit_names` alone. Exact
     # fractions make "0.3 mm" the same float as 3e-4, so that the spelling of a number cannot change
     # a result.

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 
 LARGEST = 20_000_000
 """Bytes of a workbook, which is packed."""
@@ -26,7 +27,7 @@ def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> list[tupl
     except ImportError:
         raise InputError(
             what, str(path), "reading an Excel workbook takes the package openpyxl",
-            "pip install 'hpcclear[tables]', or save it as CSV",
+            f"{installing('tables')}, or save it as CSV",
         ) from None  # fmt: skip
     if len(data) > LARGEST:
         raise InputError(what, str(path), f"is larger than {LARGEST} bytes", "Save it as CSV")
@@ -106,4 +107,4 @@ def _text(path: Path, cell: Any, formula: Any) -> str:
         if "%" in (cell.number_format or ""):
             return f"{100 * value!r} %"
         return repr(value)
-    return str(value).strip()
+    return str(value).strip()[:200]

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.extras import installing
 from hpcclear.ranks.stopping import Exit, Stopped
 from hpcclear.scene import Scene
 
@@ -81,6 +82,6 @@ def _mpiexec(ranks: int) -> str:
     beside = Path(sys.executable).parent / "mpiexec"
     found = str(beside) if beside.exists() else shutil.which("mpiexec")
     if found is None:
-        remedy = "Install one with: pip install 'hpcclear[mpich]', or leave ranks out"
+        remedy = f"{installing('mpich')}, or leave ranks out"
         raise InputError("ranks", ranks, "there is no mpiexec to start them", remedy)
     return found

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.errors import InputError
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
@@ -156,11 +157,7 @@ def _together(
     """Answer procedures of several designs by f, all they ask for at a time in one batch."""
     wanted = {k: next(one) for k, one in enumerate(going)}
     while wanted:
-        batches = [_points(run, asked[k].choice, u) for k, u in wanted.items()]
-        values = np.concatenate([one.values for one in batches])
-        points = Points(batches[0].names, values, batches[0].paths)
-        f = run.simulations.objective(run.simulations.records(points, stage))
-        parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1])
+        parts = _simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
         fresh = {}
         for k, part in zip(wanted, parts, strict=True):
             try:
@@ -170,8 +167,43 @@ def _together(
         wanted = fresh
 
 
-def _points(run: StudyRun, choice: Choice, u: Array) -> Points:
-    """A design at standard normals u, (n, random inputs), in all study variables."""
+def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
+    """f of designs at standard normals, (n,) each; NaN where it failed, or where inputs so far out make no mechanism."""
+    rows = [_rows(run, choice, u) for choice, u in where]
+    makes = [_valid(run, names, values) for names, values in rows]
+    batches = [
+        run.simulations.filled(names, values[good])
+        for (names, values), good in zip(rows, makes, strict=True)
+    ]
+    values = np.concatenate([one.values for one in batches])
+    points = Points(batches[0].names, values, batches[0].paths)
+    f = np.empty(0)
+    if len(values):
+        f = run.simulations.objective(run.simulations.records(points, stage))
+    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1])
+    found = []
+    for good, part in zip(makes, parts, strict=True):
+        whole = np.full(len(good), np.nan)
+        whole[good] = part
+        found.append(whole)
+    return found
+
+
+def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
+    """Which rows make a mechanism, (n,)."""
+    try:
+        run.simulations.filled(names, values)
+    except InputError:
+        if len(values) == 1:
+            return np.zeros(1, bool)
+        middle = len(values) // 2
+        halves = (_valid(run, names, part) for part in (values[:middle], values[middle:]))
+        return np.concatenate(list(halves))
+    return np.ones(len(values), bool)
+
+
+def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
+    """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
     random = run.study.case(choice.case).random
     moved = offsets(run.scene, random, list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T))
     design = dict(choice.design)
@@ -181,4 +213,4 @@ def _points(run: StudyRun, choice: Choice, u: Array) -> Points:
         design[name] = values if row.absolute else centre + values  # type: ignore[assignment]
     names = tuple(design)
     columns = [np.broadcast_to(design[name], len(u)) for name in names]
-    return run.simulations.filled(names, np.column_stack(columns))
+    return names, np.column_stack(columns)

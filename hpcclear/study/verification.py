@@ -89,7 +89,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
     nothing else is asked for; gamma, delta and epsilon of further ones. Of those that cannot be told from it at the
     study's confidence it is the best in the others. Each design of the front is surely better than each
-    other in one of them. Designs that break a constraint are none of these, unless all do.
+    other in one of them. They are chosen among the designs that surely satisfy all constraints, if there are any.
     """
     table = Table([], [], [], [])
     for case in run.study.cases:

@@ -36,6 +36,10 @@ _FITS = (
 """Figures of surrogates: the captions name those that do not fit."""
 
 
+_ELSEWHERE = ("timing", "accuracy")
+"""Kinds whose figures stand in sections of their own."""
+
+
 def figures(content: Content, troubles: list[str]) -> list[dict[str, str]] | None:
     """All figures: their pictures (PNG, base64) and captions; in `troubles`, why one was left out."""
     made = [attempt(f"The figure “{what}”", draw, troubles) for what, draw in _drawings(content)]
@@ -48,6 +52,8 @@ Maker = Callable[[], dict[str, str] | None]
 def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
     """Every figure that there may be: what it shows, and what makes its picture and caption."""
     for one in catalogue.RESULTS:
+        if one.kind in _ELSEWHERE:
+            continue
         fit = _warnings(one.kind, content.get(one.kind)) if one.draw in _FITS else ""
         yield from _of_file(one.draw, content.get(one.kind), one.caption + fit)
     certificate, times = content.get("effects"), content.get("timing")
