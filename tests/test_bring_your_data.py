@@ -312,8 +312,8 @@ def test_a_sketch_draws_each_table():
         JOBS / "slider_crank.toml",
         ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
     )
-    for scene, poses, peak in ((linkage, poses_at_start(linkage), None), (with_load, None, 1.0)):
-        figure = sketch_figure(scene, poses)
+    for scene, peak in ((linkage, None), (with_load, 1.0)):
+        figure = sketch_figure(scene, poses_at_start(scene))
         curve = figure.axes[-1]
         (line,) = curve.get_lines()
         angles, values = line.get_data()
@@ -323,3 +323,23 @@ def test_a_sketch_draws_each_table():
         assert "kN" in curve.get_title(loc="left")
         assert peak is None or values.max() == peak
     assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        " " * 90_000,
+        "C" + " " * 90_000,
+        "1," * 40_000,
+        "(" * 90_000,
+        "1 " * 40_000,
+        "a in " * 18_000,
+    ],
+)
+@pytest.mark.timeout(60)
+def test_hostile_lines_take_no_time(text, tmp_path):
+    path = tmp_path / "h.csv"
+    for body in (f"{text}\n1\n", f"C\n{text}\n"):
+        path.write_text(body)
+        with pytest.raises(InputError):
+            read_points(path, load_scene(JOBS / "slider_crank.toml"))

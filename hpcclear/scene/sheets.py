@@ -44,6 +44,8 @@ _HEADING = re.compile(
 )
 _NOTHING = ("", "-", "–", "—", "na", "n/a", "nan", "null", "none")
 """Cells in which nothing stands, in small letters."""
+LONGEST_CELL = 200
+"""Characters of a heading or number, so that no pattern takes long over it."""
 _SIGNS = tuple("+-.,0123456789\u2212")
 """How a number begins."""
 
@@ -232,41 +234,59 @@ _NAMED = {
 _COMMENT = re.compile(r"\s*(?:#|%|//|!)\s*(.*)")
 
 
+Lines = list[tuple[int, str]]
+"""Numbers, from 1 on, and texts of lines."""
+
+
 def _cells(path: Path, what: str, text: str) -> tuple[Rows, str]:
     """Rows of a text that are not empty, and the separator of their cells."""
-    lines = text.split("\n")
-    longest = max(map(len, lines))
-    if longest > LONGEST_LINE:
-        reason = f"a line has more than {LONGEST_LINE} characters"
-        raise InputError(what, str(path), reason, "Write a line for each point")
-    separator = ""
-    if stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip()):
-        separator, lines[0] = stated[1], ""
-    comments = {k: found[1] for k, line in enumerate(lines) if (found := _COMMENT.match(line))}
-    lines = ["" if k in comments else line for k, line in enumerate(lines)]
-    separator = separator or _separator(lines)
+    lines, comments, separator = Lines(), Lines(), ""
+    number, counted = 1, 0
+    # one after the other: a file may be of line ends alone
+    for found in re.finditer(r"[^\n]+", text):
+        line = found[0]
+        number, counted = number + text.count("\n", counted, found.start()), found.start()
+        if len(line) > LONGEST_LINE:
+            reason = f"a line has more than {LONGEST_LINE} characters"
+            raise InputError(what, str(path), reason, "Write a line for each point")
+        if line.isspace():
+            continue
+        if number == 1 and (stated := re.fullmatch(r'"?sep=(.)"?', line.strip())):
+            separator = stated[1]
+        elif comment := _COMMENT.match(line):
+            comments.append((number, comment[1]))
+        else:
+            lines.append((number, line))
+    separator = separator or _separator([line for _, line in lines[:2000]])
     rows = _rows(path, what, lines, separator)
-    if rows and comments and all(map(_is_number, rows[0][1])):  # NumPy writes headings behind a #
-        last = max((k for k in comments if k + 1 < rows[0][0]), default=None)
-        above = [] if last is None else _rows(path, what, [comments[last]], separator)
-        if above and len(above[0][1]) == len(rows[0][1]):
-            rows = [(1 + (last or 0), above[0][1]), *rows]
+    above = [one for one in comments if rows and one[0] < rows[0][0]]
+    if above and all(map(_is_number, rows[0][1])):  # NumPy writes headings behind a #
+        headings = _rows(path, what, above[-1:], separator)
+        if headings and len(headings[0][1]) == len(rows[0][1]):
+            rows = [*headings, *rows]
     return rows, separator
 
 
-def _rows(path: Path, what: str, lines: list[str], separator: str) -> Rows:
+def _rows(path: Path, what: str, lines: Lines, separator: str) -> Rows:
     if separator.isspace() and separator != "\t":  # runs of them stand between columns
         runs = _between(separator)
-        lines = [runs.sub("\x1f", re.sub(r"\s+(?=[\[(])", "", line.strip())) for line in lines]
+        lines = [
+            (number, runs.sub("\x1f", re.sub(r"\s+(?=[\[(])", "", line.strip())))
+            for number, line in lines
+        ]
         separator = "\x1f"
     try:
         cut = csv.reader(
-            (line + "\n" for line in lines),
+            (line + "\n" for _, line in lines),
             delimiter=separator or "\x1f", strict=True, skipinitialspace=True,
         )  # fmt: skip
-        rows = [(cut.line_num, [cell.strip() for cell in cells]) for cells in cut]
+        rows = [(lines[cut.line_num - 1][0], [cell.strip() for cell in cells]) for cells in cut]
     except csv.Error as error:
         raise InputError(what, str(path), f"cannot be read ({error})", _SAVE) from None
+    for line, cells in rows:
+        if max(map(len, cells), default=0) > LONGEST_CELL:
+            reason = f"a cell has more than {LONGEST_CELL} characters ({_NAMED.get(separator, 'spaces')})"
+            raise InputError(f"{path}, line {line}", cells[0][:40], reason, _SAVE)
     return [(line, cells) for line, cells in rows if any(cells)]
 
 
@@ -278,7 +298,7 @@ def _between(sign: str) -> re.Pattern[str]:
 
 def _separator(lines: Sequence[str]) -> str:
     """What stands between cells: the sign that cuts most lines into one number of cells, several; "" for one column."""
-    filled = [re.sub(r'"[^"]*"', '""', line.strip(" ")) for line in lines if line.strip()][:2000]
+    filled = [re.sub(r'"[^"]*"', '""', line.strip(" ")) for line in lines]
     best, share = "", 0.0
     for sign in ("\t", ";", "|", ",", "  ", " "):
         counts = Counter(len(_between(sign).findall(line)) + 1 for line in filled)

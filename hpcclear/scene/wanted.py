@@ -6,7 +6,7 @@ HERE = {
     ("torsionspring", "torsionalspring", "rotaryspring", "rotationalspring"):
         'There is no torsion spring: a long spring (load of kind "spring") at a lever arm r has the stiffness k r^2.',
     ("offset", "eccentricslider"):
-        'The line of an offset slider goes through a ground point beside the crank: kind = "slide", line = "ground.NAME".',
+        'Write offset in [mechanism] of a slider-crank; in a linkage the guide has line = "ground.NAME".',
     ("diametral", "diametric", "bearingdiameter", "journaldiameter", "borediameter", "pindiameter"):
         "Write diametral_clearance for the difference of both diameters, or half of it as clearance; halve the bore, too.",
     ("journalradius", "pinradius", "shaftradius"):
@@ -16,7 +16,7 @@ HERE = {
     ("gaspressure", "gasforce", "cylinder", "piston", "pressure", "indicated"):
         'A gas force is effects.slider_load, or the size of a force: { file = "p.csv", bore = "42 mm", ambient = "1 bar" }.',
     ("clockwise", "reverse", "rotationdirection", "senseofrotation"):
-        "Angles and speeds count counter-clockwise: a drive of a linkage turns clockwise with a negative speed.",
+        "Angles and speeds count counter-clockwise: a drive turns clockwise with a negative speed.",
     ("backlash", "play", "slop", "looseness", "gap"):
         'The play of a joint is its radial clearance: kind = "clearance", clearance = "0.1 mm".',
     ("stroke",): "The stroke of a slider-crank is twice crank.length.",

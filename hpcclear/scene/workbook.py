@@ -107,4 +107,4 @@ def _text(path: Path, cell: Any, formula: Any) -> str:
         if "%" in (cell.number_format or ""):
             return f"{100 * value!r} %"
         return repr(value)
-    return str(value).strip()
+    return str(value).strip()[:200]
