@@ -19,7 +19,7 @@ from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states
-from hpcclear.report.figures import motion
+from hpcclear.report.figures import motion, moving
 from hpcclear.scene.points import Points
 
 ANGLES = np.linspace(0, 3 * at.TURN, 721)
@@ -232,6 +232,8 @@ def test_a_clockwise_slider_crank_is_the_mirror_image(changes):
         np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6 * size, err_msg=name)
     np.testing.assert_allclose(motion.turns(other), motion.turns(one), rtol=1e-12)
     assert motion.crank_angle(other)[1] == -motion.crank_angle(one)[1] == -1
+    for response, offset in ((one, 0.01), (other, -0.01)):
+        np.testing.assert_allclose(moving.bodies(response)[1][:, 4, 1], offset, rtol=1e-6)
     # at rod and crank in line the slider is at its ends
     reach = np.sqrt((0.12 + 0.05) ** 2 - 0.01**2)
     assert one["slider_position"].max() == pytest.approx(reach, rel=1e-2 if changes else 1e-4)

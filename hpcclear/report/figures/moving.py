@@ -25,7 +25,8 @@ def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
     """Points of crank, rod and slider.
 
     The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
-    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths.
+    centre, back to the first bearing, plus the eccentricity; two equations an instant, linear in two lengths. So does the
+    height of the slider, from the rod's other end.
     """
     rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
     phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
@@ -33,7 +34,11 @@ def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
     # crank length * crank = rod - u2 * along + e12
     both = np.column_stack([crank.ravel(), along.ravel()])
     pin = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0]) * crank
-    slider = np.column_stack([shown["slider_position"].to_numpy(), np.zeros(len(pin))])
+    far = rod + e[:, 1]  # from here along the rod to the slider's pin, which stays at one height
+    slides = shown["slider_position"].to_numpy()
+    length = float((slides - far[:, 0]) @ along[:, 0] / (along[:, 0] @ along[:, 0]))
+    height = float(np.mean(far[:, 1] + length * along[:, 1]))
+    slider = np.column_stack([slides, np.full(len(pin), height)])
     points = np.stack([np.zeros_like(pin), pin, pin - e[:, 0], slider - e[:, 1], slider], axis=1)
     return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, np.zeros_like(phi)])
 
