@@ -165,5 +165,7 @@ step "recipes" recipes
 step "documentation" site
 printf '\n%-32s %-5s %s\n' step result time
 printf '%s\n' "${rows[@]}"
-if [ "$red" -eq 0 ]; then printf '\nto publish: git tag -a v%s -m "hpcclear %s" && git push origin v%s\n' "$version" "$version" "$version"; fi
+if grep -q "^## $version\b.*unreleased" "$scratch/source/CHANGELOG.md"; then
+    printf '\nnot to be tagged yet: the changelog calls %s unreleased (CONTRIBUTING.md, Release)\n' "$version"
+elif [ "$red" -eq 0 ]; then printf '\nto publish: git tag -a v%s -m "hpcclear %s" && git push origin v%s\n' "$version" "$version" "$version"; fi
 exit "$red"
