@@ -71,8 +71,9 @@ def test_responses_of_a_sample_are_those_of_its_time_series(changes):
         mean = integral(force[:, joint], time) / span
         assert record["mean_contact_force"][joint] == pytest.approx(mean, rel=1e-4)
     moment = np.abs(series.crank_moment.to_numpy()[late]).max()
-    # a sample looks at the ends of its steps, the series at many more instants
-    assert moment * 0.97 < record["peak_crank_moment"] <= moment * (1 + 1e-6)
+    # A sample looks at the ends of its steps, the series at many more instants. A step may end nearer to the peak than any of
+    # 20 000 instants: the moment follows contacts that swing some 11 times a radian, so these miss (11 * 3.1e-4 / 2)^2 / 2.
+    assert moment * 0.97 < record["peak_crank_moment"] <= moment * (1 + 3e-6)
     a = series.slider_acceleration.to_numpy()[late]
     mean = integral(a, time) / span
     deviation = np.sqrt(integral((a - mean) ** 2, time) / span)

@@ -14,8 +14,11 @@ from test_user_laws import FORMULA, NO_FRICTION, POWER, ROOT, file_with, oracle_
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.laws import laws, numbers
 from hpcclear.dynamics.laws.hertz_contact import dundurs
+from hpcclear.dynamics.problem import problem_of
 from hpcclear.scene import load_scene
 from hpcclear.scene.switches import switches
+
+from assembly import executed_arithmetic, force_evaluation  # isort: skip, found by test_user_laws
 
 STEEL, BRONZE, POLYMER, RUBBER = (207e9, 0.3), (105e9, 0.34), (3e9, 0.4), (10e6, 0.49)
 PAIRS = {
@@ -239,3 +242,11 @@ def test_a_response_has_pressure_and_angle(tmp_path):
     (row,) = bearings.bearings(found)
     titles = [title for title, _ in bearings.pressures([row])]
     assert titles == ["mean pressure", "half angle of contact", "peak pressure"]
+
+
+def test_a_line_is_vectorised(tmp_path):
+    made = content(geometry="line")
+    made["joints"]["rod_slider"] = {"kind": "ideal"}
+    found = executed_arithmetic(force_evaluation(problem_of(loaded(tmp_path, made)), 16))
+    assert found.packed.total() >= 100
+    assert found.packed_share >= 0.9
