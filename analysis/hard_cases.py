@@ -146,6 +146,10 @@ def closed_form(scene: Scene) -> Run:
     began = time.perf_counter()
     response = simulate(scene)
     outcome = np.zeros(1, OUTCOME)[0]
+    if not Status(int(response["status"])).valid:  # numbers of joints that are not there, too
+        for name in OUTCOME.names:
+            if outcome[name].dtype.kind == "f":
+                outcome[name] = np.nan
     for name in OUTCOME.names:
         if name in response:
             value = response[name].values

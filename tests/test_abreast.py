@@ -43,8 +43,9 @@ def scene_of(name: str) -> Scene:
 
 def run(scene: Scene, samples: slice, width: int) -> Outcome:
     """Outcomes of some of twelve samples."""
-    par = parameters(scene, latin_hypercube(scene, 12))[samples]
-    return Lanes(problem_of(scene), width).run(par, start_states(scene, par))
+    points = latin_hypercube(scene, 12).take(samples)
+    par = parameters(scene, points)
+    return Lanes(problem_of(scene), width).run(par, start_states(scene, par, points))
 
 
 @pytest.mark.parametrize("name", ["friction", "oil", "always"])

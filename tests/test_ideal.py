@@ -272,7 +272,7 @@ def test_a_rod_hardly_longer_than_the_crank_is_told(drive, longer):
     records = evaluate_records(scene, Points((), np.empty((1, 0)), ()))
     if longer < 1e-7:
         assert int(found["status"]) == records["status"][0] == Status.NEAR_SINGULAR
-        assert "clearance" in Status.NEAR_SINGULAR.message
+        assert "change point" in Status.NEAR_SINGULAR.message
         assert np.isnan(float(found["objective"]))
         assert np.isnan(records["objective"][0])
     else:
