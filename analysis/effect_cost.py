@@ -126,8 +126,9 @@ class Ensemble:
     """Samples of a scene, ready to be run again and again."""
 
     def __init__(self, scene: Scene, samples: int, width: int) -> None:
-        self.par = parameters(scene, latin_hypercube(scene, samples))
-        self.start = start_states(scene, self.par)
+        points = latin_hypercube(scene, samples)
+        self.par = parameters(scene, points)
+        self.start = start_states(scene, self.par, points)
         self.lanes = Lanes(problem_of(scene), width)
 
     def run(self) -> tuple[float, float]:

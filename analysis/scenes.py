@@ -12,6 +12,7 @@ from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import latin_hypercube
 
 ROOT = Path(__file__).parent.parent
@@ -65,19 +66,20 @@ def scene(
     return load_scene(JOB, overrides)
 
 
-def setup(chosen: Scene, par: Array) -> Setup:
+def setup(chosen: Scene, points: Points | None = None) -> Setup:
     """Problem, parameters and start states; without friction its coefficient is 0 for codes that always ask."""
+    par = parameters(chosen, points)
     if chosen.effects.friction.law == "none":
         for joint in at.JOINTS[:2]:
             par[:, joint.block + at.FRICTION_NUMBERS] = 0.0
-    return Setup(problem_of(chosen), par, start_states(chosen, par))
+    return Setup(problem_of(chosen), par, start_states(chosen, par, points))
 
 
 def single(chosen: Scene) -> Setup:
     """One sample: the scene itself."""
-    return setup(chosen, parameters(chosen))
+    return setup(chosen)
 
 
 def ensemble(chosen: Scene, samples: int) -> Setup:
     """A Latin hypercube of Table 3's box."""
-    return setup(chosen, parameters(chosen, latin_hypercube(chosen, samples)))
+    return setup(chosen, latin_hypercube(chosen, samples))

@@ -100,6 +100,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "readings": "objective_smallest mean deviation",
         "statistics": "objective_mean objective_deviation mean_gap_histogram samples_by_status",
         "timing": "busy idle compile write command",
+        "bifurcation": "observed",
         "wear": "clearance bearing_depth objective lifetime survival survival_lower exceedance ending",
         "effects": "off change limit decision recommended work samples failed objective",
         "accuracy": "error seconds evaluations averaging_error r2 moment_error strong_seconds lost_seconds",
@@ -117,6 +118,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "readings": "reading design",
         "statistics": "joint bin edge",
         "timing": "rank stage",
+        "bifurcation": "value crossing",
         "wear": "life joint cycle quantile",
         "effects": "variant effect response",
         "accuracy": "integrator rung quantity",
@@ -389,7 +391,7 @@ def test_a_nul_in_a_path_is_bad_input(tmp_path):
         dataset.write(samples(), f"{tmp_path}/a\0b")
 
 
-@pytest.mark.parametrize("call", ["write", "fsync", "rename"])
+@pytest.mark.parametrize("call", ["write", "fsync", "replace"])
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
 def test_a_failing_disk_keeps_the_last_good_file(tmp_path, monkeypatch, call, code):
     path = tmp_path / "x.nc"

@@ -237,5 +237,7 @@ def test_what_a_scene_leaves_out_is_off():
     bare = scene_with(
         {"joints.crank_rod": IDEAL, "joints.rod_slider": IDEAL, "effects.friction": {"law": "none"}}
     )
-    assert set(effects_of(bare)._replace(first=None)) == {None}  # a place of no joint
+    off = effects_of(bare)
+    assert off.joints == 0
+    assert set(off._replace(joints=None, first=None)) == {None}
     assert effects_of(bare.with_({"effects.contact": LATCHED})) == effects_of(bare)

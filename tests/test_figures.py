@@ -303,7 +303,7 @@ def test_saved_under_the_name_given(tmp_path) -> None:
 
 def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(InputError, match=r"hpcclear\[analysis\]"):
+    with pytest.raises(InputError, match=r"pip install 'matplotlib>=3\.9'"):
         report.timing_figure(data.timing())
 
 

@@ -214,7 +214,7 @@ def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         write_report(tmp_path)
     dataset.write(data.samples(), tmp_path / "samples.nc")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(InputError, match=r"hpcclear\[analysis\]"):
+    with pytest.raises(InputError, match=r"pip install 'matplotlib>=3\.9'"):
         write_report(tmp_path)
     assert not (tmp_path / "report.html").exists()
 
