@@ -189,8 +189,8 @@ def wrong_unit(dice: random.Random, content: Content) -> tuple[str, ...]:
 
 def unknown_unit(dice: random.Random, content: Content) -> tuple[str, ...]:
     name, body = _some_body(dice, content)
-    body["mass"] = "0.3 kilos"
-    return (f"mechanism.bodies.{name}.mass", "kilos")
+    body["mass"] = "0.3 klio"
+    return (f"mechanism.bodies.{name}.mass", "klio")
 
 
 def speed_in_hertz(dice: random.Random, content: Content) -> tuple[str, ...]:

@@ -37,6 +37,9 @@ NARROW = 5e-3
 changes within so small a part of a turn that steps, or the nodes that works are summed over, pass over it. For a slider-crank
 it is the cosine of the rod's steepest angle: at 6e-3 works at a given speed close to 1e-5."""
 
+CLOSED = 1e-14
+"""Of the size of a linkage: by how much loops are open where they close to rounding."""
+
 NEAR_CHANGE = 0.1
 """Of a change point, rad of the drive: poses nearer to it are on its way."""
 
@@ -99,8 +102,10 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Assembly
     if not mechanism.clearances:
         found = passage_of(assembly, rounds, gravity)
         end = found.ended
-        if _by_torque(mechanism) and not any(end and end.node is one for one in found.changes):
-            found.ended = None  # it may swing
+        if _by_torque(mechanism) and end is not None:
+            near = any(end.node is one for one in found.changes)
+            if not near or _closes(assembly, found, end.node):
+                found.ended = None  # it may swing; and inertia carries it past a change point
         narrow = _narrowest(found)
         if narrow is not None and (found.ended is None or found.ended.node.time > narrow.time):
             found.end(Status.NEAR_SINGULAR, narrow)
@@ -130,6 +135,13 @@ def _narrowest(walk: Passage) -> Node | None:
     tight = np.flatnonzero((margins < NARROW * best) & ~near)
     tight = tight[tight < past.max(initial=0)]
     return walk.nodes[int(tight[0])] if len(tight) else None
+
+
+def _closes(assembly: Assembly, walk: Passage, node: Node) -> bool:
+    """Whether the loops close at a pose where they change branch, to rounding: else they pass beside it, too near to tell."""
+    ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time]))
+    error = np.abs(assembly.loops.at(q, v, node.time).error).max()
+    return bool(error <= CLOSED * np.abs(q).max())
 
 
 def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: Node) -> bool:
