@@ -10,6 +10,7 @@ from test_report import Tree
 
 from hpcclear.base.arrays import Array
 from hpcclear.report.html.page import write_report
+from hpcclear.report.scatter import HALF_WIDTH
 from hpcclear.results import dataset
 
 NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(?:e([-+]?\d+))?(?![\w.]*\d)")
@@ -69,6 +70,9 @@ def summed(content: xr.Dataset) -> Iterator[float]:
             yield from np.ravel(0.5 * (content[f"{name}_upper"] - content[f"{name}_lower"]))
             true = content[f"{name}_true"].to_numpy()
             yield from np.ravel(true[:, None] / true[None, :] - 1.0)
+    if kind == "contributions":
+        for name in ("contribution_error", "halved_error"):  # half-widths at 95 %
+            yield from np.ravel(HALF_WIDTH * content[name])
     if kind == "timing":
         parts = [content[name] for name in ("busy", "idle", "compile", "write")]
         for part in (*parts, *([content["samples"]] if "samples" in content else [])):

@@ -161,7 +161,7 @@ def test_the_swarm_needs_no_pymoo():
     ("entry", "key", "reason"),
     [
         ("study.swarm.algorithm=pymoo:NSGA5", "study.swarm.algorithm", "there is no pymoo.py"),
-        ("study.swarm.algorithm=NSGA2", "study.swarm.algorithm", "no search that is known"),
+        ("study.swarm.algorithm=NSGA2", "study.swarm.algorithm", "not a known search"),
         (f"study.swarm.particles={FEWEST - 1}", "study.swarm.particles", f"at least {FEWEST}"),
     ],
 )

@@ -269,8 +269,8 @@ def task() -> Task:
     ("asked", "said"),
     [
         (np.zeros((2, 3)), r"shape \(2, 3\), not \(n, 2\)"),
-        (np.array([[0.0, 1.0]]), "asks for 1 in variable 2, outside"),
-        (np.array([[np.nan, 0.0]]), "asks for nan in variable 1"),
+        (np.array([[0.0, 1.0]]), "requested 1 in variable 2, outside"),
+        (np.array([[np.nan, 0.0]]), "requested nan in variable 1"),
         (lambda: fails(0), "failed in ask: ZeroDivisionError: of mine"),
     ],
 )

@@ -193,7 +193,7 @@ def test_the_terminal_says_so_and_the_exit_code(tmp_path: Path):
     code, shown, errors = run_simulate(tmp_path, BASE.with_(missed))
     assert code == 4
     assert "chaotic" in shown
-    assert errors.startswith("Target missed: f is known to ")
+    assert errors.startswith("Target missed: the relative half-width of f is ")
     with xr.open_dataset(tmp_path / "r.nc") as made:
         assert int(made["flags"]) & Flag.TARGET_MISSED
 

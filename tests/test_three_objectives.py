@@ -25,7 +25,7 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import extent, lives, refinement, run_study, truth
+from hpcclear.study import extent, goals, lives, run_study, truth
 from hpcclear.study.optimisation import Choice
 
 PROGRAMS = Path(__file__).parent / "mpi_programs"
@@ -254,11 +254,9 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
 
 def test_the_search_finds_constraints_behind_the_goals() -> None:
     case = scene_of(*MIXED).required_study.case("five")
-    told = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 0.45])
-    assert refinement._broken(case, told) == pytest.approx(0.5)
-    assert refinement._broken(case, np.array([9.0, 9.0, 9.0, 9.0, 9.0, 0.15])) == pytest.approx(
-        -0.5
-    )
+    values = np.linspace(1.0, 2.0, 64)
+    assert goals.steered(case.kept, values, {"m2": 0.45}) == pytest.approx(0.5)
+    assert goals.steered(case.kept, values, {"m2": 0.15}) == pytest.approx(-0.5)
 
 
 def test_lives_are_followed_of_every_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,8 +34,8 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     rest = float(own["unexplained"])
     yield Line(
         "contributions",
-        f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}; "
-        f"{rest:.0%} not explained by the cubic fit: finer structure of f, interactions of three inputs, chaotic motion",
+        f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}. "
+        f"The cubic fit does not explain {rest:.0%}: finer structure of f, interactions of three inputs, chaotic motion",
     )
     each = [(str(names[k]), *(one[k] for one in falls)) for k in range(len(rows))]
     yield Line(
