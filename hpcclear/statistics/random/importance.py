@@ -47,6 +47,10 @@ PRIOR = 0.3
 ANEW = 2
 """How often draws may be dropped because the pilot had missed where most failures are."""
 
+WIDER = 1.4
+"""Of intervals: what repeats share, the density of one pilot, they do not disagree about. Of functions whose failures lie in
+separate regions intervals of 95 % held 87 to 88 % of the time without it, as 1.96/1.53 of the width would mend."""
+
 ENOUGH = 20.0
 """Equally weighted draws that those beyond a level are worth, at least, for limits of its probability."""
 
@@ -252,7 +256,6 @@ def weighted(f: Array, weights: Array, level: float, confidence: float) -> Limit
     if value <= 0.0:
         return Limited(0.0, shifts, 0.0, 1.0)
     error = float(spread(shifts[None])[0])
-    factor = float(
-        np.exp(min(error / value * student(confidence, int((counts > 0).sum()) - 1), 500.0))
-    )
+    width = WIDER * student(confidence, int((counts > 0).sum()) - 1)
+    factor = float(np.exp(min(error / value * width, 500.0)))
     return Limited(value, shifts, value / factor, min(value * factor, 1.0))
