@@ -107,8 +107,9 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
     # Not by (1e-5 / 1e-3): at the loosest tolerance most steps are at the edge of stability, and held stricter there.
     assert best[1, position] < 0.1 * best[0, position] < 1e-4
     assert best[2, position] < 1e-2 * best[1, position]
-    eighth = ("prince-dormand", "DOP853 (scipy)")  # pairs of order 8 may be better still
-    pairs = [k for k, name in enumerate(found.methods) if name not in eighth]
+    # of order 8, or with steps that no tolerance chooses: these may be better still
+    others = ("prince-dormand", "RK4, fixed steps")
+    pairs = [k for k, name in enumerate(found.methods) if name not in others]
     floor = integration.MARGIN * found.reference_error[position]
     assert (found.error[pairs, :, position] >= floor).all()
     assert (found.error >= found.reference_error).all()
