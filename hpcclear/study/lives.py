@@ -122,7 +122,8 @@ def known(run: StudyRun) -> Scene:
     """
     run.announce("wear")
     scene, options = run.scene, Options(style=run.simulations.style)
-    lives = run_wear(scene, run.directory / NAME, run.ranks, options).content
+    timing = run.directory / "timing.nc"  # the study's, which replaces it at the end
+    lives = run_wear(scene, run.directory / NAME, run.ranks, options, timing).content
     for text in doubts(lives):
         run.tell(f"Lives: {text}.")
     changes = {}
