@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.loops import Loops, typical_length
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
@@ -165,7 +165,7 @@ def _closed(loops: Loops, rough: Array, wanted: Array) -> tuple[Array, int]:
     )  # fmt: skip
 
 
-def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, Array]:
+def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, Integers]:
     """Newton's method by least changes, shortened until the error falls, of poses (n, m): poses, steps, errors left (m,), and
     their rows."""
     zero, times = np.zeros_like(q), np.zeros(q.shape[1])
@@ -201,7 +201,8 @@ def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, A
         q = np.where(going, new, q)
         error, left, jacobian = found(q)
         steps += 1
-    return q, steps, np.abs(error).max(axis=0, initial=0.0), np.abs(error).argmax(axis=0)
+    rows: Integers = np.abs(error).argmax(axis=0)
+    return q, steps, np.abs(error).max(axis=0, initial=0.0), rows
 
 
 def rough_pose(loops: Loops) -> Array:
