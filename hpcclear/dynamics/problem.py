@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -240,6 +240,7 @@ def check_objective(scene: Scene) -> None:
         )  # fmt: skip
 
 
+@lru_cache(maxsize=16)
 def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects

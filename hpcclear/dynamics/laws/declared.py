@@ -7,6 +7,7 @@ are arithmetic, so that one and the same source is compiled into the lanes, runs
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from inspect import signature
 from typing import Any
 
@@ -107,7 +108,9 @@ class Law:
 
     kind = ""
 
-    def arguments(self, function: Function) -> tuple[str, ...]:
+    @staticmethod
+    @cache
+    def arguments(function: Function) -> tuple[str, ...]:
         """Names of what a function asks for."""
         return tuple(signature(function).parameters)
 
@@ -121,7 +124,7 @@ class Law:
         """Those that run in the lanes, by name."""
         raise NotImplementedError
 
-    @property
+    @cached_property
     def read(self) -> tuple[str, ...]:
         """Numbers of a sample that they ask for, in the order of their rows."""
         varying = VARYING[self.kind]
