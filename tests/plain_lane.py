@@ -60,7 +60,7 @@ def joints_of(mechanism):
     """Rows of the joints in `work` and `par`."""
     return tuple(
         at.Joint(k, BLOCKS + at.JOINT_ROWS * k, 0,
-                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 14))),
+                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 16))),
                  FREE + 20 * k + 8, FREE + 20 * k + 9)
         for k, _ in enumerate(mechanism.clearances)
     )  # fmt: skip

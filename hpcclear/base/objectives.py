@@ -13,7 +13,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, RESPONSES
+from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES
 
 Function = Callable[..., Any]
 
@@ -26,6 +26,12 @@ RECORDED = {
     "slider_acceleration_deviation": "m/s^2",
     "point_acceleration_deviation": "m/s^2",
     "peak_point_acceleration": "m/s^2",
+    "impacts": "",
+    "impact_energy": "J",
+    "contact_impulse": "N s",
+    "contact_loss": "rad",
+    "rms_contact_force": "N",
+    "rms_frame_force": "N",
 }
 """Fields of a sample's record that `Objective.value` may ask for, with units; ``objective`` is f of eq. 13."""
 
@@ -129,6 +135,11 @@ class Objective:
         """Whether samples have to record more than gaps and peak forces for it."""
         return not self.asks.isdisjoint(RESPONSES)
 
+    @property
+    def needs_impacts(self) -> bool:
+        """Whether samples have to record measures of impact and noise for it."""
+        return not self.asks.isdisjoint(IMPACTS)
+
     def made_of(self, mean: Array, peak: Array, period: Array) -> Array:
         """What is made of the rate, (m, joints): of its mean in time, of its square where that is what is made, its peak
         and the length of a revolution, (m, 1)."""
@@ -203,6 +214,30 @@ OURS = {
     "peak-point-acceleration": Objective(
         "largest acceleration of the followed point", "m/s^2",
         lambda peak_point_acceleration: peak_point_acceleration,
+    ),
+    "impacts": Objective(
+        "number of impacts in a revolution, of the joint where it is larger", "",
+        lambda impacts: impacts.max(),
+    ),
+    "impact-energy": Objective(
+        "energy lost in impacts in a revolution, of all joints", "J",
+        lambda impact_energy: impact_energy.sum(),
+    ),
+    "contact-impulse": Objective(
+        "impulse of the contact force in a revolution, of the joint where it is larger", "N s",
+        lambda contact_impulse: contact_impulse.max(),
+    ),
+    "contact-loss": Objective(
+        "angle of the drive without contact in a revolution, of the joint where it is larger", "rad",
+        lambda contact_loss: contact_loss.max(),
+    ),
+    "rms-contact-force": Objective(
+        "root mean square of the contact force, of the joint where it is larger", "N",
+        lambda rms_contact_force: rms_contact_force.max(),
+    ),
+    "rms-frame-force": Objective(
+        "root mean square about its mean of the force on the frame", "N",
+        lambda rms_frame_force: rms_frame_force,
     ),
 }  # fmt: skip
 OURS = {name: replace(one, name=name) for name, one in OURS.items()}

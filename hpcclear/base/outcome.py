@@ -139,7 +139,24 @@ RESPONSES = (
 )
 """Fields of `OUTCOME` that a study of one of them records."""
 
-ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
+IMPACTS = (
+    "impacts",
+    "impact_energy",
+    "contact_impulse",
+    "contact_loss",
+    "rms_contact_force",
+    "rms_frame_force",
+)
+"""Fields of `OUTCOME` that measure impact and noise."""
+
+ON_REQUEST = (
+    *RESPONSES,
+    *IMPACTS,
+    "rate_of_objective",
+    "sliding_work",
+    "sliding_waves",
+    "energy_error",
+)
 """Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
@@ -175,6 +192,20 @@ OUTCOME = np.dtype(
         ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
         ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
         ("peak_point_acceleration", np.float64),  # m/s^2, likewise
+        (
+            "impacts",
+            np.float64,
+            MAX_JOINTS,
+        ),  # contacts that begin, a revolution; NaN unless asked for
+        (
+            "impact_energy",
+            np.float64,
+            MAX_JOINTS,
+        ),  # J, lost by damping of the contact, a revolution
+        ("contact_impulse", np.float64, MAX_JOINTS),  # N s, of the normal force, a revolution
+        ("contact_loss", np.float64, MAX_JOINTS),  # rad of a revolution without contact
+        ("rms_contact_force", np.float64, MAX_JOINTS),  # N, root mean square
+        ("rms_frame_force", np.float64),  # N, of the force on the frame about its mean
         (
             "rate_of_objective",
             np.float64,

@@ -8,6 +8,7 @@ Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^
 from typing import NamedTuple
 
 from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.outcome import IMPACTS
 
 Dims = tuple[str, ...]
 
@@ -83,6 +84,12 @@ def outcome(*per_sample: str) -> Columns:
         "point_acceleration_deviation": number(per_sample, "m/s^2",
         "root mean square of the acceleration of the followed point about its mean"),
         "peak_point_acceleration": number(per_sample, "m/s^2", "largest acceleration of the followed point"),
+        "impacts": number(per_joint, "1", "number of contacts that begin in a revolution"),
+        "impact_energy": number(per_joint, "J", "energy lost by damping of the contact in a revolution"),
+        "contact_impulse": number(per_joint, "N s", "impulse of the normal force in a revolution"),
+        "contact_loss": number(per_joint, "rad", "angle of a revolution without contact"),
+        "rms_contact_force": number(per_joint, "N", "root mean square of the normal force"),
+        "rms_frame_force": number(per_sample, "N", "root mean square about its mean of the force on the frame"),
         "rate_of_objective": number(per_joint, "rate", "what is made of the objective's own rate"),
         "sliding_work": number(per_joint, "J", "normal force times sliding distance in a revolution"),
         "energy_error": number(per_sample, "1", "residual of the energy balance, relative"),
@@ -92,6 +99,33 @@ def outcome(*per_sample: str) -> Columns:
         "flags": flag(per_sample, "validity warnings of the result"),
     }
     # fmt: on
+
+
+def by_revolution() -> Columns:
+    """Measures of impact and noise of each averaged revolution, and half-widths of their means."""
+    found = {}
+    means = outcome()
+    for name in IMPACTS:
+        row = means[name]
+        dims = ("revolution", *row.dims)
+        found[f"{name}_by_revolution"] = number(dims, row.units, f"{row.long_name}: of each")
+        words = f"half-width of the 95 % confidence interval of {name}"
+        found[f"{name}_limit"] = number(row.dims, row.units, words)
+    return found
+
+
+def spectrum(name: str, words: str, *dims: str) -> Columns:
+    """Orders and third-octave levels of a force."""
+    found = {
+        f"{name}_orders": number(
+            ("order", *dims), "N", f"root mean square of the order in the {words}"
+        )
+    }
+    level = f"third-octave level of the {words}, dB re 1e-6 N; NaN of a band without an order"
+    for end, which in (("", ""), ("_lower", ": lower end"), ("_upper", ": upper end")):
+        interval = f"{which} of its 95 % confidence interval" if which else ""
+        found[f"{name}_level{end}"] = number(("band", *dims), "1", level + interval)
+    return found
 
 
 def fit(*dims: str) -> Columns:

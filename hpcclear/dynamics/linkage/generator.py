@@ -5,7 +5,7 @@ accelerations, gaps, forces and powers; an effect that is off is not in it. It i
 contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -40,6 +40,7 @@ class On(NamedTuple):
     ledger: bool = False  # energies
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
+    impacts: bool = False  # force on the frame
     follow: str = ""  # a guided body, or body.point
     objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
@@ -390,6 +391,8 @@ class _Generator:
             self._rate(at.LOAD_POWER, self.load_power)
         if on.follow and (on.series or on.responses or on.objective):
             self._follow(found)
+        if on.impacts and not self.kinematics.bends:
+            self._frame(found)
         if on.objective:
             self._objective()
 
@@ -407,8 +410,8 @@ class _Generator:
             call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
             self.writer.line(f"work[{where} * W + i] = {call}")
 
-    def _follow(self, found: dict[int, Term]) -> None:
-        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
+    def _second(self, found: dict[int, Term]) -> Callable[[Column], Term]:
+        """Accelerations of coordinates, by their columns; 0 of what is none."""
 
         def second(column: Column) -> Term:
             term = found[self.number[column]] if column in self.number else ZERO
@@ -416,6 +419,28 @@ class _Generator:
                 return term - self.writer.parameter("gravity")
             return term
 
+        return second
+
+    def _frame(self, found: dict[int, Term]) -> None:
+        """Force of the mechanism on its frame, weight included, of rigid bodies only.
+
+        Loads act between bodies and the frame, so that of all forces inertia and weight are left.
+        """
+        kin, write, second = self.kinematics, self.writer, self._second(found)
+        total = NOWHERE
+        for body in self.mechanism.bodies:
+            moved = kin.acceleration(kin.center(body.name), second)
+            if self.on.gravity:
+                moved = moved + Vector(ZERO, write.parameter("gravity"))
+            total = total - moved.times(self.balance.mass_of(body))
+        x, y = (write.let(f"frame_{axis}", term) for axis, term in zip("xy", total, strict=True))
+        self._rate(at.FRAME_X, x)
+        self._rate(at.FRAME_Y, y)
+        self._rate(at.FRAME_SQUARE, x * x + y * y)
+
+    def _follow(self, found: dict[int, Term]) -> None:
+        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
+        second = self._second(found)
         kin, follow = self.kinematics, self.on.follow
         if "." not in follow:
             if (k := self.number.get(Column("slide", follow))) is not None:

@@ -100,9 +100,10 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     loss = (normal - elastic) * rate + product(rubs, tangential, sliding)
     oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
-    work[(at.RATE_NOW + joint.force) * W + i] = pressed(
-        effects.film, normal, nx, ny, oil[0], oil[1]
-    )
+    force = pressed(effects.film, normal, nx, ny, oil[0], oil[1])
+    work[(at.RATE_NOW + joint.force) * W + i] = force
+    store_rate(effects.impacts, work, joint.force_square, force * force, i, W)
+    store_rate(effects.impacts, work, joint.impact_power, (normal - elastic) * rate, i, W)
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.objective, work, joint.friction, tangential, i, W)
