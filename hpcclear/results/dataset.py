@@ -330,7 +330,7 @@ def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, s
     references : str
         Published work that its numbers are taken from; "" leaves the attribute out.
     """
-    version = metadata.version("hpcclear")
+    version = _version()
     return {
         "source": f"hpcclear {version}",
         "history": f"written by hpcclear {version}",
@@ -341,6 +341,11 @@ def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, s
         "versions": _versions(),
         "processor": _processor(),
     }
+
+
+@functools.cache
+def _version() -> str:
+    return metadata.version("hpcclear")
 
 
 @functools.cache
