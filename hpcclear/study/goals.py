@@ -1,13 +1,15 @@
 """What a case asks of its designs: told from simulations, with limits, and guessed by the surrogate."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
+from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
+from hpcclear.scene.domain import to_physical
 from hpcclear.scene.formula import value_of
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
@@ -120,6 +122,20 @@ def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     assert goal.limit is not None  # by validation
     width = SMOOTH * drawn.std(axis=1, keepdims=True) + 1e-300
     return np.asarray(ndtr((drawn - goal.limit) / width).mean(axis=1))
+
+
+def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
+    """Of each that a case makes small, sampling coordinates (n, d) to its values (n,) where it is a formula; None elsewhere."""
+    names = scene.required_study.design_variables(case.name)
+
+    def of(formula: str) -> Callable[[Array], Array]:
+        def exact(points: Array) -> Array:
+            designs = dict(zip(names, to_physical(scene, names, points).T, strict=True))
+            return np.array(np.broadcast_to(value_of(formula, designs), len(points)))
+
+        return exact
+
+    return [None if goal.formula is None else of(goal.formula) for goal in case.goals]
 
 
 def names_of(case: Case, unit: str) -> tuple[str, ...]:
