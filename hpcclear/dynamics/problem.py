@@ -158,7 +158,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
-    models = {film.model for film in scene.films().values()}
+    films = {scene.joint_labels.index(name): film.model for name, film in scene.films().items()}
     return at.Effects(
         joints=count,
         first=next(iter(scene.open_places), 0),
@@ -177,10 +177,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        film=_flag(bool(models)),
-        short_film=_flag("short" in models),
-        long_film=_flag("long" in models),
-        finite_film=_flag("finite" in models),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)),
     )
 
 

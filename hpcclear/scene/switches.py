@@ -22,9 +22,6 @@ from hpcclear.scene.validation import validated
 GENTLE_RAMP = 50.0
 """Friction coefficient over ramp speed, s/m, that a steeper ramp is widened to: half of what calls for implicit steps."""
 
-SHORT_TO = 1.5
-"""Length over diameter up to which a short film is nearer to the finite one, and from which a long one."""
-
 FEW_MODES = (2, 1)
 """Modes that a bar which bends in more of them is tried with."""
 
@@ -92,10 +89,9 @@ def _films(scene: Scene) -> Iterator[Switch]:
     for label, film in scene.films().items():
         key = f"{scene.joint_key(label)}.film"
         yield Switch(f"oil film in {label}", {key: None})
-        if film.model == "finite":
-            slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
-            closed = "short" if slender < SHORT_TO else "long"
-            yield Switch(f"finite length of the film in {label}", {f"{key}.model": closed})
+        slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
+        for words, model in () if film.law.simpler is None else film.law.simpler(slender):
+            yield Switch(f"{words} in {label}", {f"{key}.model": model})
 
 
 def _surfaces(scene: Scene) -> Iterator[Switch]:
