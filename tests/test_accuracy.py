@@ -125,8 +125,8 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
 def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
     """scipy on the generated equations, and the kernel; a revolution of a free crank ends at an angle, not at a time."""
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
-    # Pressed against its bearings; left alone it rattles, and a kick grows by e^10 in this revolution. With -20, which the
-    # motor can turn, contacts still come and go: the error of one method is 0.003 or 4 times its first there.
+    # Pressed against its bearings; left alone it rattles, and a perturbation grows by e^10 in this revolution. With -20, which
+    # the motor can turn, contacts still come and go: the error of one method is 0.003 or 4 times its first there.
     hold = {"kind": "torque", "body": "rocker", "torque": -20.0 if drive == "torque" else -120.0}
     scene = scene.with_({"mechanism.loads": {"hold": hold}})
     if drive == "torque":

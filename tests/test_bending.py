@@ -470,7 +470,7 @@ def test_rods_however_soft_or_stiff_end_in_a_stated_way(contact):
 
 
 def test_errors_of_stiff_modes_hold_no_more_energy_than_those_of_their_speeds():
-    """So that kicks to copies, which are so many tolerances, are no blows: to each mode some 10 um/s."""
+    """So that perturbations to copies, which are so many tolerances, are no blows: to each mode some 10 um/s."""
     for stiffness in (10.0, 1e3, 1e9):
         scene = bending(stiffness=stiffness, modes=3)
         size = scales(scene)

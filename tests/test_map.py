@@ -70,7 +70,7 @@ def test_periods_double_on_the_way_to_chaos():
     """Of 90 clearances from 0.1 to 1 mm 16 have the period 1, 6 two; of 48 in two of these stretches some 23 four or eight.
 
     Which single clearances do is chance: several attractors lie side by side, and processors differ in the last bits.
-    Clearances kicked by 1e-9 gave 21 to 26.
+    Clearances perturbed by 1e-9 gave 21 to 26.
     """
     wide = np.linspace(0.1e-3, 1e-3, 90)
     narrow = [np.linspace(*ends, 24) for ends in ((0.424e-3, 0.4333e-3), (0.5205e-3, 0.5243e-3))]

@@ -159,7 +159,7 @@ OUTCOME = np.dtype(
         (
             "objective_uncertainty",
             np.float64,
-        ),  # m, its half-width: over kicked copies, or of the steady mean; NaN where nothing checked it
+        ),  # m, its half-width: over perturbed copies, or of the steady mean; NaN where nothing checked it
         ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
         (
             "peak_contact_force",
@@ -188,7 +188,7 @@ OUTCOME = np.dtype(
         ),  # likewise, by the contact's angle; NaN unless told
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
-        ("kick_growth", np.float64),  # mean logarithm of the growth of a kick per revolution
+        ("kick_growth", np.float64),  # largest Lyapunov exponent, per revolution
         ("kick_growth_limit", np.float64),  # of its limits; NaN outside maps
         ("attractors", np.float64),  # kinds of motion found from several starts; NaN outside maps
         ("period", np.float64),  # revolutions; NaN where none was found

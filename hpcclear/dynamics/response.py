@@ -110,8 +110,10 @@ def simulate(
     if still:
         times, data, record = _prescribed(scene)
     else:
-        kicks = alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
-        times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
+        perturbations = (
+            alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
+        )
+        times, data, record = _integrated(scene, Recording(scene, copy, perturbations, objective))
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady

@@ -37,7 +37,7 @@ def responses_of(
     stage : str
         Name for reports and timing.
     copies : int
-        Starts of each variant; all but the first are kicked.
+        Starts of each variant; all but the first are perturbed.
 
     Returns
     -------

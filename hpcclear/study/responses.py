@@ -61,7 +61,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Statistics of each design's steady response and of copies kicked at their start, stretch by stretch.
+    """Statistics of each design's steady response and of copies perturbed at their start, stretch by stretch.
 
     Where motion is chaotic one response says little of a design: copies see other stretches of the
     same motion.

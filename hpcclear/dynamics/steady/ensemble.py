@@ -1,4 +1,4 @@
-"""An irregular motion's mean: kicked copies at two tolerances, as many revolutions as its limits take."""
+"""An irregular motion's mean: perturbed copies at two tolerances, as many revolutions as its limits take."""
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import KICK
+from hpcclear.dynamics.steady.copies import PERTURBATION
 from hpcclear.dynamics.steady.effort import (
     SPEED,
     STEADY,
@@ -50,7 +50,7 @@ STRETCH = 4
 """Revolutions between two looks at an ensemble, and those that its peaks are told for."""
 
 PARTED = 12
-"""Revolutions before the first look at an ensemble, from when the kicks have grown to the size of the motion."""
+"""Revolutions before the first look at an ensemble, from when the perturbations have grown to the size of the motion."""
 
 FIRST = 4, 6
 """Stretches before it, at least and at most."""
@@ -122,7 +122,7 @@ class _Limits:
 def ensemble(
     effort: Effort, target: float, rtol: float, growth: float
 ) -> Generator[Stretch, Outcome, Mean]:
-    """Go on with copies from kicked starts until the limits of their mean are narrow enough, or the budget is spent."""
+    """Go on with copies from perturbed starts until the limits of their mean are narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
     stretches, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
@@ -159,10 +159,10 @@ def ensemble(
 
 
 def _first(sample: Sample, growth: float) -> int:
-    """Stretches before the first look: the faster kicks grow, the fewer, unless a speed or a latched damping lasts longer."""
+    """Stretches before the first look: fewer if perturbations grow fast, unless a speed or a latched damping lasts longer."""
     if sample.free or sample.latched or not growth > 0.0:
         return FIRST[1]
-    parting = -np.log(KICK) / growth
+    parting = -np.log(PERTURBATION) / growth
     return int(np.clip(np.ceil((parting + PARTED) / STRETCH), *FIRST))
 
 
