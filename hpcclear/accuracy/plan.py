@@ -191,8 +191,10 @@ def measure(
     with _company(scene, points, workers if ranks.size == 1 else 1, tell):
         for k, (error, one) in enumerate(wanted):
             limit = FILE_SECONDS if error is None else RUNG_SECONDS
-            told = "the settings of the file" if error is None else f"a target error of {error:g}"
-            tell(f"measuring {k + 1} of {len(wanted)}: {told}")
+            setting = (
+                "the settings of the file" if error is None else f"a target error of {error:g}"
+            )
+            tell(f"measuring {k + 1} of {len(wanted)}: {setting}")
             seconds, records = cost(one, points, ranks, limit, str(k), progress_style)
             rows.append(Row(error, one, seconds, telling.in_short(one, records)))
             if k + 1 < len(wanted):
@@ -263,7 +265,7 @@ def _company(
 
 
 def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -> None:
-    """Simulate points over and over until told to stop."""
+    """Simulate points over and over until asked to stop."""
     evaluator = Evaluator(
         load_scene(content, trust=True).with_({"numerics.target_error": None}), points
     )

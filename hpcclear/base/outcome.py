@@ -185,7 +185,7 @@ OUTCOME = np.dtype(
             "sliding_waves",
             np.float64,
             WAVE_ROWS,
-        ),  # likewise, by the contact's angle; NaN unless told
+        ),  # likewise, by the contact's angle; NaN unless recorded
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
         ("kick_growth", np.float64),  # largest Lyapunov exponent, per revolution

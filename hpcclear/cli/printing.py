@@ -158,12 +158,12 @@ def _locked(scene: Scene) -> list[str]:
     """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
     from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
 
-    told = refused_of(scene)
-    if told is None:
+    refusal = refused_of(scene)
+    if refusal is None:
         return []
     if not varies_geometry(scene):
-        raise told[1]
-    return [f"the scene's own design {told[1].reason}; its run time is not measured"]
+        raise refusal[1]
+    return [f"the scene's own design {refusal[1].reason}; its run time is not measured"]
 
 
 def _mpi(ranks: "Ranks | None") -> str:
@@ -395,8 +395,8 @@ def describe_map(found: "Finished") -> None:
         if count and regime is not Regime.UNJUDGED:
             rows.append((regime.name.lower(), f"{count} {regime.meaning.partition(': ')[2]}"))
     periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
-    told = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
-    rows.append(("period, revolutions", ", ".join(told) or "none found"))
+    parts = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
+    rows.append(("period, revolutions", ", ".join(parts) or "none found"))
     growth = content["kick_growth"].to_numpy()[good]
     if len(growth):
         text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"

@@ -137,11 +137,11 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
         )
         rows.append((f"largest around {name}", f"{largest} at the end{beside} (medians)"))
     if any(name.startswith("limit_") for name in content.attrs):
-        cycles, told = float(content["cycle"][-1]), []
+        cycles, parts = float(content["cycle"][-1]), []
         for name in ("lifetime_quantile", "even_lifetime_quantile"):
             value = float(content[name].sel(quantile=0.5))
-            told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
-        rows.append(("median life", f"{told[0]}; {told[1]} with uniform wear"))
+            parts.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
+        rows.append(("median life", f"{parts[0]}; {parts[1]} with uniform wear"))
     return rows
 
 

@@ -175,9 +175,9 @@ class Evaluator:
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
         effects = self._problem.effects
-        told = responses_told(self._problem)
+        responses = responses_reported(self._problem)
         records = outcome_records(
-            labels, outcome, par, told, bool(effects.wear), self.scene.objective
+            labels, outcome, par, responses, bool(effects.wear), self.scene.objective
         )
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
@@ -199,7 +199,7 @@ class Evaluator:
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 
-def responses_told(problem: Problem) -> tuple[str, ...]:
+def responses_reported(problem: Problem) -> tuple[str, ...]:
     """Which of `RESPONSES` samples tell: those asked for, of a slider where one is followed, of a point where one is."""
     if not problem.effects.responses:
         return ()
@@ -251,13 +251,13 @@ NO_RATE = -1e299
 
 
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False,
+    labels: Integers, outcome: Outcome, par: Array, responses: Sequence[str] = (), worn: bool = False,
     objective: Objective = MEAN_GAP,
 ) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
-    `told` (as of `responses_told`), sliding work unless `worn`,
+    `responses` (as of `responses_reported`), sliding work unless `worn`,
     what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
@@ -281,7 +281,7 @@ def outcome_records(
     for name in (*STEADY, *MAPPED):
         records[name] = np.nan
     for name in RESPONSES:
-        records[name][~(valid & (name in told))] = np.nan
+        records[name][~(valid & (name in responses))] = np.nan
     records["sliding_work"] = sliding_work(outcome) if worn else np.nan
     records["sliding_work"][~valid] = np.nan
     records["sliding_waves"] = (

@@ -457,7 +457,7 @@ class Rules(NamedTuple):
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
-    profile: Any  # where around joints sliding work is done is told
+    profile: Any  # where around joints sliding work is done is recorded
     largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`

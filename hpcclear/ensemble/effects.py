@@ -149,14 +149,14 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
         "effect": np.array([one.name for one in trial.switches], dtype=str),
         "response": np.array(RESPONSES, dtype=str),
     }
-    told = {
+    attrs = {
         **attributes,
         "tolerance": plan.tolerance,
         "confidence": plan.confidence,
         "reduced_scene": reduced.to_toml(),
         "kept": json.dumps(trial.kept),
     }
-    return dataset.dataset("effects", coords, data, told, objective=trial.scene.objective)
+    return dataset.dataset("effects", coords, data, attrs, objective=trial.scene.objective)
 
 
 def _three(changes: Changes) -> tuple[Any, Any, Any]:

@@ -144,12 +144,12 @@ def lives_dataset(
         coords["angle"] = angles
     units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
     words = None if inputs is None else inputs.words
-    told = {
+    attrs = {
         **attributes,
         "tolerance": scene.wear.tolerance,
         **{f"limit_{name}": value for name, value in limits.items()},
     }
-    return dataset.dataset("wear", coords, data, told, units, scene.objective, words)
+    return dataset.dataset("wear", coords, data, attrs, units, scene.objective, words)
 
 
 def _reason(one: Life) -> str:

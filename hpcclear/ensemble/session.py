@@ -236,7 +236,7 @@ class Session:
         self.tell = tell
         self.attributes: dict[str, str] = {}
         self._checkpoint: Checkpoint | None = None
-        self._told = 0
+        self._reported = 0
         self._lock = Lock(place.lock.parent, place.lock.name)
 
     def __enter__(self) -> Self:
@@ -296,9 +296,9 @@ class Session:
     def tell_problems(self) -> None:
         """Report what was found in the checkpoint and could not be used, each once."""
         problems = [] if self._checkpoint is None else self._checkpoint.problems
-        for problem in problems[self._told :]:
+        for problem in problems[self._reported :]:
             self.tell(problem)
-        self._told = len(problems)
+        self._reported = len(problems)
 
     def write(self, content: xr.Dataset) -> xr.Dataset:
         """Write the result file; returns what was written."""

@@ -210,9 +210,9 @@ class _Streaming:
                 self._run_rest(seconds)
             if self._files is not None:
                 with self._session.ranks.stage("files"), self._session.ranks.writing():
-                    told = self._files.finish()
-                if told:
-                    self._session.tell(told)
+                    message = self._files.finish()
+                if message:
+                    self._session.tell(message)
         return self._session.write(self._dataset())
 
     def _run_rest(self, seconds: float) -> None:

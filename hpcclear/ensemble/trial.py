@@ -264,13 +264,13 @@ class Trial:
     def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
         """Follow the effect screening to its end; raises what `simulate` does."""
 
-        def told(wanted: Sequence[Asked]) -> list[Seen]:
+        def answer(wanted: Sequence[Asked]) -> list[Seen]:
             return [
                 self.seen(one, simulate(self.simulated(one.off), self.points(one)))
                 for one in wanted
             ]
 
-        return answered(certificate(plan), told)
+        return answered(certificate(plan), answer)
 
     def seconds(self, variants: Sequence[Variant], rounds: int = 3) -> dict[str, float]:
         """Processor time of a sample of each, by names, measured here in turn: the least of some rounds, s."""

@@ -253,7 +253,7 @@ def _after_mpi() -> Mail:
 
 def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     """Run the program, say how it ended, and send the others home with the same exit code."""
-    text = told = ""
+    text = note = ""
     try:
         code = program(ranks) or Exit.DONE
     except Stopped as error:
@@ -263,21 +263,21 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     except StorageError as error:
         code, text = Exit.FAILED, f"Error: {error}"
     except RankFailed as error:
-        code, told = error.code, str(error)
+        code, note = error.code, str(error)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
     except BaseException as error:  # noqa: BLE001 - the rank boundary
         user_error = isinstance(mendable(error), InputError)
         code = Exit.BAD_INPUT if user_error else Exit.FAILED
         text = _report(ranks, error)
-    if text or told:
-        ranks.stop_switch.told = True
+    if text or note:
+        ranks.stop_switch.reported = True
     if text:
         _say(text)
-    return _dismiss(ranks, int(code), told)
+    return _dismiss(ranks, int(code), note)
 
 
-def _dismiss(ranks: Ranks, code: int, told: str = "") -> int:
+def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:
     """Tell the others to leave; after a failure those who do not listen are ended.
 
     An error of another rank is reported last. A rank that cannot reach root reports the error itself and ends the job.
@@ -291,14 +291,14 @@ def _dismiss(ranks: Ranks, code: int, told: str = "") -> int:
         message = ranks.mail.poll()
         if message is None:
             if code != Exit.DONE and time.monotonic() > patience:
-                _say_and_abort(ranks, told, code)
+                _say_and_abort(ranks, note, code)
             nap.take()
         elif message.tag == Tag.LEFT:
             waited_for.discard(message.source)
         elif message.tag == Tag.ERROR and code == Exit.DONE:
             _say_and_abort(ranks, *message.body[:2])
-    if told:
-        _say(told)
+    if note:
+        _say(note)
     return code
 
 
@@ -319,16 +319,16 @@ def _as_worker(ranks: Ranks, ahead: Sequence[str]) -> int:
 def _tell_root(ranks: Ranks, error: BaseException) -> int:
     """Send a report and finished records to root; if root is deaf, report and end the job here."""
     known = isinstance(error, InputError)
-    told = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
-    ranks.mail.send(0, Tag.ERROR, (*told, ranks.outbox()))
+    note = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
+    ranks.mail.send(0, Tag.ERROR, (*note, ranks.outbox()))
     patience, nap = time.monotonic() + 2.0, Nap()
     while time.monotonic() < patience:
         message = ranks.mail.poll()
         if message is not None and message.tag == Tag.LEAVE:
             return int(message.body)
         nap.take()
-    _say_and_abort(ranks, *told)
-    return told[1]
+    _say_and_abort(ranks, *note)
+    return note[1]
 
 
 def _report(ranks: Ranks, error: BaseException) -> str:

@@ -37,7 +37,7 @@ class Tag(IntEnum):
     ASK = 6  # wants samples: (finished records or None, need)
     RECORDS = 7  # finished records
     DONE = 8  # stage or call are over here: (finished records or None, [(rank, busy and set-up seconds)])
-    STOP = 9  # was told to stop: reason
+    STOP = 9  # has to stop: reason
     ERROR = 10  # failed: (report or InputError, finished records or None)
     LEFT = 11  # has heard LEAVE
 

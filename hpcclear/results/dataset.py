@@ -247,8 +247,8 @@ def samples_dataset(
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
     if "sliding_waves" in kept:
         coords["wave"] = np.arange(WAVE_ROWS)
-    told = {**(attributes or {}), **_checked(data)}
-    return dataset("samples", coords, data, told, units, objective, words)
+    attrs = {**(attributes or {}), **_checked(data)}
+    return dataset("samples", coords, data, attrs, units, objective, words)
 
 
 def _checked(data: Mapping[str, ArrayLike]) -> dict[str, str]:
@@ -305,8 +305,8 @@ def response_dataset(
     """
     coords = {"time": time, "joint": np.array(joints, dtype=str)}
     coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
-    told = {**(attributes or {}), **_checked(data)}
-    return dataset("response", coords, data, told, objective=objective)
+    attrs = {**(attributes or {}), **_checked(data)}
+    return dataset("response", coords, data, attrs, objective=objective)
 
 
 def timing_dataset(

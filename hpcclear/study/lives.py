@@ -101,14 +101,14 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     ):
         if found["end_reason"][k] != "failed":
             values[k] = np.interp(parts * min(oldest, end), at[at <= end], f[at <= end])
-    told: list[float] = []
+    estimates: list[float] = []
     for one in moments(values):
         sure = one.freedom > 0
         reach = (
             one.error * student(run.study.verification.confidence, one.freedom) if sure else np.nan
         )
-        told += [one.value, reach]
-    return tuple(told)
+        estimates += [one.value, reach]
+    return tuple(estimates)
 
 
 def known(run: StudyRun) -> Scene:

@@ -42,7 +42,7 @@ NOTHING = 1e-9
 """Share of the mean below which a deviation is round-off."""
 
 Taken = tuple[Array, Array]
-"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.told_each`, without what chance made; and
+"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
 the standard error."""
 
 
@@ -86,13 +86,13 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
             _left(run.study.wanted, list(taken.values())),
         )  # fmt: skip
         made = truth.contested(run, designs, made, "verification", "verification")
-    true = _widened(run, designs, truth.told_of(run, designs, made), taken)
+    true = _widened(run, designs, truth.results_of(run, designs, made), taken)
     return true | truth.explained(run, designs, made)
 
 
 def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:
     """Rows of the designs that are the ends of their cases, by what is known."""
-    table = verification.named(run, designs, truth.told_of(run, designs, made))
+    table = verification.named(run, designs, truth.results_of(run, designs, made))
     named = zip(table.choices, table.rows, strict=True)
     return [row for one, row in named if one.name in run.study.case(one.case).ends]
 
@@ -137,17 +137,19 @@ def _taken(
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much what is told of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
-    one, other = (truth.told_each(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs))
-    scale = _scales(run, choice, np.array([told.value for told in other]))
+    one, other = (
+        truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
+    )
+    scale = _scales(run, choice, np.array([one.value for one in other]))
     bias = np.array([a.value - b.value for a, b in zip(one, other, strict=True)]) / scale
     shifts = np.array([a.shifts - b.shifts for a, b in zip(one, other, strict=True)])
     return bias, spread(shifts) / scale
 
 
 def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
-    """What errors of all that is told of a design are relative to: (k,) as `truth.told_each` returns them."""
+    """What errors of the results of a design are relative to: (k,) as `truth.estimates_of` returns them."""
     case, scale = run.study.case(choice.case), np.abs(values)
     scale[1] = max(scale[1], NOTHING * scale[0])
     for k, goal in enumerate((*case.goals, *case.kept), 3):

@@ -20,10 +20,10 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be told."""
+"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
 
 QUANTILE = 0.95
-"""Probability of staying below the percentile that is told."""
+"""Probability of staying below the percentile that is reported."""
 
 
 def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verification") -> Points:
@@ -84,7 +84,7 @@ def simulate(
     else:
         made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
         made = contested(run, choices, made, stage, purpose)
-    return told_of(run, choices, made) | explained(run, choices, made, purpose)
+    return results_of(run, choices, made) | explained(run, choices, made, purpose)
 
 
 def explained(
@@ -127,7 +127,7 @@ def sequences(
     run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
 ) -> Result:
     """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
-    return told_of(run, choices, doubled(run, choices, stage, purpose, length, most))
+    return results_of(run, choices, doubled(run, choices, stage, purpose, length, most))
 
 
 def doubled(
@@ -201,9 +201,9 @@ def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array])
         ]
         if not rows:
             continue
-        told = [_goals(run, choices[k], made[k][0])[: len(case.goals)] for k in rows]
-        values = np.array([[one.value for one in row] for row in told])
-        shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in told]), 1, 0)
+        estimates = [_goals(run, choices[k], made[k][0])[: len(case.goals)] for k in rows]
+        values = np.array([[one.value for one in row] for row in estimates])
+        shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in estimates]), 1, 0)
         less = Compared(values, shifts, settings.confidence).less
         for column, goal in enumerate(case.goals):
             share, relative = goals.wanted(goal, run.study.wanted)
@@ -273,21 +273,21 @@ def _accurate(
     return bool(good)
 
 
-def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.Told]:
+def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
     """What a design comes to in all that its case asks."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
-    return [goals.told(goal, values, choice.design, level) for goal in asked]
+    return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
-def told_each(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.Told]:
+def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
     """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
     percentile = quantile(values, QUANTILE, run.study.verification.confidence)
     return [*moments(values), percentile, *_goals(run, choice, values)]
 
 
-def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """All that is told of designs from what was made of them, shape (2, replicates, values) each; as `simulate` returns it."""
+def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
+    """Results of designs from their simulations, shape (2, replicates, values) each; as `simulate` returns it."""
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     held = max(len(case.kept) for case in run.study.cases)
@@ -305,16 +305,16 @@ def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> 
         found = quantile(values, QUANTILE, settings.confidence)
         row |= {"percentile": found.value, "percentile_lower": found.lower}
         row["percentile_upper"] = found.upper
-        told = _goals(run, choice, values)
-        missing = [np.nan] * (most - len(told))
-        row["goal"] = [one.value for one in told] + missing
-        row["goal_lower"] = [one.lower for one in told] + missing
-        row["goal_upper"] = [one.upper for one in told] + missing
+        estimates = _goals(run, choice, values)
+        missing = [np.nan] * (most - len(estimates))
+        row["goal"] = [one.value for one in estimates] + missing
+        row["goal_lower"] = [one.lower for one in estimates] + missing
+        row["goal_upper"] = [one.upper for one in estimates] + missing
         nothing = np.full(len(values), np.nan)
-        row["goal_shifts"] = [one.shifts for one in told] + [nothing] * len(missing)
+        row["goal_shifts"] = [one.shifts for one in estimates] + [nothing] * len(missing)
         sure = verdicts.level(settings, many, values.size)
         kept = run.study.case(choice.case).kept
-        certain = [goals.told(goal, values, choice.design, sure) for goal in kept]
+        certain = [goals.goal_value(goal, values, choice.design, sure) for goal in kept]
         missing = [np.nan] * (held - len(kept))
         row["counted"] = [float(values.size)] * len(certain) + missing
         row["excess"] = goals.steered(kept, values, choice.design)

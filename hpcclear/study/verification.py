@@ -72,7 +72,7 @@ class Table:
     rows : list of int
         Number of each in what was simulated.
     same_as : list of str
-        The first design before it that it cannot be told apart from; empty if there is none.
+        The first design before it that it is statistically indistinguishable from; empty if there is none.
     dominated : list of bool
         Whether another design of its case is surely better in all that the case makes small.
     """
@@ -87,7 +87,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     """Verified designs under the names that they have earned.
 
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
-    nothing else is asked for; gamma, delta and epsilon of further ones. Of those that cannot be told from it at the
+    nothing else is asked for; gamma, delta and epsilon of further ones. Of designs that are indistinguishable from it at the
     study's confidence it is the best in the others. Each design of the front is surely better than each
     other in one of them. They are chosen among the designs that surely satisfy all constraints, if there are any.
     """

@@ -202,10 +202,10 @@ def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) ->
         return found
     for row in np.flatnonzero(closed & ~_clear(loops, samples)).tolist():
         try:
-            told = refused(samples.mechanism(row), gravity, rounds)
+            refusal = refused(samples.mechanism(row), gravity, rounds)
         except InputError:
-            told = None
-        found[row] = int(Status.OK if told is None else told[0])
+            refusal = None
+        found[row] = int(Status.OK if refusal is None else refusal[0])
     return found
 
 

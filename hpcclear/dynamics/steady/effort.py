@@ -74,7 +74,7 @@ class Mean:
     met: bool
     period: int | None = None
     growth: float = np.nan
-    """Of a perturbation, per revolution: mean of the logarithm, as far as the look told."""
+    """Of a perturbation, per revolution: mean of the logarithm, as far as the look showed."""
     growth_limit: float = np.nan
     """Half-width of its limits, if it was measured on purpose."""
     attractors: int | None = None

@@ -47,7 +47,7 @@ COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
 
 STRETCH = 4
-"""Revolutions between two looks at an ensemble, and those that its peaks are told for."""
+"""Revolutions between two looks at an ensemble, and those that its peaks are reported for."""
 
 PARTED = 12
 """Revolutions before the first look at an ensemble, from when the perturbations have grown to the size of the motion."""
@@ -108,7 +108,7 @@ class _Limits:
     copies_count: bool  # more copies help, more revolutions do not
     short: bool  # too few stretches to see a drift
 
-    def told(self, most: float) -> float:
+    def half_width(self, most: float) -> float:
         """The limit that is stated, m: with what is unseen as far as that leaves it within `most`; NaN if there is none."""
         limit = self.limit + self.settling
         wide = float(np.hypot(self.limit, self.unseen)) + self.settling
@@ -146,7 +146,7 @@ def ensemble(
         if unsteady or spent or met:
             regime = Regime.UNSTEADY if unsteady else Regime.SETTLING if drifting else seen.regime
             return effort.mean(
-                regime=regime, limit=np.nan if unsteady else seen.told(level if met else np.inf),
+                regime=regime, limit=np.nan if unsteady else seen.half_width(level if met else np.inf),
                 outcomes=copies.kept(seen), stretch=STRETCH, rtol=rtol, met=bool(met and not unsteady),
                 growth=growth,
             )  # fmt: skip

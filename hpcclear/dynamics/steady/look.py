@@ -150,13 +150,15 @@ def _judge(history: _History, sample: Sample, target: float, rtol: float) -> "_F
         return _unsteady(history)
     limit = settling + perturbation + 0.5 * tolerance  # of the stricter copies, an order better
     outcomes = history.window(seen.length)
-    mean = float(objective(outcomes.mean_gap.mean(axis=(0, 1))))  # as it is told with the limits
+    mean = float(
+        objective(outcomes.mean_gap.mean(axis=(0, 1)))
+    )  # as it is reported with its half-width
     met = bool(settled and limit <= target * mean)
     orbits = ORBITS if sample.latched and target >= COARSE else 0.0
     unseen = _unseen(seen, mean, max(TOLERANCES * rtol / given.STRICTER, orbits))
-    told = max(limit, min(float(np.hypot(limit, unseen)), target * mean if met else np.inf))
+    half_width = max(limit, min(float(np.hypot(limit, unseen)), target * mean if met else np.inf))
     return _Found(
-        Regime.REGULAR if settled else Regime.SETTLING, told, outcomes,
+        Regime.REGULAR if settled else Regime.SETTLING, half_width, outcomes,
         met=met, final=settled, period=seen.period if settled else None,
     )  # fmt: skip
 

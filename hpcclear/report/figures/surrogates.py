@@ -249,10 +249,10 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
         fits.mark(panel, known[name], 0.12)
-        told = "".join(
+        note = "".join(
             f", {label}" for label in sorted({leaf.label for leaf in model.leaves} - {""})
         )
-        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{told}")
+        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{note}")
     limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(limits)[0], max(high for _, high in limits))
     for panel in axes.flat:
