@@ -114,7 +114,7 @@ def main(arguments: list[str] | None = None) -> None:
         try:
             if (
                 not is_launched()
-            ):  # ranks tell each other, so that none waits for one that cannot begin
+            ):  # ranks inform each other, so that none waits for one that cannot begin
                 check_address_space()
             _check_words(sys.argv[1:] if arguments is None else arguments)
             code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)

@@ -16,7 +16,7 @@ from rich.text import Text
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
-from hpcclear.dynamics.steady.telling import in_a_line
+from hpcclear.dynamics.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.report.answer import answer

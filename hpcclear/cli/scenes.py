@@ -174,7 +174,7 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.dynamics.steady.telling import why_missed
+    from hpcclear.dynamics.steady.wording import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset

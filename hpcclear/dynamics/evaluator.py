@@ -200,7 +200,7 @@ class Evaluator:
 
 
 def responses_reported(problem: Problem) -> tuple[str, ...]:
-    """Which of `RESPONSES` samples tell: those asked for, of a slider where one is followed, of a point where one is."""
+    """Which of `RESPONSES` samples notify: those asked for, of a slider where one is followed, of a point where one is."""
     if not problem.effects.responses:
         return ()
     linkage = problem.linkage

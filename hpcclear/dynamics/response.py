@@ -23,7 +23,7 @@ from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.telling import recorded
+from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of

@@ -103,7 +103,7 @@ def _check_bounds(scene: Scene) -> None:
 
 
 def of_lives(scene: Scene) -> Scene:
-    """The scene without inputs that its lives are to tell: their clearances are new ones, with what scatter these have."""
+    """The scene without inputs that its lives are to notify: their clearances are new ones, with what scatter these have."""
     if scene.study is None or not scene.study.worn:
         return scene
     changes: dict[str, Any] = {"study.cases": {}}

@@ -112,7 +112,7 @@ def _watch(ranks: Ranks) -> Watch:
             f"or the network is gone"
         )
         if ranks.is_root:
-            mail.tell_itself(
+            mail.notify_itself(
                 Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
             )
             return
@@ -278,13 +278,13 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
 
 
 def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:
-    """Tell the others to leave; after a failure those who do not listen are ended.
+    """Notify the others to leave; after a failure those who do not listen are ended.
 
     An error of another rank is reported last. A rank that cannot reach root reports the error itself and ends the job.
     """
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
-    ranks.mail.tell_others(Tag.LEAVE, code)
+    ranks.mail.notify_others(Tag.LEAVE, code)
     waited_for, nap = set(range(1, ranks.size)), Nap()
     patience = time.monotonic() + 1.5
     while waited_for:
@@ -309,14 +309,14 @@ def _as_worker(ranks: Ranks, ahead: Sequence[str]) -> int:
     except Leave as leave:
         code = leave.code
     except BaseException as error:  # noqa: BLE001 - the rank boundary
-        code = _tell_root(ranks, error)
+        code = _notify_root(ranks, error)
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
     ranks.mail.send(0, Tag.LEFT)
     return code
 
 
-def _tell_root(ranks: Ranks, error: BaseException) -> int:
+def _notify_root(ranks: Ranks, error: BaseException) -> int:
     """Send a report and finished records to root; if root is deaf, report and end the job here."""
     known = isinstance(error, InputError)
     note = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)

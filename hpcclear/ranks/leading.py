@@ -167,7 +167,7 @@ class RootLead(Lead):
         """
         self._spent = spent
         self._ranks.raise_if_stopped()
-        self._mail.tell(self._members, Tag.STAGE, task)
+        self._mail.notify(self._members, Tag.STAGE, task)
         try:
             self._hand_out(task)
         except BaseException as error:
@@ -193,7 +193,7 @@ class RootLead(Lead):
     def _gather(self, until: float | None) -> None:
         """End the stage on every rank; after an error or a stop, do not wait for ever."""
         self._closing = True
-        self._mail.tell(self._members, Tag.END)
+        self._mail.notify(self._members, Tag.END)
         nap = Nap()
         while self._present and (until is None or time.monotonic() < until):
             message = self._mail.poll()
@@ -247,7 +247,9 @@ class NodeLead(Lead):
 
     def work(self, task: object) -> None:
         """Serve the node until root ends the stage."""
-        self._mail.tell(self._crew, Tag.STAGE, task)  # before the worker is made: nodes meet there
+        self._mail.notify(
+            self._crew, Tag.STAGE, task
+        )  # before the worker is made: nodes meet there
         desk, setup = self._ranks.make_desk(task)
         try:
             self._share_out(desk)
@@ -320,7 +322,7 @@ class NodeLead(Lead):
     def _close(self) -> None:
         """Let the others end the stage, and take what they have."""
         self._closing = True
-        self._mail.tell(self._crew, Tag.END)
+        self._mail.notify(self._crew, Tag.END)
         nap = Nap()
         while self._present:
             message = self._mail.poll()

@@ -97,7 +97,7 @@ class Mail:
         self._sent: list[tuple[Any, bytes]] = []
         self._pulsed: list[Any] = []
         self._lock = threading.Lock()
-        self._news: deque[Message] = deque()  # what this rank has to tell itself
+        self._news: deque[Message] = deque()  # messages of this rank to itself
         self.neighbours: list[int] = []
         self.leaders: list[int] = []
         self.crew: list[int] = []
@@ -140,11 +140,11 @@ class Mail:
         if self._mpi is not None:
             self._post(to, tag, self._mpi.pickle.dumps(body))
 
-    def tell_others(self, tag: Tag, body: object = None) -> None:
+    def notify_others(self, tag: Tag, body: object = None) -> None:
         """Post one message to every other rank."""
-        self.tell((other for other in range(self.size) if other != self.rank), tag, body)
+        self.notify((other for other in range(self.size) if other != self.rank), tag, body)
 
-    def tell(self, others: Iterable[int], tag: Tag, body: object = None) -> None:
+    def notify(self, others: Iterable[int], tag: Tag, body: object = None) -> None:
         """Post one message to each of these ranks."""
         if self._mpi is not None:
             data = self._mpi.pickle.dumps(body)
@@ -170,7 +170,7 @@ class Mail:
                 return None
             return Message(status.source, status.tag, message.recv())
 
-    def tell_itself(self, message: Message) -> None:
+    def notify_itself(self, message: Message) -> None:
         """Let `poll` return a message that nobody sent; for the other thread."""
         self._news.append(message)
 

@@ -218,7 +218,7 @@ class Ranks:
         """
         with self._timed(name) as spent:
             self.raise_if_stopped()
-            self.mail.tell_others(Tag.CALL, (name, function, payload))
+            self.mail.notify_others(Tag.CALL, (name, function, payload))
             spent[0, COLUMNS.index("compile")] = self._call(function, payload)
             waited_for, nap = set(range(1, self.size)), Nap()
             while waited_for and not self.stop_switch.is_set():

@@ -97,7 +97,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
             response = simulate(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
-            run.tell(
+            run.notify(
                 f"The response of {name} has no file: its simulation ended as {status.name.lower()}: {status.message}. "
                 f"{status.remedy}"
             )
