@@ -6,7 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from hpcclear.accuracy import surrogate
-from hpcclear.accuracy.panels import Nowhere, Panels, Store, Notify
+from hpcclear.accuracy.panels import Notify, Nowhere, Panels, Store
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError

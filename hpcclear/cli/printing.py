@@ -361,7 +361,7 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
         throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
-        if evaluations:  # without play there is nothing to integrate
+        if evaluations:  # without clearance there is nothing to integrate
             throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns per force evaluation"
         rows.append(("throughput", throughput))
     out.print(table("Samples", rows + _load(found)))

@@ -122,7 +122,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     """
     book, plan, variants = found.book, found.book.plan, found.variants
     whole = book.all(())
-    _refuse_nought(trial.scene, whole)
+    _refuse_zero(trial.scene, whole)
     changes = [book.changes(off) for off in variants]
     counted = np.array([True, plan.scattered, plan.forces])
     reduced = trial.variant(found.recommended).scene
@@ -167,7 +167,7 @@ def _mean(values: Array) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
-def _refuse_nought(scene: Scene, whole: Seen) -> None:
+def _refuse_zero(scene: Scene, whole: Seen) -> None:
     known = whole.objective[np.isfinite(whole.objective)]
     if known.size and not known.any():
         raise InputError(

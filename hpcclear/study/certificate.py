@@ -31,7 +31,7 @@ def certify(run: StudyRun, extent: Extent) -> None:
     Raises
     ------
     InputError
-        No effect of the scene can be off, or its objective is nought.
+        No effect of the scene can be off, or its objective is zero.
     """
     asked = run.study.certificate
     assert asked is not None

@@ -98,7 +98,7 @@ def generate(
     Parameters
     ----------
     mechanism : Mechanism
-        What is nought in it is taken for nought for good.
+        A number that is zero in it is zero in every sample.
     on : On
     rows : Rows
     cartesian : bool

@@ -23,7 +23,7 @@ from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
 class Linkage:
-    """A mechanism's structure: what its texts hold and where. Numbers that are nought in it are nought in every sample.
+    """A mechanism's structure: what its texts hold and where. Numbers that are zero in it are zero in every sample.
 
     Parameters
     ----------

@@ -131,7 +131,7 @@ def long_impedance(a, b, s2, along, across):
 
 @lane_function
 def along_and_across(eccentricity, w):
-    """The eccentricity's components along w and across it, where w is not nought."""
+    """The eccentricity's components along w and across it, where w is not zero."""
     ex, ey = eccentricity
     wx, wy = w
     inverse = 1.0 / math.sqrt(wx * wx + wy * wy + _TINY)

@@ -83,12 +83,12 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
 
 
 def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    caption = f"Responses of the designs, two revolutions{_plays(*found.values())}."
+    caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
     return _shown(designs.comparison_figure(found), caption)
 
 
 def _response_alone(name: str, found: xr.Dataset) -> dict[str, str]:
-    caption = f"{name}: response, two revolutions{_plays(found)}."
+    caption = f"{name}: response, two revolutions{_clearances(found)}."
     return _shown(response.response_figure(found), caption)
 
 
@@ -112,7 +112,7 @@ def _warnings(kind: str, content: xr.Dataset | None) -> str:
     return f" Warning: {'; '.join(found)}." if found else ""
 
 
-def _plays(*responses: xr.Dataset) -> str:
+def _clearances(*responses: xr.Dataset) -> str:
     """At which clearances these were simulated, where that is the same for all."""
     parts = []
     for joint, name in enumerate(motion.joints(responses[0]).values()):
