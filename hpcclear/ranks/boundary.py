@@ -27,7 +27,7 @@ from hpcclear.base.errors import (
 from hpcclear.base.extras import installing
 from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
-from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
+from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.stopping import (
     ANEW,
     GRACE,
@@ -285,14 +285,14 @@ def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
     ranks.mail.notify_others(Tag.LEAVE, code)
-    waited_for, nap = set(range(1, ranks.size)), Nap()
+    waited_for, backoff = set(range(1, ranks.size)), Backoff()
     patience = time.monotonic() + 1.5
     while waited_for:
         message = ranks.mail.poll()
         if message is None:
             if code != Exit.DONE and time.monotonic() > patience:
                 _say_and_abort(ranks, note, code)
-            nap.take()
+            backoff.wait()
         elif message.tag == Tag.LEFT:
             waited_for.discard(message.source)
         elif message.tag == Tag.ERROR and code == Exit.DONE:
@@ -321,12 +321,12 @@ def _notify_root(ranks: Ranks, error: BaseException) -> int:
     known = isinstance(error, InputError)
     note = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
     ranks.mail.send(0, Tag.ERROR, (*note, ranks.outbox()))
-    patience, nap = time.monotonic() + 2.0, Nap()
+    patience, backoff = time.monotonic() + 2.0, Backoff()
     while time.monotonic() < patience:
         message = ranks.mail.poll()
         if message is not None and message.tag == Tag.LEAVE:
             return int(message.body)
-        nap.take()
+        backoff.wait()
     _say_and_abort(ranks, *note)
     return note[1]
 

@@ -50,14 +50,14 @@ class Message(NamedTuple):
     body: Any
 
 
-class Nap:
+class Backoff:
     """Sleeps longer and longer while nothing happens, so that waiting costs no processor time."""
 
     def __init__(self, longest: float = 0.01) -> None:
         self._longest = longest
         self._seconds = _SHORTEST
 
-    def take(self) -> None:
+    def wait(self) -> None:
         """Sleep, half as long again as last time."""
         time.sleep(self._seconds)
         self._seconds = min(1.5 * self._seconds, self._longest)
@@ -87,7 +87,7 @@ class Mail:
         Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
     leaders : list of int
         The first rank of each node but for root, which is none of them.
-    crew : list of int
+    group : list of int
         Of a leader: the other ranks of its node but for root.
     """
 
@@ -100,7 +100,7 @@ class Mail:
         self._news: deque[Message] = deque()  # messages of this rank to itself
         self.neighbours: list[int] = []
         self.leaders: list[int] = []
-        self.crew: list[int] = []
+        self.group: list[int] = []
         cores = host.cores()
         if mpi is None:
             self.rank, self.size = 0, 1
@@ -124,7 +124,7 @@ class Mail:
         every = self._comm.allgather((first, working[0] if working else 0))
         self.leaders = sorted({leader for _, leader in every} - {0})
         if self.rank in self.leaders:
-            self.crew = working[1:]
+            self.group = working[1:]
         if threads and self.rank != first:
             self.neighbours = [first]
         elif threads:
@@ -193,9 +193,9 @@ class Mail:
     def meet_on_node(self) -> None:
         """Wait until every rank of this node is here."""
         if self._mpi is not None:
-            request, nap = self._node.Ibarrier(), Nap()
+            request, backoff = self._node.Ibarrier(), Backoff()
             while not self._is_complete(request):
-                nap.take()
+                backoff.wait()
 
     def _is_complete(self, request: Any) -> bool:
         with self._lock:
