@@ -137,7 +137,7 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
-        verdicts.of_limits(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
+        verdicts.of_interval(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
         is not Standing.UNDECIDED
     ):
         return True

@@ -81,8 +81,8 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
             simulations = int(true["counted"][row, k])
             sure = level(run.study.verification, many[row], simulations)
             value = true["goal"][row, len(case.goals) + k]
-            limits = true["sure_lower"][row, k], true["sure_upper"][row, k]
-            found = of_limits(goal, GoalValue(value, *limits, _NOTHING), simulations, sure)
+            interval = true["sure_lower"][row, k], true["sure_upper"][row, k]
+            found = of_interval(goal, GoalValue(value, *interval, _NOTHING), simulations, sure)
             true["standing"][row, k], true["price"][row, k] = found
     return true
 
@@ -90,7 +90,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
 _NOTHING = np.empty(0)
 
 
-def of_limits(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> Verdict:
+def of_interval(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> Verdict:
     """How a design stands to a constraint, from limits at a two-sided confidence by so many simulations, and its price."""
     if one.upper <= goal.most:
         return Verdict(Standing.KEPT, np.nan)
@@ -174,7 +174,7 @@ def settled(
     """Whether a constraint of a design is decided, as one of `many`."""
     sure = level(settings, many, values.size)
     one = goals.goal_value(goal, values, choice.design, sure)
-    return of_limits(goal, one, values.size, sure).standing is not Standing.UNDECIDED
+    return of_interval(goal, one, values.size, sure).standing is not Standing.UNDECIDED
 
 
 def words(case: Case, unit: str, values: Sequence[Array], standings: Array, prices: Array) -> str:

@@ -177,9 +177,9 @@ def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
         for end in ("", "_lower", "_upper"):  # behind what a case makes small stand its constraints
             values = true[f"goal{end}"][:, column]
             data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
-    table_of_limits = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
+    table_of_intervals = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
     rows = zip(
-        cases, zip(*table_of_limits, strict=True), true["standing"], true["price"], strict=True
+        cases, zip(*table_of_intervals, strict=True), true["standing"], true["price"], strict=True
     )
     data["constraints"] = np.array([verdicts.words(case, unit, *row) for case, *row in rows])
     if any(case.kept for case in cases):

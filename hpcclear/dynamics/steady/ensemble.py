@@ -86,13 +86,13 @@ class _Copies:
         """Shape (stretches, copies, 2)."""
         return np.stack([outcome.mean_gap for outcome in self.outcomes])
 
-    def kept(self, seen: "_Limits") -> Outcome:
+    def kept(self, seen: "_Interval") -> Outcome:
         rows = np.stack([outcome.rows for outcome in self.outcomes[seen.first :]])
         return Outcome(rows if seen.pooled else rows[:, 1::2])
 
 
 @dataclass
-class _Limits:
+class _Interval:
     """What an ensemble says at a look: mean of f, its limit and standard error, m; what to do about it."""
 
     first: int  # stretch that the average begins with
@@ -129,7 +129,7 @@ def ensemble(
         yield from _extend(effort, copies, rtol, stretches)
         if effort.failed is not None:
             return effort.failure(copies.outcomes[-1], rtol)
-        seen = _limits(copies, effort.sample)
+        seen = _interval(copies, effort.sample)
         level = target * seen.f
         spent = effort.revolutions >= effort.budget
         if seen.biased(0.25 * level) and rtol / STRICTER >= TIGHTEST and not spent:
@@ -206,7 +206,7 @@ def _extend(
 
 
 def _more(
-    effort: Effort, copies: _Copies, rtol: float, seen: _Limits, level: float
+    effort: Effort, copies: _Copies, rtol: float, seen: _Interval, level: float
 ) -> Generator[Stretch, Outcome, int]:
     """Add copies where their orbits differ for good; how many further stretches to ask for."""
     used, total = len(copies.outcomes) - seen.first, len(copies.outcomes)
@@ -238,7 +238,7 @@ def _join(copies: _Copies, new: _Copies) -> None:
     ]
 
 
-def _limits(copies: _Copies, sample: Sample) -> _Limits:
+def _interval(copies: _Copies, sample: Sample) -> _Interval:
     speeds = sample.speeds(copies.outcomes)
     gaps = copies.gaps()
     y = judging.projected(gaps)  # (stretches, copies)
@@ -285,7 +285,7 @@ def _limits(copies: _Copies, sample: Sample) -> _Limits:
         by_speed = SPEED * mean / abs(float(speeds[first:].mean()))
         faster, further = judging.approach(speeds[first:])
         moved, settling = max(moved, by_speed * faster), max(settling, by_speed * further)
-    return _Limits(
+    return _Interval(
         first,
         pooled,
         mean,
