@@ -90,13 +90,13 @@ def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> 
     notify("integration: reference")
     reference = reference_of(scene, profile.designs)
     methods = methods_of(scene, profile.designs, profile.more_methods)
-    shape = (len(methods), len(profile.rungs))
+    shape = (len(methods), len(profile.tolerances))
     seconds, evaluations, setting = (np.full(shape, np.nan) for _ in range(3))
     error = np.full((*shape, len(QUANTITIES)), np.nan)
     for m, method in enumerate(methods):
         notify(f"integration: {method.name}")
         repeats = profile.repeats if method.compiled else profile.outside_repeats
-        for r, rtol in enumerate(profile.rungs):
+        for r, rtol in enumerate(profile.tolerances):
             run, share = method.prepare(rtol)
             outcome, total = timed(run, repeats)
             seconds[m, r] = total * share

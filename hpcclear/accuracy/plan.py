@@ -34,7 +34,7 @@ PROBE = 2 * DEFAULT_LANES
 STEADY_PROBE = 8
 """Likewise where each is a steady mean: its copies fill the lanes."""
 
-FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
+FILE_SECONDS, LEVEL_SECONDS = 4.0, 1.0
 """How long the settings of the file, and each target error, are measured on every rank."""
 
 LARGEST_DESIGN = 4096
@@ -190,7 +190,7 @@ def measure(
     rows.clear()
     with _company(scene, points, workers if ranks.size == 1 else 1, notify):
         for k, (error, one) in enumerate(wanted):
-            limit = FILE_SECONDS if error is None else RUNG_SECONDS
+            limit = FILE_SECONDS if error is None else LEVEL_SECONDS
             setting = (
                 "the settings of the file" if error is None else f"a target error of {error:g}"
             )

@@ -73,13 +73,13 @@ class Drawn:
             return self._vicinity(first, count)
         designs = monte_carlo(
             self._scene, count * (1 if self.scattered else self.size), random=(),
-            purpose="designs of effects", scrambling=0, first=first * (1 if self.scattered else self.size),
+            purpose="designs of effects", replicate=0, first=first * (1 if self.scattered else self.size),
         )  # fmt: skip
         if not self.scattered:
             return designs
         parts = [
             monte_carlo(
-                self._scene, self.size, purpose="effects", scrambling=first + k,
+                self._scene, self.size, purpose="effects", replicate=first + k,
                 design=dict(zip(designs.names, row.tolist(), strict=True)),
             )
             for k, row in enumerate(designs.values)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene import Scene
-from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy
+from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth, verdicts, verification
@@ -29,7 +29,7 @@ FALL = 0.5
 stability keep steps short, then 0.7, 0.55 and 0.35 to 1e-7. What the stricter one leaves counts too."""
 
 FIRST, LEAST = 4, 4
-"""Pairs are made of one in so many of a design's points at first, and of so many of each scrambling at least: where few motions
+"""Pairs are made of one in so many of a design's points at first, and of so many of each replicate at least: where few motions
 go another way, fewer may miss them all."""
 
 HIDDEN = 0.25
@@ -50,7 +50,7 @@ def simulations(study: Study) -> int:
     """Simulations in pairs, at the fewest."""
     if not study.paired:
         return 0
-    return goals.ends_in_all(study) * SCRAMBLINGS * _first(truth.first_length(study.verification))
+    return goals.ends_in_all(study) * REPLICATES * _first(truth.first_length(study.verification))
 
 
 def stricter(scene: Scene) -> tuple[Scene, float]:
@@ -75,7 +75,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
         its case, at worst, relative; and to what standard error that is known.
     """
     settings, everything = run.study.verification, range(len(designs))
-    made = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    made = [np.empty((2, REPLICATES, 0))] * len(designs)
     length = truth.first_length(settings)
     truth.lengthen(run, designs, made, everything, "verification", "verification", length)
     taken: dict[int, Taken] = {}
@@ -107,7 +107,7 @@ def _left(wanted: MomentAccuracy, taken: Sequence[Taken]) -> MomentAccuracy:
 
 
 def _first(length: int) -> int:
-    """Points of each scrambling that pairs are made of at first, of so many."""
+    """Points of each replicate that pairs are made of at first, of so many."""
     return min(max(length // FIRST, LEAST), length)
 
 
@@ -119,7 +119,7 @@ def _taken(
     scene, left = stricter(run.scene)
     wanted = run.study.wanted
     asked = HIDDEN * np.array([wanted.mean, wanted.deviation])
-    strict = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
     tight, open_, length = run.of(scene), list(rows), _first(min(made[k].shape[2] for k in rows))
     found: dict[int, Taken] = {}
     while open_:

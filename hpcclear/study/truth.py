@@ -8,7 +8,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
+from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
 from hpcclear.statistics.search.certainty import Compared
@@ -39,13 +39,13 @@ def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verifi
 def scattered(
     run: StudyRun, choice: Choice, count: int, purpose: str = "verification", first: int = 0
 ) -> Points:
-    """The points from `first` on of all scramblings of a design, `count` of each, one scrambling after the other."""
-    made = [_of_design(run, choice, count, purpose, first, k) for k in range(SCRAMBLINGS)]
+    """The points from `first` on of all replicates of a design, `count` of each, one replicate after the other."""
+    made = [_of_design(run, choice, count, purpose, first, k) for k in range(REPLICATES)]
     return run.simulations.filled(made[0].names, np.concatenate([one.values for one in made]))
 
 
 def _of_design(
-    run: StudyRun, choice: Choice, count: int, purpose: str, first: int, scrambling: int | None
+    run: StudyRun, choice: Choice, count: int, purpose: str, first: int, replicate: int | None
 ) -> Points:
     return monte_carlo(
         run.scene,
@@ -54,7 +54,7 @@ def _of_design(
         design=dict(choice.design),
         purpose=purpose,
         first=first,
-        scrambling=scrambling,
+        replicate=replicate,
     )
 
 
@@ -101,12 +101,12 @@ def explained(
 
 
 def scrambled_length(simulations: int) -> int:
-    """Points of each scrambling that so many simulations make at most: a power of two."""
-    return 2 ** int(np.log2(max(simulations // SCRAMBLINGS, 1)))
+    """Points of each replicate that so many simulations make at most: a power of two."""
+    return 2 ** int(np.log2(max(simulations // REPLICATES, 1)))
 
 
 def first_length(settings: Verification) -> int:
-    """Points of each scrambling from which accuracy is judged: a power of two."""
+    """Points of each replicate from which accuracy is judged: a power of two."""
     least = FIRST if settings.least_samples is None else settings.least_samples
     return scrambled_length(min(least, settings.most_samples))
 
@@ -120,7 +120,7 @@ def expected(study: Study) -> int:
     needed = FIRST * max(0.014 / study.wanted.deviation, 1.0) ** 1.7
     kept = [goal for case in study.cases for goal in case.kept if not verdicts.rare(goal, settings)]
     needed = max([needed, *(verdicts.usual(goal, settings) for goal in kept)])
-    return int(np.clip(needed, first_length(settings) * SCRAMBLINGS, settings.most_samples))
+    return int(np.clip(needed, first_length(settings) * REPLICATES, settings.most_samples))
 
 
 def sequences(
@@ -140,11 +140,11 @@ def doubled(
     before: Sequence[Array] = (),
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
-    """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each scrambling,
+    """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
     doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
     from."""
     wanted = wanted or run.study.wanted
-    made = list(before) or [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
+    made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
     many = verdicts.rivals(choices)
     while True:
         rows = [
@@ -167,7 +167,7 @@ def lengthen(
     purpose: str,
     length: int,
 ) -> None:
-    """So many points more of each scrambling of some designs that are equally long; `made` as `doubled` returns it, shape
+    """So many points more of each replicate of some designs that are equally long; `made` as `doubled` returns it, shape
     (2, replicates, values) each."""
     first = made[rows[0]].shape[2]
     fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
@@ -228,13 +228,13 @@ def _values(
     first: int | None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) each: `count` draws, or points from
-    `first` on of each scrambling."""
+    `first` on of each replicate."""
     if first is None:
         batches = [samples_of(run, choice, count, purpose) for choice in choices]
         shape = (2, count, 1)
     else:
         batches = [scattered(run, choice, count, purpose, first) for choice in choices]
-        shape = (2, SCRAMBLINGS, count)
+        shape = (2, REPLICATES, count)
     values = np.concatenate([batch.values for batch in batches])
     records = run.simulations.records(Points(batches[0].names, values, batches[0].paths), stage)
     beyond = (records["flags"] & Flag.BEYOND_HERTZ) != 0
