@@ -107,7 +107,7 @@ def chunks(lanes: Lanes) -> Iterator[np.ndarray]:
 
 def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
     """One lane that keeps every step, its parameters (1, PARAMETERS) and its start as a row of the record (1, columns)."""
-    problem = problem_of(scene, ledger=True, series=True)
+    problem = problem_of(scene, energies=True, series=True)
     n, par = problem.coordinates, parameters(scene)
     start = start_states(scene, par)
     lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))

@@ -77,7 +77,7 @@ class Text:
     """A generated text read by Python, its joints with clearance exerting given forces and moments on bearing and journal."""
 
     def __init__(self, mech, loads=None, cartesian=False, hoist=True):
-        self.on = On(friction=True, gravity=True, ledger=True, series=True)
+        self.on = On(friction=True, gravity=True, energies=True, series=True)
         self.motion = generate(mech, self.on, Rows(), cartesian=cartesian, hoist=hoist)
         base = values(mech, cartesian, gravity=GRAVITY, feedback=(0.0, 0.0))
         self.par = row_of(self.motion, base)

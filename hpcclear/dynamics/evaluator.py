@@ -165,7 +165,7 @@ class Evaluator:
             par, start, labels = with_copies(
                 par, start, labels, self.scene.numerics.rtol, self._perturbations
             )
-        if self._problem.effects.ledger and self._problem.coordinates:
+        if self._problem.effects.energies and self._problem.coordinates:
             before = energy.of_starts(self.scene, par, start, self._problem.coordinates)
             self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
         self._lanes.queue(par, start, labels)

@@ -91,7 +91,7 @@ class Recording:
         if copy:
             self._start = perturbed(self._start, scales(scene), range(copy, copy + 1))
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
-        observed = effects_of(scene, series=True, ledger=True)
+        observed = effects_of(scene, series=True, energies=True)
         self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed)
         self._evaluator = Evaluator(
             scene, ITSELF, perturbations=perturbations, objective=objective, recorder=self._lanes
