@@ -95,7 +95,7 @@ def test_by_itself_a_response_is_integrated_as_a_sample_and_checked_by_its_repli
 def test_commands_are_functions_that_return_datasets(tmp_path):
     scene = hpcclear.load_scene("jobs/hunt_crossley.toml", SHORT)
     cells = hpcclear.map(scene, "C=0.2mm:0.4mm:2", output=tmp_path / "map.nc", progress="quiet")
-    assert cells["kick_growth"].dims == ("C",)
+    assert cells["lyapunov_exponent"].dims == ("C",)
     np.testing.assert_allclose(cells["C"], [2e-4, 4e-4])
     assert (tmp_path / "map.nc").exists()
     seen = hpcclear.bifurcation(

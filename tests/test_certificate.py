@@ -671,7 +671,7 @@ def test_what_cannot_be_told_says_what_would_tell(certified):
     content = dataset.read(place / "e.nc", "effects")
     gravity = int(np.argmax(content["off"].sel(effect="gravity").to_numpy()))
     row = {"variant": gravity, "response": 0}
-    for name, value in (("change", 0.01), ("limit", 0.03), ("told", 2)):
+    for name, value in (("change", 0.01), ("limit", 0.03), ("finding", 2)):
         content[name][row] = value
     content["decision"][gravity] = int(Verdict.UNDECIDED)
     # 64 samples whose limits are three times too wide

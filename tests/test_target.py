@@ -75,7 +75,7 @@ def test_a_regular_motion_is_told_and_its_limits_hold(target: float):
 def test_a_chaotic_motion_is_told_and_its_limits_hold(target: float):
     found = record(CHAOTIC, target)
     assert found["regime"] == Regime.CHAOTIC
-    assert found["kick_growth"] > 1.0
+    assert found["lyapunov_exponent"] > 1.0
     assert not found["flags"] & Flag.TARGET_MISSED
     assert found["objective_limit"] <= target * found["objective"]
     mean, error = truth(True)
@@ -129,7 +129,7 @@ def test_neither_lanes_nor_company_change_a_bit():
         for name in (
             "objective",
             "objective_limit",
-            "kick_growth",
+            "lyapunov_exponent",
             "peak_contact_force",
             "rhs_evaluations",
         ):

@@ -397,7 +397,7 @@ def describe_map(found: "Finished") -> None:
     periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
     parts = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
     rows.append(("period, revolutions", ", ".join(parts) or "none found"))
-    growth = content["kick_growth"].to_numpy()[good]
+    growth = content["lyapunov_exponent"].to_numpy()[good]
     if len(growth):
         text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"
         rows.append(("largest Lyapunov exponent", text))

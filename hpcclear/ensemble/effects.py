@@ -130,7 +130,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
         "off": np.array([[k in off for k in range(plan.effects)] for off in variants], np.int8),
         "change": np.array([[one.value for one in _three(c)] for c in changes]),
         "limit": np.array([[one.limit for one in _three(c)] for c in changes]),
-        "told": np.array(
+        "finding": np.array(
             [[int(judged([one], plan.tolerance)) for one in _three(c)] for c in changes], np.int8
         ),
         "decision": np.array([int(book.verdict(off)) for off in variants], np.int8),

@@ -31,7 +31,7 @@ from hpcclear.base.outcome import (
     Status,
 )
 from hpcclear.results import netcdf
-from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
+from hpcclear.results.names import DESIGN_VARIABLES, FORMER, FURTHER, KINDS, Column, Kind
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
@@ -97,6 +97,7 @@ def dataset(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
+    data = {**data, **{FORMER[name]: values for name, values in data.items() if name in FORMER}}
     least = set(table.coords) - FURTHER_DIMS if whole else set()
     if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
@@ -398,6 +399,7 @@ def read(
     """
     place = _path(path)
     content = netcdf.load(place)
+    content = content.rename({o: n for n, o in FORMER.items() if o in content and n not in content})
     fault = _fault(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")

@@ -244,8 +244,8 @@ def record_of(
     record["objective_limit"] = record["objective_uncertainty"] = mean.limit
     record["regime"] = mean.regime
     record["period"] = np.nan if mean.period is None else mean.period
-    record["kick_growth"] = mean.growth
-    record["kick_growth_limit"] = mean.growth_limit
+    record["lyapunov_exponent"] = mean.growth
+    record["lyapunov_exponent_limit"] = mean.growth_limit
     record["attractors"] = np.nan if mean.attractors is None else mean.attractors
     record["steady_rtol"] = mean.tightest
     record["steady_revolutions"] = mean.revolutions

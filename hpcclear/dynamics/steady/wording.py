@@ -42,7 +42,9 @@ def in_a_line(record: Any, seconds: float | None = None) -> str:
     if np.isfinite(period):
         parts.append(f"period {period:.0f}")
     if regime in (Regime.CHAOTIC, Regime.SEVERAL):
-        parts.append(f"perturbations grow by e^{float(record['kick_growth']):.2g} per revolution")
+        parts.append(
+            f"perturbations grow by e^{float(record['lyapunov_exponent']):.2g} per revolution"
+        )
     parts.append(f"{int(record['steady_revolutions'])} revolutions")
     if seconds is not None:
         parts.append(f"{seconds:.1f} s")

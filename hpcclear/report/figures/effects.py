@@ -65,7 +65,7 @@ def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> s
 
 def _verdict(one: xr.Dataset, tolerance: float) -> str:
     """What a single variant's changes come to, as the end of its sentence."""
-    counted, found = one["judged"].to_numpy() == 1, one["told"].to_numpy()
+    counted, found = one["judged"].to_numpy() == 1, one["finding"].to_numpy()
     if int(one["decision"]) == 0:
         return ""
     if int(one["decision"]) == 1:
