@@ -135,7 +135,7 @@ MARKERS = {
     "load_table": (set(), {par("load_force_x"), ("constant", PER_TURN)}),
     "guide": (set(), {par("guide_coefficient"), par("guide_inverse_ramp")}),
     "baumgarte": (set(), {par("alpha2"), par("beta2")}),
-    "ledger": (set(), {work(at.RATE_NOW + at.DRIVE_POWER), work(at.RATE_NOW + at.DISSIPATION)}),
+    "energies": (set(), {work(at.RATE_NOW + at.DRIVE_POWER), work(at.RATE_NOW + at.DISSIPATION)}),
     "series": (set(), {work(at.RATE_NOW + at.FRICTIONS), work(at.RATE_NOW + at.DRIVE_MOMENT)}),
     "responses": (
         set(),

@@ -44,7 +44,7 @@ LOADS = [[0.0, -30.0], [math.pi, 20.0], [3 * math.pi, -5.0]]
 DEFLECTIONS = np.array([4e-6, -2e-6])  # of the bristles in both joints, m
 KERNEL_ORDER = [0, 1, 3, 4, 5, 6, 7, 8, 2]  # the kernel keeps the crank angle last
 
-FULL = {"gravity", "load", "guide", "ledger", "series"}
+FULL = {"gravity", "load", "guide", "energies", "series"}
 TOPOLOGIES = {
     "two": {"crank_rod", "rod_slider"},
     "O12": {"crank_rod"},
@@ -66,7 +66,7 @@ MOTIONS = [
     ("O23", FULL | {"fixed", "long_film"}),
     ("O23", FULL | {"latched", "coulomb"}),
     ("O23", FULL | {"fixed", "ambrosio", "torque"}),
-    ("none", {"torque", "ledger", "series"}),
+    ("none", {"torque", "energies", "series"}),
     ("none", FULL | {"torque"}),
 ]
 FURTHER = [
@@ -266,7 +266,7 @@ def reduced(effects, values):
 def seen_by_kernel(effects, par, q, v, contacts, t):
     """Accelerations, those of bristles first where there are any, and rates of one state from the kernel."""
     problem = problem_of(
-        scene_of(frozenset(effects)), series="series" in effects, ledger="ledger" in effects
+        scene_of(frozenset(effects)), series="series" in effects, energies="energies" in effects
     )
     if "lugre" in effects:
         z = deflected(effects)
@@ -313,7 +313,7 @@ def check_rates(effects, mech, rates, v):
                 np.testing.assert_allclose(
                     rates[joint.friction], seen["tangential"], rtol=1e-9, atol=1e-9
                 )
-    if "ledger" in effects:
+    if "energies" in effects:
         drive = mech.seen["drive"]
         scale = abs(drive) + 1.0
         assert rates[at.DRIVE_MOMENT] == pytest.approx(drive, rel=1e-9, abs=1e-9 * scale)
@@ -353,8 +353,8 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
     ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
 def test_power_balance_closes_at_every_instant(topology, effects):
-    """Kinetic, potential and stored energy change by what the ledger says, state by state."""
-    effects = effects | TOPOLOGIES[topology] | {"ledger", "series"}
+    """Kinetic, potential and stored energy change by what the balance says, state by state."""
+    effects = effects | TOPOLOGIES[topology] | {"energies", "series"}
     for par, contacts, mech, q, v, t in cases(np.random.default_rng(4), effects, 10):
         a = mech.accelerations(q, v, t)
         _, rates = seen_by_kernel(

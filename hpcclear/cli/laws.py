@@ -56,13 +56,13 @@ def _list(place: str, registry: Any) -> None:
 
     names, ours = registry.names(), registry.ours()
     show(f"{place} ({registry.kind}): {', '.join(names)}")
-    told = names if place == "study.objective" else names[len(ours) :]
-    rows = [(name, "; ".join(filter(None, _told(registry, name)))) for name in told]
+    listed = names if place == "study.objective" else names[len(ours) :]
+    rows = [(name, "; ".join(filter(None, _described(registry, name)))) for name in listed]
     if rows:
         console().print(table(f"{registry.kind}s", rows))
 
 
-def _told(registry: Any, name: str) -> tuple[str, ...]:
+def _described(registry: Any, name: str) -> tuple[str, ...]:
     """What a plug-in is, and the package that it comes from."""
     one = registry.get(name)
     origin = registry.origin(name)

@@ -25,7 +25,7 @@ class Effects(NamedTuple):
     friction: Any = None
     torque: Any = None  # the body that gives the period is free, driven by a torque
     baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
-    ledger: Any = None  # energies
+    energies: Any = None  # energy balance
     series: Any = None  # friction forces and crank moment, for time series
     responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
@@ -172,10 +172,10 @@ EACH = MAX_JOINTS
 GAP = WRITTEN("distance from the clearance circle, positive in contact", "m", EACH, "joints")
 FORCE = WRITTEN("normal force", "N", EACH, "responses")
 GAP_RATE = WRITTEN("rate of the gap", "m/s", EACH)
-DRIVE_POWER = WRITTEN("of all drives", "W", asked_by="ledger")
-ABS_DRIVE_POWER = WRITTEN("its size", "W", asked_by="ledger")
-DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="ledger")
-LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="ledger")
+DRIVE_POWER = WRITTEN("of all drives", "W", asked_by="energies")
+ABS_DRIVE_POWER = WRITTEN("its size", "W", asked_by="energies")
+DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="energies")
+LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="energies")
 FRICTIONS = WRITTEN("tangential force, for time series and objectives", "N", EACH)
 DRIVE_MOMENT = WRITTEN("for time series, responses and objectives", "N m")
 FOLLOWED_ACCELERATION = WRITTEN(
@@ -452,7 +452,7 @@ class Rules(NamedTuple):
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
-    profile: Any  # where around joints sliding work is done is told
+    profile: Any  # where around joints sliding work is done is recorded
     largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`

@@ -151,7 +151,7 @@ def coordinate_count(scene: Scene) -> int:
     return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
 
 
-def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
+def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
     count = len(scene.clearance_joints())
@@ -168,7 +168,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         torque=_flag(isinstance(main, TorqueDrive)),
         baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
-        ledger=_flag(scene.numerics.energy if ledger is None else ledger),
+        energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
         wear=_flag(bool(scene.worn_joints())),
@@ -238,7 +238,7 @@ def check_objective(scene: Scene) -> None:
 
 
 @lru_cache(maxsize=16)
-def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
+def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
     check_objective(scene)
@@ -251,7 +251,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     )
     return Problem(
         linkage=linkage,
-        effects=effects_of(scene, series=series, ledger=ledger),
+        effects=effects_of(scene, series=series, energies=energies),
         coordinates=coordinate_count(scene),
         tableau=tableau_of(scene),
         rtol=scene.numerics.rtol,

@@ -48,8 +48,8 @@ def start_states(
     places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
     if points is None or not _moved(scene, points):
         places[:], speeds[:] = _of_scene(scene)
-        told = refused_of(scene) if walk else None
-        found = np.full(len(par), int(Status.OK if told is None else told[0]))
+        refusal = refused_of(scene) if walk else None
+        found = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
         samples = Samples(scene, points)
         places.T[:], speeds.T[:] = samples.coordinates(trees)

@@ -27,7 +27,7 @@ from hpcclear.base.errors import (
 from hpcclear.base.extras import installing
 from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
-from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
+from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.stopping import (
     ANEW,
     GRACE,
@@ -116,7 +116,7 @@ def _watch(ranks: Ranks) -> Watch:
             f"or the network is gone"
         )
         if ranks.is_root:
-            mail.tell_itself(
+            mail.notify_itself(
                 Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
             )
             return
@@ -248,7 +248,7 @@ def _after_mpi() -> Mail:
 
 def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     """Run the program, say how it ended, and send the others home with the same exit code."""
-    text = told = ""
+    text = note = ""
     try:
         code = program(ranks) or Exit.DONE
     except Stopped as error:
@@ -258,42 +258,42 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     except StorageError as error:
         code, text = Exit.FAILED, f"Error: {error}"
     except RankFailed as error:
-        code, told = error.code, str(error)
+        code, note = error.code, str(error)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
     except BaseException as error:  # noqa: BLE001 - the rank boundary
         user_error = isinstance(mendable(error), InputError)
         code = Exit.BAD_INPUT if user_error else Exit.FAILED
         text = _report(ranks, error)
-    if text or told:
-        ranks.stop_switch.told = True
+    if text or note:
+        ranks.stop_switch.reported = True
     if text:
         _say(text)
-    return _dismiss(ranks, int(code), told)
+    return _dismiss(ranks, int(code), note)
 
 
-def _dismiss(ranks: Ranks, code: int, told: str = "") -> int:
-    """Tell the others to leave; after a failure those who do not listen are ended.
+def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:
+    """Notify the others to leave; after a failure those who do not listen are ended.
 
     An error of another rank is reported last. A rank that cannot reach root reports the error itself and ends the job.
     """
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
-    ranks.mail.tell_others(Tag.LEAVE, code)
-    waited_for, nap = set(range(1, ranks.size)), Nap()
+    ranks.mail.notify_others(Tag.LEAVE, code)
+    waited_for, backoff = set(range(1, ranks.size)), Backoff()
     patience = time.monotonic() + 1.5
     while waited_for:
         message = ranks.mail.poll()
         if message is None:
             if code != Exit.DONE and time.monotonic() > patience:
-                _say_and_abort(ranks, told, code)
-            nap.take()
+                _say_and_abort(ranks, note, code)
+            backoff.wait()
         elif message.tag == Tag.LEFT:
             waited_for.discard(message.source)
         elif message.tag == Tag.ERROR and code == Exit.DONE:
             _say_and_abort(ranks, *message.body[:2])
-    if told:
-        _say(told)
+    if note:
+        _say(note)
     return code
 
 
@@ -304,26 +304,26 @@ def _as_worker(ranks: Ranks, ahead: Sequence[str]) -> int:
     except Leave as leave:
         code = leave.code
     except BaseException as error:  # noqa: BLE001 - the rank boundary
-        code = _tell_root(ranks, error)
+        code = _notify_root(ranks, error)
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
     ranks.mail.send(0, Tag.LEFT)
     return code
 
 
-def _tell_root(ranks: Ranks, error: BaseException) -> int:
+def _notify_root(ranks: Ranks, error: BaseException) -> int:
     """Send a report and finished records to root; if root is deaf, report and end the job here."""
     known = isinstance(error, InputError)
-    told = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
-    ranks.mail.send(0, Tag.ERROR, (*told, ranks.outbox()))
-    patience, nap = time.monotonic() + 2.0, Nap()
+    note = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
+    ranks.mail.send(0, Tag.ERROR, (*note, ranks.outbox()))
+    patience, backoff = time.monotonic() + 2.0, Backoff()
     while time.monotonic() < patience:
         message = ranks.mail.poll()
         if message is not None and message.tag == Tag.LEAVE:
             return int(message.body)
-        nap.take()
-    _say_and_abort(ranks, *told)
-    return told[1]
+        backoff.wait()
+    _say_and_abort(ranks, *note)
+    return note[1]
 
 
 def _report(ranks: Ranks, error: BaseException) -> str:

@@ -89,11 +89,11 @@ def pin_threads() -> None:
     for name in _THREADS:
         os.environ[name] = "1"
     if "numpy" in sys.modules:
-        told, sys.unraisablehook = sys.unraisablehook, lambda _: None
+        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
         try:  # a library that cannot be opened again keeps what the environment says, without a word
             importlib.import_module("threadpoolctl").threadpool_limits(1)
         finally:
-            sys.unraisablehook = told
+            sys.unraisablehook = hook
     if "numba" in sys.modules:
         sys.modules["numba"].set_num_threads(1)
     else:  # Numba refuses a change of this variable once its threads run

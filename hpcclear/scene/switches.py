@@ -68,12 +68,12 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
     Clearance in a joint of ``numerics.objective_joints`` is left out, since it makes up the objective.
     """
     return (
-        *_plays(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
+        *_clearances(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
         *_bendings(scene), *_outside(scene), *_drives(scene),
     )  # fmt: skip
 
 
-def _plays(scene: Scene) -> Iterator[Switch]:
+def _clearances(scene: Scene) -> Iterator[Switch]:
     for label in scene.clearance_joints():
         if label in scene.numerics.objective_joints:
             continue
@@ -227,9 +227,11 @@ class Off:
 
     def __init__(self, scene: Scene, off: Sequence[Switch]) -> None:
         self._off = list(off)
-        plays = {one.joint for one in off if one.joint is not None}
-        if plays and plays == set(scene.clearance_joints()):
-            self._off.append(Switch("", {"effects.friction": {"law": "none"}}))  # acts in play only
+        joints = {one.joint for one in off if one.joint is not None}
+        if joints and joints == set(scene.clearance_joints()):
+            self._off.append(
+                Switch("", {"effects.friction": {"law": "none"}})
+            )  # acts in clearances only
         self.scene = self._made(scene)
 
     def paths(self, paths: Sequence[str]) -> tuple[str, ...]:

@@ -117,11 +117,11 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
     remarks = list(found.remarks)
     if run.study.paired:
         text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
-        run.tell(text)
+        run.notify(text)
         remarks += more
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:
-        run.tell(text)
+        run.notify(text)
     return Verified(found.designs, table, true, remarks)
 
 

@@ -96,7 +96,7 @@ def short_impedance(a, b, s2):
 
 @lane_function
 def along_and_across(eccentricity, w):
-    """The eccentricity's components along w and across it, where w is not nought."""
+    """The eccentricity's components along w and across it, where w is not zero."""
     ex, ey = eccentricity
     wx, wy = w
     inverse = 1.0 / math.sqrt(wx * wx + wy * wy + TINY)

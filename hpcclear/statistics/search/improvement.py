@@ -150,7 +150,9 @@ def _fitted(
     designs: Array, values: Array, errors: Array, bounds: Array, rng: np.random.Generator
 ) -> Kriging:
     scale = float(np.nanstd(values))
-    share = float(np.nanmedian(errors)) / scale if scale > 0.0 and np.isfinite(errors).any() else 0.0
+    share = (
+        float(np.nanmedian(errors)) / scale if scale > 0.0 and np.isfinite(errors).any() else 0.0
+    )
     low, high = (max(factor * share**2, 1e-8) for factor in NOISE)
     noise = (low, max(high, 10.0 * low)) if share else None
     return fit_kriging(
@@ -269,7 +271,10 @@ def volume(front: Array, mean: Array, deviation: Array) -> Array:
     extent = np.where(extent > 0.0, extent, 1.0)
     first, second = ((points - low) / extent).T
     mean, deviation = (mean - low) / extent, deviation / extent
-    left, right = gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0]), np.append(1.1, second)
+    left, right = (
+        gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0]),
+        np.append(1.1, second),
+    )
     strips = np.diff(left, axis=0, prepend=0.0)  # between one point and the next
     return np.asarray((strips * gain_to(right, mean[:, 1], deviation[:, 1])).sum(axis=0))
 
