@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 from hpcclear import simulate
 from hpcclear.dynamics import bearing
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.lubrication import finite_force
+from hpcclear.dynamics.contacts.lubrication import finite_force
 
 ANGLES = np.array([0.0, 0.4, 1.2, 1.7, 2.4, 3.0, 3.14])
 

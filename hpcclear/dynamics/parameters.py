@@ -60,10 +60,10 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     """But for those of films of finite length."""
     p = parameters_of(scene, get, points)
     force = _inertia(scene, get, p)
-    for k, joint in zip(scene.open_places, scene.clearance_joints(), strict=True):
-        key, block = scene.joint_key(joint), at.JOINT_BLOCKS + k * at.JOINT_ROWS
-        fill(scene, get, key, scene.materials_key(joint), force, p[:, block:])
-        _film_parameters(scene, get, joint, p, block)
+    for k, contact in zip(scene.open_places, scene.contact_labels(), strict=True):
+        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        fill(scene, get, contact, force, p[:, block:])
+        _film_parameters(scene, get, contact, p, block)
     held = scene.responses_asked() and is_prescribed(scene)
     p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = (
         held_extremes(scene, points, get.size) if held else np.nan
@@ -109,8 +109,7 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
     needed = np.ones(len(p))
     for key in scene.guide_friction_keys():
         needed = np.maximum(needed, 1.0 / (OF_RAMP * get(f"{key}.ramp_speed")))
-    for joint in scene.clearance_joints():
-        place = _place(scene, joint)
+    for place in scene.open_places:
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
         if scene.effects.friction.law != "none":
             needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
@@ -148,14 +147,15 @@ def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
     """With the waves of surfaces that are out of round, and thresholds of wear; of joints without the former are 0."""
     rows = np.zeros((len(p), at.FINITE))
     rows[:, : p.shape[1]] = p
-    for joint in scene.clearance_joints():
+    for joint in scene.pins():
         own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
         paths = wave_paths(scene, joint)
         for k in range(len(paths) // 2):
             cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
             n = int(paths[2 * k].rpartition("_")[2])
             own[:, 4 * k : 4 * k + 4] = np.stack([cosine, sine, n * sine, -n * cosine], axis=-1)
-        row = at.THRESHOLDS + 2 * _place(scene, joint)
+    for joint, place in zip(scene.contact_labels(), scene.open_places, strict=True):
+        row = at.THRESHOLDS + 2 * place
         rows[:, row : row + 2] = _share_that_wears(scene, get, joint)
     return rows
 
@@ -203,7 +203,7 @@ def finite_rows(scene: Scene) -> int:
     """Parameters of a sample with films of finite length; 0 without such films."""
     if all(film.model != "finite" for film in scene.films().values()):
         return 0
-    return at.FINITE + at.FINITE_ROWS * (_place(scene, scene.clearance_joints()[-1]) + 1)
+    return at.FINITE + at.FINITE_ROWS * (scene.open_places[-1] + 1)
 
 
 def _place(scene: Scene, joint: str) -> int:
@@ -215,15 +215,15 @@ def _with_finite_films(scene: Scene, get: Numbers, p: Array) -> Array:
     """With the coefficients of films of finite length; those of other joints are a short one's."""
     rows = np.zeros((len(p), finite_rows(scene)))
     rows[:, : p.shape[1]] = p
-    for joint in scene.clearance_joints():
-        first = at.FINITE + at.FINITE_ROWS * _place(scene, joint)
+    for joint, place in zip(scene.contact_labels(), scene.open_places, strict=True):
+        first = at.FINITE + at.FINITE_ROWS * place
         own = rows[:, first : first + at.FINITE_ROWS]
         film = scene.films().get(joint)
         if film is None or film.model != "finite":
             own[:, :: at.FINITE_ROWS // 2] = 1.0
             continue
         key = scene.joint_key(joint)
-        ratio = 0.5 * film.length / scene.clearance_joint(joint).bearing_radius
+        ratio = 0.5 * film.length / scene.pin(joint).bearing_radius
         varied = 0.5 * get(f"{key}.film.length") / get(f"{key}.bearing_radius")
         if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():
             raise InputError(
