@@ -11,7 +11,13 @@ JOINTS = ("crank_rod", "rod_slider")
 """Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
 
 MAX_JOINTS = 8
-"""Largest number of joints of a record; datasets contain those of the scene."""
+"""Largest number of contacts of a record, one in each pin and four in each guide; datasets contain those of the scene."""
+
+CORNERS = {
+    "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
+    "back_left": (-1.0, 1.0), "back_right": (-1.0, -1.0),
+}  # fmt: skip
+"""Contacts of a guide with clearance, the corners of its slider: before or behind its middle along the line, left or right."""
 
 WAVE_ROWS = 32
 """Largest number of profile coefficients of all joints."""

@@ -154,7 +154,7 @@ def coordinate_count(scene: Scene) -> int:
 def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
-    count = len(scene.clearance_joints())
+    count = len(scene.contact_labels())
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
