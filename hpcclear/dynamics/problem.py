@@ -177,7 +177,7 @@ def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)) if films else None,
     )
 
 

@@ -69,7 +69,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     loss = lost(effects, work, par, joint, touch, forces, i, W)
     oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
-    whole = pressed(effects.films[joint.place], normal, nx, ny, oil[0], oil[1])
+    whole = pressed(effects.film_at[joint.place], normal, nx, ny, oil[0], oil[1])
     work[(at.RATE_NOW + joint.force) * W + i] = whole
     store_contact(effects, work, par, joint, touch, forces, (nx, ny), i, W)
     store_angles(effects, work, joint, here, i, W)
