@@ -16,8 +16,8 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.cases import Case
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_physical
-from hpcclear.scene.formula import value_of
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search.infill import TwoScales
@@ -110,6 +110,7 @@ def _of_case(
     for _ in range(ROUNDS):
 
         def judged(points: Array, off: float = shift + _gap(case, aim)) -> tuple[Array, Array]:
+            points = snapped(run.study, names, points)
             least = np.column_stack([one(points) for one in objectives])
             return least, np.maximum(model.predict(points) + off, 0.0)
 
@@ -120,6 +121,7 @@ def _of_case(
                 coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]],
                 rng,
             )
+            place = snapped(run.study, names, place[None])[0]
             guess = float(model.predict(place[None])[0])
         row = to_physical(run.scene, names, place[None])[0]
         choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
@@ -140,14 +142,14 @@ def _of_case(
 def _objective(
     run: StudyRun, case: Case, names: Sequence[str], column: int, model: TwoScales
 ) -> Callable[[Array], Array]:
-    """What a case makes small of designs, (n, d) to (n,): a formula as it is, else by a model of what was simulated."""
-    formula = case.goals[column].formula
-    if formula is None:
+    """What a case makes small of designs, (n, d) to (n,): what is exact as it is, else by a model of what was simulated."""
+    goal = case.goals[column]
+    if not goal.exact:
         return model.predict
 
     def exact(points: Array) -> Array:
         rows = to_physical(run.scene, names, points)
-        found = value_of(formula, dict(zip(names, rows.T, strict=True)))
+        found = goal.of_design(dict(zip(names, rows.T, strict=True)))
         return np.asarray(np.broadcast_to(found, len(points)))
 
     return exact

@@ -8,7 +8,6 @@ from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene.cases import Case
-from hpcclear.scene.formula import value_of
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
@@ -35,8 +34,8 @@ class Told:
 
 def told(goal: Goal, values: Array, design: Mapping[str, float], confidence: float) -> Told:
     """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
-    if goal.formula is not None:
-        value = float(value_of(goal.formula, design))
+    if goal.exact:
+        value = float(goal.of_design(design))
         return Told(value, value, value, np.zeros(len(values)))
     if goal.statistic == "quantile":
         found = replicates.quantile(values, goal.order, confidence)
@@ -109,8 +108,8 @@ def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, floa
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     """A goal of designs by the surrogate: f at draws of the random inputs (n, s), design variables (n,) each; to (n,)."""
-    if goal.formula is not None:
-        return np.broadcast_to(value_of(goal.formula, designs), len(drawn))
+    if goal.exact:
+        return np.broadcast_to(goal.of_design(designs), len(drawn))
     if goal.statistic == "mean":
         return np.asarray(drawn.mean(axis=1))
     if goal.statistic == "deviation":

@@ -9,12 +9,14 @@ win nothing or all are spent.
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import moocore
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import SCRAMBLINGS
@@ -138,7 +140,7 @@ def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
             ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))
             places = (np.arange(RAYS) + rng.random(RAYS)) / RAYS
             ray[:, k] = region.lower[k] + places * (region.upper[k] - region.lower[k])
-            chosen += _choices(run, case.name, ray)
+            chosen += _distinct(_choices(run, case.name, ray))
     return _simulated(run, chosen, "check-0")
 
 
@@ -157,7 +159,8 @@ def _go_on(run: StudyRun, tried: Mapping[str, Tried], stage: str) -> Result:
         count, rng = run.study.verification.infill_designs, run.rng(stage, name)
         try:
             broken = one.excess if run.study.case(name).kept else None
-            where = proposals(one.coordinates, one.values, bounds, count, rng, broken)
+            snap = partial(snapped, run.study, one.names)
+            where = proposals(one.coordinates, one.values, bounds, count, rng, broken, snap)
         except InputError:  # too few designs that did not fail for a model
             unit = unit_lhs(count, len(one.names), rng)
             where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
@@ -173,7 +176,7 @@ def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
 
 def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
     names = run.study.design_variables(case)
-    rows = to_physical(run.scene, names, coordinates)
+    rows = to_physical(run.scene, names, snapped(run.study, names, coordinates))
     return [Choice("", case, dict(zip(names, row.tolist(), strict=True))) for row in rows]
 
 
