@@ -26,7 +26,7 @@ from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.scene import load_scene
-from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import (
     chaos,

@@ -14,8 +14,8 @@ from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.ensemble.session import samples_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.points import Points, check_points
-from hpcclear.scene.variables import SHORT_NAMES
 
 
 def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:

@@ -142,7 +142,7 @@ def _case(best: xr.Dataset) -> str:
 
 def _values(best: xr.Dataset) -> str:
     shown = [
-        f"{labels.words(v)} = {labels.quantity(float(v), str(v.attrs['units']))}"
+        f"{labels.words(v)} = {labels.value(v)}"
         for v in labels.design_variables(best)
         if np.isfinite(float(v))
     ]

@@ -18,12 +18,12 @@ from hpcclear.scene.film import Film
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.study import Study
-from hpcclear.scene.variables import SHORT_NAMES
 from hpcclear.scene.wear import Lives
 
 Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide

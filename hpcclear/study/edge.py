@@ -16,6 +16,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.cases import Case
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.tail import of_share
@@ -109,6 +110,7 @@ def _of_case(
     for _ in range(ROUNDS):
 
         def judged(points: Array, off: float = shift + _gap(case, aim)) -> tuple[Array, Array]:
+            points = snapped(run.study, names, points)
             least = np.column_stack([one(points) for one in objectives])
             return least, np.maximum(model.predict(points) + off, 0.0)
 
@@ -119,6 +121,7 @@ def _of_case(
                 coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]],
                 rng,
             )
+            place = snapped(run.study, names, place[None])[0]
             guess = float(model.predict(place[None])[0])
         row = to_physical(run.scene, names, place[None])[0]
         choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))

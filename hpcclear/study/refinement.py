@@ -9,12 +9,14 @@ win nothing or all are spent.
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import moocore
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
@@ -182,7 +184,7 @@ def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
             ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))
             places = (np.arange(RAYS) + rng.random(RAYS)) / RAYS
             ray[:, k] = region.lower[k] + places * (region.upper[k] - region.lower[k])
-            chosen += _choices(run, case.name, ray)
+            chosen += _distinct(_choices(run, case.name, ray))
     return _simulated(run, chosen, "check-0")
 
 
@@ -214,10 +216,11 @@ def _go_on(
         bounds, rng = _bounds(run, one.names), run.rng(stage, name)
         broken = one.excess if run.study.case(name).kept else None
         try:
+            snap = partial(snapped, run.study, one.names)
             if statistics:
                 where = improvement.proposals(*_problem(run, name, one), count, rng)
             else:
-                where = proposals(one.coordinates, one.values, bounds, count, rng, broken)
+                where = proposals(one.coordinates, one.values, bounds, count, rng, broken, snap)
         except InputError:  # too few designs that did not fail for a model
             unit = unit_lhs(count, len(one.names), rng)
             where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
@@ -231,7 +234,8 @@ def _problem(run: StudyRun, name: str, one: Tried) -> tuple[Known, Space]:
     directions = np.eye(len(case.goals))
     if case.plain:
         directions = np.vstack([directions, [1.0, 2.0]])
-    space = Space(_bounds(run, one.names), directions, exact_in(run.scene, case))
+    snap = partial(snapped, run.study, one.names)
+    space = Space(_bounds(run, one.names), directions, exact_in(run.scene, case), snap)
     broken = one.excess if case.kept else None
     return Known(one.coordinates, one.values, one.errors, broken), space
 
@@ -244,7 +248,7 @@ def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
 
 def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
     names = run.study.design_variables(case)
-    rows = to_physical(run.scene, names, coordinates)
+    rows = to_physical(run.scene, names, snapped(run.study, names, coordinates))
     return [Choice("", case, dict(zip(names, row.tolist(), strict=True))) for row in rows]
 
 

@@ -54,7 +54,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
         "numerics.objective": run.scene.objective.name,
     }
     for name, value in choice.design.items():
-        changes |= dict.fromkeys(run.study.variable(name).paths, value)
+        changes |= run.study.variable(name).entries(value)
     if settings.response_clearance is not None:
         for joint in run.scene.clearance_joints():
             changes[f"{run.scene.joint_key(joint)}.clearance"] = settings.response_clearance
