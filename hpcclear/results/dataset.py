@@ -36,7 +36,9 @@ from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kin
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
 LINKAGE_DIMS = {"body", "point", "pin"}
-FURTHER_DIMS = LINKAGE_DIMS | {"wave", "angle", "mode"}
+FURTHER_DIMS = LINKAGE_DIMS | {"wave", "angle", "mode"} | {
+    "record", "particle", "feature", "candidate", "revolutions",
+}  # fmt: skip
 """Coordinates that only some files have."""
 
 _ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results

@@ -7,6 +7,7 @@ import numpy as np
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
+from hpcclear.results.identified import IDENTIFY
 from hpcclear.results.rows import Column, Columns
 
 
@@ -76,6 +77,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
     "together": _meanings("independent", "correlated"),
+    "explained": _meanings("not_explained", "explained"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
 """CF attributes beyond units and long name: what the codes mean."""
@@ -128,6 +130,7 @@ KINDS = {
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),
     "wear": _kind("Service lives of a mechanism with wear", columns.WEAR, ("life",)),
     "effects": _kind("Effect screening: effects that can be neglected", columns.EFFECTS),
+    "identify": _kind("Unknowns of a machine from measured signals", IDENTIFY),
     "timing": _kind("Run time of the ranks", columns.TIMING),
     "accuracy": _kind("Accuracy against run time", columns.ACCURACY),
 }
