@@ -19,7 +19,7 @@ from hpcclear.scene.sampling import offsets
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, verdicts
-from hpcclear.study.goals import Told
+from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
@@ -112,8 +112,8 @@ def probabilities(
         ]  # fmt: skip
     return [
         Found(
-            one.told(run.study.verification.confidence),
-            one.told(verdicts.level(run.study.verification, number, one.f.size)),
+            one.interval(run.study.verification.confidence),
+            one.interval(verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
             one.f.size,
         )
@@ -137,15 +137,17 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
-        verdicts.of_limits(one.goal, _told(rate.told(sure)), rate.f.size, sure).standing
+        verdicts.of_interval(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
         is not Standing.UNDECIDED
     ):
         return True
-    return goals.accurate(one.goal, _told(rate.told(settings.confidence)), run.study.wanted)
+    return goals.accurate(
+        one.goal, _goal_value(rate.interval(settings.confidence)), run.study.wanted
+    )
 
 
-def _told(one: Limited) -> Told:
-    return Told(one.value, one.lower, one.upper, one.shifts)
+def _goal_value(one: Limited) -> GoalValue:
+    return GoalValue(one.value, one.lower, one.upper, one.shifts)
 
 
 def _together(
