@@ -9,7 +9,7 @@ import pytest
 from hpcclear.base.errors import InputError
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import SCRAMBLINGS, Verification
+from hpcclear.scene.stages import REPLICATES, Verification
 from hpcclear.statistics.random.replicates import moments, quantile, student, surely_less
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
@@ -22,9 +22,9 @@ CASE = ("C", "m2", "m3", "u2", "I2")
 DESIGN = {"m2": 0.2, "m3": 0.14, "u2": 0.06, "I2": 3e-4}
 
 
-def points(scene, count=64, first=0, scrambling=0, **more):
+def points(scene, count=64, first=0, replicate=0, **more):
     return monte_carlo(
-        scene, count, random=CASE, design=DESIGN, first=first, scrambling=scrambling, **more
+        scene, count, random=CASE, design=DESIGN, first=first, replicate=replicate, **more
     ).values
 
 
@@ -43,7 +43,7 @@ def test_scramblings_purposes_and_seeds_differ():
     other = load_scene(ROBUST, ["study.seed=21"])
     made = [
         points(scene),
-        points(scene, scrambling=1),
+        points(scene, replicate=1),
         points(scene, purpose="search"),
         points(other),
     ]
@@ -54,7 +54,7 @@ def test_scramblings_purposes_and_seeds_differ():
 def test_every_scrambling_is_balanced_in_every_input():
     """64 points: one in each 64th of every random input's range."""
     scene = load_scene(ROBUST)
-    names = monte_carlo(scene, 64, random=CASE, design=DESIGN, scrambling=3)
+    names = monte_carlo(scene, 64, random=CASE, design=DESIGN, replicate=3)
     for name, (middle, half) in {
         "m2": (0.2, 0.005),
         "u2": (0.06, 0.02),
@@ -80,7 +80,7 @@ def sobol(dimensions, length, seed):
 
     rng = np.random.default_rng(seed)
     return np.stack(
-        [qmc.Sobol(dimensions, scramble=True, rng=rng).random(length) for _ in range(SCRAMBLINGS)]
+        [qmc.Sobol(dimensions, scramble=True, rng=rng).random(length) for _ in range(REPLICATES)]
     )
 
 
@@ -320,7 +320,10 @@ def test_small_steps_that_a_search_wins_count_together():
     def met(steps):
         tables = [np.array([[1.0, (1.0 - step * share)]]) for step in steps]
         nothing = np.zeros((1, len(names)))
-        return [refinement.Tried(names, nothing, table, np.full(1, -1.0)) for table in tables]
+        return [
+            refinement.Tried(names, nothing, table, np.full(1, -1.0), 0.0 * table)
+            for table in tables
+        ]
 
     assert not refinement._stands(run, case, met([0.0, 0.0, 0.0]))  # too few rounds
     assert refinement._stands(run, case, met([0.0, 0.3, 0.6, 0.9]))

@@ -13,25 +13,13 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES
+from hpcclear.base.outcome import FIELDS, IMPACTS, OUTCOME, RESPONSES
 
 Function = Callable[..., Any]
 
-RECORDED = {
-    "objective": "m",
-    "mean_gap": "m",
-    "peak_contact_force": "N",
-    "mean_contact_force": "N",
-    "peak_crank_moment": "N m",
-    "slider_acceleration_deviation": "m/s^2",
-    "point_acceleration_deviation": "m/s^2",
-    "peak_point_acceleration": "m/s^2",
-    "impacts": "",
-    "impact_energy": "J",
-    "contact_impulse": "N s",
-    "contact_loss": "rad",
-    "rms_contact_force": "N",
-    "rms_frame_force": "N",
+RECORDED = {"objective": "m"} | {
+    name: FIELDS[name].unit.removeprefix("1")
+    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS)
 }
 """Fields of a sample's record that `Objective.value` may ask for, with units; ``objective`` is f of eq. 13."""
 

@@ -152,15 +152,15 @@ def coordinate_count(scene: Scene) -> int:
 
 
 def effects_of(
-    scene: Scene, *, series: bool = False, ledger: bool | None = None, impacts: bool | None = None
+    scene: Scene, *, series: bool = False, energies: bool | None = None, impacts: bool | None = None
 ) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
-    count = len(scene.clearance_joints())
+    count = len(scene.contact_labels())
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
-    models = {film.model for film in scene.films().values()}
+    films = {scene.joint_labels.index(name): film.model for name, film in scene.films().items()}
     return at.Effects(
         joints=count,
         first=next(iter(scene.open_places), 0),
@@ -170,7 +170,7 @@ def effects_of(
         torque=_flag(isinstance(main, TorqueDrive)),
         baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
-        ledger=_flag(scene.numerics.energy if ledger is None else ledger),
+        energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
         responses=_flag(scene.responses_asked() or bool(impacts)),
         impacts=_flag(bool(count) and (scene.impacts_asked() if impacts is None else impacts)),
@@ -180,10 +180,7 @@ def effects_of(
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        film=_flag(bool(models)),
-        short_film=_flag("short" in models),
-        long_film=_flag("long" in models),
-        finite_film=_flag("finite" in models),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)) if films else None,
     )
 
 
@@ -244,7 +241,7 @@ def check_objective(scene: Scene) -> None:
 
 
 @lru_cache(maxsize=16)
-def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
+def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
     check_objective(scene)
@@ -257,7 +254,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     )
     return Problem(
         linkage=linkage,
-        effects=effects_of(scene, series=series, ledger=ledger),
+        effects=effects_of(scene, series=series, energies=energies),
         coordinates=coordinate_count(scene),
         tableau=tableau_of(scene),
         rtol=scene.numerics.rtol,

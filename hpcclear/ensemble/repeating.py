@@ -12,6 +12,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.api import as_points
 from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -24,7 +25,7 @@ class Repeated:
     """What came of one file."""
 
     file: str
-    told: str
+    extent: str
     """How much of it was simulated again, or why nothing was."""
     differing: tuple[str, ...] = ()
     """Variables that are other ones here, with the largest relative difference."""
@@ -81,12 +82,15 @@ def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated
             name, "not simulated: its scene reads otherwise in this version", (), changed
         )
     if kind == "response":
-        told, (ours, theirs) = "its series", _series(content, scene)
+        extent, (ours, theirs) = "its series", _series(content, scene)
     else:
         chosen = np.unique(np.linspace(0, content.sizes["sample"] - 1, count).round().astype(int))
         theirs = content.isel(sample=chosen)
-        told, ours = f"{len(chosen)} of {content.sizes['sample']} samples", _samples(theirs, scene)
-    return Repeated(name, told, tuple(_differing(ours, theirs)), changed)
+        extent, ours = (
+            f"{len(chosen)} of {content.sizes['sample']} samples",
+            _samples(theirs, scene),
+        )
+    return Repeated(name, extent, tuple(_differing(ours, theirs)), changed)
 
 
 def _samples(content: xr.Dataset, scene: Scene) -> xr.Dataset:
@@ -133,7 +137,7 @@ def _differing(ours: xr.Dataset, theirs: xr.Dataset) -> Iterator[str]:
 
 def _changed(content: xr.Dataset, scene: Scene) -> Iterator[str]:
     """What the file says of programs and processor, where that is not what is here."""
-    now = dataset.provenance("", scene.hash)
+    now = provenance("", scene.hash)
     for name in ("hpcclear_version", "processor"):
         if content.attrs.get(name) != now[name]:
             yield f"{name}: {content.attrs.get(name)}, here {now[name]}"

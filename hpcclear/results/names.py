@@ -4,9 +4,11 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
+from hpcclear.results.identified import IDENTIFY
 from hpcclear.results.rows import Column, Columns
 
 
@@ -41,6 +43,13 @@ SECONDS_PER_SAMPLE = "seconds_per_sample"
 ALL_ON = "all on"
 """Name of the whole scene there."""
 
+FORMER = {
+    "lyapunov_exponent": "kick_growth",
+    "lyapunov_exponent_limit": "kick_growth_limit",
+    "finding": "told",
+}
+"""Former names of variables. Files have them as well, deprecated, until the next minor version."""
+
 
 def _meanings(*words: str) -> dict[str, object]:
     """Codes from 0 on, and what they mean."""
@@ -70,14 +79,16 @@ FURTHER: dict[str, dict[str, object]] = {
     "accepted": _meanings("refused", "accepted"),
     "verified": _meanings("not_simulated", "simulated"),
     "off": _meanings("on", "off"),
-    "told": _meanings("within", "beyond", "undecided"),
+    "finding": _meanings("within", "beyond", "undecided"),
     "decision": _meanings("within", "beyond", "undecided"),
     "judged": _meanings("reported", "judged"),
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
     "together": _meanings("independent", "correlated"),
+    "explained": _meanings("not_explained", "explained"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
+FURTHER |= {FORMER[name]: FURTHER[name] for name in FORMER if name in FURTHER}
 """CF attributes beyond units and long name: what the codes mean."""
 
 
@@ -90,10 +101,13 @@ def _kind(
     whole: bool = False,
 ) -> Kind:
     """A kind of file; of a `whole` one only what is made on request may be missing."""
+    for name in (name for name in FORMER if name in table):
+        row = table[name]._replace(long_name=f"deprecated: now {name}", required=False)
+        table = {**table, FORMER[name]: row}
     coords = {name: row for name, row in table.items() if row.dims == (name,)}
     data = {name: row for name, row in table.items() if name not in coords}
     required = (
-        set(data) - {*ON_REQUEST, *JUDGED, "label"}
+        set(data) - {*ON_REQUEST, *JUDGED, *FORMER.values(), "label"}
         if whole
         else {n for n in data if data[n].required}
     )
@@ -128,7 +142,28 @@ KINDS = {
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),
     "wear": _kind("Service lives of a mechanism with wear", columns.WEAR, ("life",)),
     "effects": _kind("Effect screening: effects that can be neglected", columns.EFFECTS),
+    "identify": _kind("Unknowns of a machine from measured signals", IDENTIFY),
     "timing": _kind("Run time of the ranks", columns.TIMING),
     "accuracy": _kind("Accuracy against run time", columns.ACCURACY),
 }
 """Every result file by its kind."""
+
+
+FURTHER_DIMS = {
+    *("body", "point", "pin", "wave", "angle", "mode"),
+    *("revolution", "order", "band", "record", "particle", "feature", "candidate", "revolutions"),
+}
+"""Coordinates that only some files have."""
+
+ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
+
+LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
+
+
+def designs_in(samples: xr.Dataset) -> dict[str, np.ndarray]:
+    """The design variables in a dataset, by their names or scene paths."""
+    return {
+        str(variable.attrs["scene_path"]): variable.to_numpy()
+        for variable in samples.data_vars.values()
+        if variable.attrs.get("role") == ROLE
+    }

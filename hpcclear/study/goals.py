@@ -1,14 +1,15 @@
-"""What a case asks of its designs: told from simulations, with limits, and guessed by the surrogate."""
+"""Objectives and constraints of a case: values with confidence intervals from simulations, or surrogate predictions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
+from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
-from hpcclear.scene.formula import value_of
+from hpcclear.scene.domain import to_physical
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
@@ -24,7 +25,7 @@ SHARE_OF_MOST = 0.02
 
 
 @dataclass(frozen=True)
-class Told:
+class GoalValue:
     """A goal of a design by direct simulation: value, limits, and what each replicate shifts (r,)."""
 
     value: float
@@ -33,11 +34,13 @@ class Told:
     shifts: Array
 
 
-def told(goal: Goal, values: Array, design: Mapping[str, float], confidence: float) -> Told:
+def goal_value(
+    goal: Goal, values: Array, design: Mapping[str, float], confidence: float
+) -> GoalValue:
     """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
-    if goal.formula is not None:
-        value = float(value_of(goal.formula, design))
-        return Told(value, value, value, np.zeros(len(values)))
+    if goal.exact:
+        value = float(goal.of_design(design))
+        return GoalValue(value, value, value, np.zeros(len(values)))
     if goal.statistic == "quantile":
         found = replicates.quantile(values, goal.order, confidence)
     elif goal.statistic == "exceedance":
@@ -46,12 +49,12 @@ def told(goal: Goal, values: Array, design: Mapping[str, float], confidence: flo
     else:
         mean, deviation = replicates.moments(values)
         return _symmetric(mean if goal.statistic == "mean" else deviation, confidence)
-    return Told(found.value, found.lower, found.upper, found.shifts)
+    return GoalValue(found.value, found.lower, found.upper, found.shifts)
 
 
-def _symmetric(one: Estimate, confidence: float) -> Told:
+def _symmetric(one: Estimate, confidence: float) -> GoalValue:
     reach = one.error * student(confidence, one.freedom) if one.freedom > 0 else np.nan
-    return Told(one.value, one.value - reach, one.value + reach, one.shifts)
+    return GoalValue(one.value, one.value - reach, one.value + reach, one.shifts)
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
@@ -68,7 +71,7 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: Told, accuracy: MomentAccuracy) -> bool:
+def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
     """Whether its limits are as narrow as asked for."""
     share, relative = wanted(goal, accuracy)
     half = (one.upper - one.lower) / 2.0
@@ -101,7 +104,7 @@ def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, floa
     found = [
         float(shortfall(one, one.most, known[None])[0])
         if one.statistic == "exceedance"
-        else float(excess([one], np.array([[told(one, values, design, 0.95).value]]))[0])
+        else float(excess([one], np.array([[goal_value(one, values, design, 0.95).value]]))[0])
         for one in kept
     ]
     return max(found, default=-np.inf)
@@ -109,8 +112,8 @@ def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, floa
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     """A goal of designs by the surrogate: f at draws of the random inputs (n, s), design variables (n,) each; to (n,)."""
-    if goal.formula is not None:
-        return np.broadcast_to(value_of(goal.formula, designs), len(drawn))
+    if goal.exact:
+        return np.broadcast_to(goal.of_design(designs), len(drawn))
     if goal.statistic == "mean":
         return np.asarray(drawn.mean(axis=1))
     if goal.statistic == "deviation":
@@ -120,6 +123,20 @@ def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     assert goal.limit is not None  # by validation
     width = SMOOTH * drawn.std(axis=1, keepdims=True) + 1e-300
     return np.asarray(ndtr((drawn - goal.limit) / width).mean(axis=1))
+
+
+def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
+    """Of each that a case makes small, sampling coordinates (n, d) to its values (n,) if it is exact, else None."""
+    names = scene.required_study.design_variables(case.name)
+
+    def of(goal: Goal) -> Callable[[Array], Array]:
+        def exact(points: Array) -> Array:
+            designs = dict(zip(names, to_physical(scene, names, points).T, strict=True))
+            return np.array(np.broadcast_to(goal.of_design(designs), len(points)))
+
+        return exact
+
+    return [of(goal) if goal.exact else None for goal in case.goals]
 
 
 def names_of(case: Case, unit: str) -> tuple[str, ...]:

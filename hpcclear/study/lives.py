@@ -15,7 +15,7 @@ from hpcclear.ensemble.lives import doubts
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.wear import check_worn, run_wear
 from hpcclear.scene import Scene
-from hpcclear.scene.variables import RandomInput
+from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.statistics.random.replicates import moments, student
 from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
@@ -87,8 +87,10 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
 
 def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]:
     """Mean, its half-width, deviation and its half-width of a design; each life is a replicate."""
-    paths = {name: run.study.variable(name).paths for name in choice.design}
-    own = scene.with_({path: choice.design[name] for name in paths for path in paths[name]})
+    entries: dict[str, float] = {}
+    for name, value in choice.design.items():
+        entries |= run.study.variable(name).entries(value)
+    own = scene.with_(entries)
     name = NAME if own == scene else f"{FOLDER}/{choice.name.replace(' ', '_')}.nc"
     options = Options(style=run.simulations.style)
     timing = run.directory / "timing.nc"
@@ -101,14 +103,14 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     ):
         if found["end_reason"][k] != "failed":
             values[k] = np.interp(parts * min(oldest, end), at[at <= end], f[at <= end])
-    told: list[float] = []
+    estimates: list[float] = []
     for one in moments(values):
         sure = one.freedom > 0
         reach = (
             one.error * student(run.study.verification.confidence, one.freedom) if sure else np.nan
         )
-        told += [one.value, reach]
-    return tuple(told)
+        estimates += [one.value, reach]
+    return tuple(estimates)
 
 
 def known(run: StudyRun) -> Scene:
@@ -125,7 +127,7 @@ def known(run: StudyRun) -> Scene:
     timing = run.directory / "timing.nc"  # the study's, which replaces it at the end
     lives = run_wear(scene, run.directory / NAME, run.ranks, options, timing).content
     for text in doubts(lives):
-        run.tell(f"Lives: {text}.")
+        run.notify(f"Lives: {text}.")
     changes = {}
     for row in run.study.worn:
         joints = [path.split(".")[-2] for path in row.paths]
@@ -133,7 +135,7 @@ def known(run: StudyRun) -> Scene:
         values = _values(scene, row, clearance, lives["ending"].to_numpy())
         left = int(np.isnan(clearance).any(axis=1).sum())
         if left:
-            run.tell(
+            run.notify(
                 f"{row.name}: {left} of {len(clearance)} lives failed or were over before {row.cycles:g} revolutions and "
                 "are left out of its distribution; the others are the better ones."
             )  # fmt: skip

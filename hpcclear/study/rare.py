@@ -19,7 +19,7 @@ from hpcclear.scene.sampling import offsets
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, verdicts
-from hpcclear.study.goals import Told
+from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
@@ -112,8 +112,8 @@ def probabilities(
         ]  # fmt: skip
     return [
         Found(
-            one.told(run.study.verification.confidence),
-            one.told(verdicts.level(run.study.verification, number, one.f.size)),
+            one.interval(run.study.verification.confidence),
+            one.interval(verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
             one.f.size,
         )
@@ -137,15 +137,17 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
-        verdicts.of_limits(one.goal, _told(rate.told(sure)), rate.f.size, sure).standing
+        verdicts.of_interval(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
         is not Standing.UNDECIDED
     ):
         return True
-    return goals.accurate(one.goal, _told(rate.told(settings.confidence)), run.study.wanted)
+    return goals.accurate(
+        one.goal, _goal_value(rate.interval(settings.confidence)), run.study.wanted
+    )
 
 
-def _told(one: Limited) -> Told:
-    return Told(one.value, one.lower, one.upper, one.shifts)
+def _goal_value(one: Limited) -> GoalValue:
+    return GoalValue(one.value, one.lower, one.upper, one.shifts)
 
 
 def _together(
@@ -205,8 +207,9 @@ def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
 def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
     """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
     random = run.study.case(choice.case).random
-    moved = offsets(run.scene, random, list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T))
     design = dict(choice.design)
+    chances = list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T)
+    moved = offsets(run.scene, random, chances, choice.design)
     for name, values in moved.items():
         row = run.study.random_input(name)
         centre = design.get(name, run.scene.number(row.paths[0]))

@@ -11,7 +11,8 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
-from hpcclear.results.dataset import provenance, variable_name
+from hpcclear.results.dataset import variable_name
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
@@ -53,7 +54,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
         "numerics.objective": run.scene.objective.name,
     }
     for name, value in choice.design.items():
-        changes |= dict.fromkeys(run.study.variable(name).paths, value)
+        changes |= run.study.variable(name).entries(value)
     if settings.response_clearance is not None:
         for joint in run.scene.clearance_joints():
             changes[f"{run.scene.joint_key(joint)}.clearance"] = settings.response_clearance
@@ -61,7 +62,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Statistics of each design's steady response and of copies kicked at their start, stretch by stretch.
+    """Statistics of each design's steady response and of copies perturbed at their start, stretch by stretch.
 
     Where motion is chaotic one response says little of a design: copies see other stretches of the
     same motion.
@@ -88,7 +89,7 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
 
 
 def write(run: StudyRun, designs: Sequence[Choice]) -> None:
-    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10. One that failed is told instead."""
+    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10. Failures are reported."""
     folder = run.directory / "responses"
     folder.mkdir(exist_ok=True)
     for name, choice in compared(run, designs):
@@ -97,7 +98,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
             response = simulate(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
-            run.tell(
+            run.notify(
                 f"The response of {name} has no file: its simulation ended as {status.name.lower()}: {status.message}. "
                 f"{status.remedy}"
             )

@@ -104,7 +104,8 @@ def _search(run: StudyRun, models: Models) -> Found:
     found = run.stage("optimisation", optimisation.optimise, models.searched)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
-    better, remarks = refinement.search(run, [*ends, *between])
+    statistics = refinement.by_statistics(run.study, surrogates.checked_r2(run.study, models.kept))
+    better, remarks = refinement.search(run, [*ends, *between], statistics)
     designs = [*ends, *(better or between)]
     return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
 
@@ -116,11 +117,11 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
     remarks = list(found.remarks)
     if run.study.paired:
         text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
-        run.tell(text)
+        run.notify(text)
         remarks += more
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:
-        run.tell(text)
+        run.notify(text)
     return Verified(found.designs, table, true, remarks)
 
 

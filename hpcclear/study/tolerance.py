@@ -14,7 +14,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene import Scene
-from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy
+from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth, verdicts, verification
@@ -29,7 +29,7 @@ FALL = 0.5
 stability keep steps short, then 0.7, 0.55 and 0.35 to 1e-7. What the stricter one leaves counts too."""
 
 FIRST, LEAST = 4, 4
-"""Pairs are made of one in so many of a design's points at first, and of so many of each scrambling at least: where few motions
+"""Pairs are made of one in so many of a design's points at first, and of so many of each replicate at least: where few motions
 go another way, fewer may miss them all."""
 
 HIDDEN = 0.25
@@ -42,7 +42,7 @@ NOTHING = 1e-9
 """Share of the mean below which a deviation is round-off."""
 
 Taken = tuple[Array, Array]
-"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.told_each`, without what chance made; and
+"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
 the standard error."""
 
 
@@ -50,7 +50,7 @@ def simulations(study: Study) -> int:
     """Simulations in pairs, at the fewest."""
     if not study.paired:
         return 0
-    return goals.ends_in_all(study) * SCRAMBLINGS * _first(truth.first_length(study.verification))
+    return goals.ends_in_all(study) * REPLICATES * _first(truth.first_length(study.verification))
 
 
 def stricter(scene: Scene) -> tuple[Scene, float]:
@@ -75,7 +75,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
         its case, at worst, relative; and to what standard error that is known.
     """
     settings, everything = run.study.verification, range(len(designs))
-    made = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    made = [np.empty((2, REPLICATES, 0))] * len(designs)
     length = truth.first_length(settings)
     truth.lengthen(run, designs, made, everything, "verification", "verification", length)
     taken: dict[int, Taken] = {}
@@ -86,13 +86,13 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
             _left(run.study.wanted, list(taken.values())),
         )  # fmt: skip
         made = truth.contested(run, designs, made, "verification", "verification")
-    true = _widened(run, designs, truth.told_of(run, designs, made), taken)
+    true = _widened(run, designs, truth.results_of(run, designs, made), taken)
     return true | truth.explained(run, designs, made)
 
 
 def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:
     """Rows of the designs that are the ends of their cases, by what is known."""
-    table = verification.named(run, designs, truth.told_of(run, designs, made))
+    table = verification.named(run, designs, truth.results_of(run, designs, made))
     named = zip(table.choices, table.rows, strict=True)
     return [row for one, row in named if one.name in run.study.case(one.case).ends]
 
@@ -107,7 +107,7 @@ def _left(wanted: MomentAccuracy, taken: Sequence[Taken]) -> MomentAccuracy:
 
 
 def _first(length: int) -> int:
-    """Points of each scrambling that pairs are made of at first, of so many."""
+    """Points of each replicate that pairs are made of at first, of so many."""
     return min(max(length // FIRST, LEAST), length)
 
 
@@ -119,7 +119,7 @@ def _taken(
     scene, left = stricter(run.scene)
     wanted = run.study.wanted
     asked = HIDDEN * np.array([wanted.mean, wanted.deviation])
-    strict = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
     tight, open_, length = run.of(scene), list(rows), _first(min(made[k].shape[2] for k in rows))
     found: dict[int, Taken] = {}
     while open_:
@@ -137,17 +137,19 @@ def _taken(
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much what is told of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
-    one, other = (truth.told_each(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs))
-    scale = _scales(run, choice, np.array([told.value for told in other]))
+    one, other = (
+        truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
+    )
+    scale = _scales(run, choice, np.array([one.value for one in other]))
     bias = np.array([a.value - b.value for a, b in zip(one, other, strict=True)]) / scale
     shifts = np.array([a.shifts - b.shifts for a, b in zip(one, other, strict=True)])
     return bias, spread(shifts) / scale
 
 
 def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
-    """What errors of all that is told of a design are relative to: (k,) as `truth.told_each` returns them."""
+    """What errors of the results of a design are relative to: (k,) as `truth.estimates_of` returns them."""
     case, scale = run.study.case(choice.case), np.abs(values)
     scale[1] = max(scale[1], NOTHING * scale[0])
     for k, goal in enumerate((*case.goals, *case.kept), 3):

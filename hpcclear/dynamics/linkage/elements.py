@@ -1,10 +1,12 @@
-"""What generated motions call besides the contact law: springs, harmonic drives, loops that fold flat. Plain, of arrays."""
+"""What generated motions call besides the contact law: springs, drives, tables, loops that fold flat. Plain, of arrays."""
+
+import math
 
 import numpy as np
 
 from hpcclear.base.jit import lane_function
 
-_TINY = 1e-300  # keeps the direction of a spring without length defined (and nought)
+_TINY = 1e-300  # keeps the direction of a spring without length defined (and zero)
 _FLAT = 1e-8  # pivots of loops over those of an open one, from which on inertia alone goes on: 1e-4 rad from flat
 
 
@@ -39,8 +41,19 @@ def harmonic(mean, amplitude, rate, sine, cosine):
 def held_inverse(pivot, scale):
     """1 / pivot of a multiplier, both negative; where a loop folds flat no more than 1e8 / scale.
 
-    There one direction of the loop is not held, neither by geometry nor by its forces, which would be nought by nought: a
+    There one direction of the loop is not held, neither by geometry nor by its forces, which would be zero by zero: a
     free linkage goes on as its inertia has it until the loop holds again, some 1e-4 rad further on.
     """
     least = _FLAT * scale
     return 1.0 / (pivot if pivot < least else least)
+
+
+@lane_function
+def table_value(table, first, cells, angle):
+    """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell, from `first` on."""
+    turns = angle * (0.5 / math.pi)
+    x = (turns - math.floor(turns)) * cells
+    cell = min(int(x), cells - 1)
+    s = x - cell
+    k = first + 4 * cell
+    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))

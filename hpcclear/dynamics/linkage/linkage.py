@@ -23,7 +23,7 @@ from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
 class Linkage:
-    """A mechanism's structure: what its texts hold and where. Numbers that are nought in it are nought in every sample.
+    """A mechanism's structure: what its texts hold and where. Numbers that are zero in it are zero in every sample.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Linkage:
     bristled : bool
         Whether friction in the joints with clearance has bristles, whose coordinates come before the mechanism's.
     places : tuple of int, optional
-        Places of the joints with clearance among the kernel's, one behind the other; from the first on by default.
+        Places of the contacts among the kernel's, one behind the other; from the first on by default.
 
     Raises
     ------
@@ -55,19 +55,21 @@ class Linkage:
         objective: str = "", bristled: bool = False, waves: bool = False, places: tuple[int, ...] | None = None,
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
-        self._bristles = len(mechanism.clearances) if bristled else 0
+        self._bristles = len(mechanism.contacts) if bristled else 0
         self.cartesian, self.follow = cartesian, follow
-        self.places = tuple(range(len(mechanism.clearances))) if places is None else places
+        self.places = tuple(range(len(mechanism.contacts))) if places is None else places
         self._on = On(
             friction=friction, gravity=gravity, follow=follow, objective=objective, waves=waves
         )
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        for ledger in (False, True):
+        for energies in (False, True):
             for series in (False, True):
                 for responses in (False, True):
-                    self._text(self._on._replace(ledger=ledger, series=series, responses=responses))
+                    self._text(
+                        self._on._replace(energies=energies, series=series, responses=responses)
+                    )
         self._text(_with_impacts(self._on))
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
@@ -147,7 +149,7 @@ class Linkage:
     def module(self, effects: at.Effects) -> ModuleType:
         """The module of its motion with these effects."""
         on = self._on._replace(
-            ledger=bool(effects.ledger), series=bool(effects.series), responses=bool(effects.responses)
+            energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses)
         )  # fmt: skip
         on = _with_impacts(on) if effects.impacts else on
         return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
@@ -167,7 +169,7 @@ class Linkage:
     def energies(
         self, par: Array, q: Array, v: Array, time: Array | float, gravity: Array | float
     ) -> tuple[Array, Array, Array]:
-        """Kinetic energy and that of gravity and of bending (m,), J, and eccentricities (joints, 2, m).
+        """Kinetic energy and that of gravity and of bending (m,), J, and eccentricities (contacts, 2, m).
 
         Arguments as of `Poses.at`.
         """
@@ -219,7 +221,7 @@ class Linkage:
 
 def _with_impacts(on: On) -> On:
     """What a text that measures impacts has: all that is measured, so that there is one of them."""
-    return on._replace(ledger=True, series=True, responses=True, impacts=True)
+    return on._replace(energies=True, series=True, responses=True, impacts=True)
 
 
 def _curves_of(part: object) -> list[str]:

@@ -131,7 +131,7 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
     below = (known & (values <= value)).sum(axis=1)
     shifts = _shifts(below - counts * (below.sum() / total), counts)
     places = np.arange(total) + 0.5
-    ends = np.array(_limits_of_share(order, shifts, counts, confidence)) * total
+    ends = np.array(_interval_of_share(order, shifts, counts, confidence)) * total
     lower, upper = np.interp(ends, places, ranked, left=np.nan, right=np.nan)
     low, high = np.clip(ends, places[0], places[-1])
     slope = float(np.diff(np.interp([low, high], places, ranked))[0] / (high - low)) * total
@@ -162,11 +162,11 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     total = int(counts.sum())
     share = float(above.sum() / total)
     shifts = _shifts(above - counts * share, counts)
-    lower, upper = _limits_of_share(share, shifts, counts, confidence)
+    lower, upper = _interval_of_share(share, shifts, counts, confidence)
     return Limited(share, shifts, lower, upper)
 
 
-def _limits_of_share(
+def _interval_of_share(
     share: float, shifts: Array, counts: Array, confidence: float
 ) -> tuple[float, float]:
     """Limits of a probability: those of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
