@@ -148,8 +148,8 @@ class Field(NamedTuple):
     per: str = ""
     """"joint" or "wave": what there is one for each of; "" for one a sample."""
     when: str = ""
-    """What a scene has to ask for, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it), "request"
-    (other effects), "steady" (a target error), "map"; "" of what always does."""
+    """What a scene has to ask for, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
+    "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
     required: bool = False
     """Whether every file with the outcome of a simulation has it."""
 

@@ -16,9 +16,12 @@ from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.loads import piecewise
+from hpcclear.dynamics.linkage.loads.writing import Writing
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Acting,
     Contact,
     Drive,
     Force,
@@ -223,8 +226,12 @@ class _Generator:
             found += [*kin.rotated(self.forest.frames[body], own)]
         return f"({', '.join(self.writer.text(term) for term in found)})"
 
-    def _load(self, load: Force | Torque | Spring) -> None:
+    def _load(self, load: Force | Torque | Spring | Acting) -> None:
         kin, write, power = self.kinematics, self.writer, ZERO
+        if isinstance(load, Acting):
+            power = load.act(Writing(kin, write, self.balance))
+            self.load_power = self.load_power + power
+            return
         if isinstance(load, Spring):
             self._spring(load)
             return
@@ -239,6 +246,17 @@ class _Generator:
                 for axis, value in zip("xy", load.force, strict=True)
             )
             force = Vector(*parts)
+            if load.follows:
+                body = split(load.place)[0]
+                cosine, sine = kin.offset(body)
+                own = Vector(cosine * force.x - sine * force.y, sine * force.x + cosine * force.y)
+                turned_force = kin.rotated(self.forest.frames[body], own)
+                force = Vector(
+                    *(
+                        write.let(f"{load.name}_{axis}", one)
+                        for axis, one in zip("xy", turned_force, strict=True)
+                    )
+                )
             self.balance.pulls.append(Pull(load.place, force))
             for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
                 power = power + part * speed
@@ -262,7 +280,8 @@ class _Generator:
         numbers = [write.parameter(f"{load.name}_{n}") for n in ("stiffness", "damping", "length")]
         texts = [write.text(t) for t in (*numbers, *apart, *moving)]
         made = [write.fresh(f"{name}_{load.name}") for name in ("fx", "fy", "power")]
-        write.line(f"{', '.join(made)} = spring_force({', '.join(texts)})")
+        call = "spring_force(" if load.side == 0 else f"one_sided({float(load.side)}, "
+        write.line(f"{', '.join(made)} = {call}{', '.join(texts)})")
         fx, fy, power = map(named, made)
         force = Vector(fx, fy)
         self.balance.pulls += [Pull(load.first, force), Pull(load.second, -force)]
@@ -270,6 +289,11 @@ class _Generator:
 
     def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:
         write = self.writer
+        if drive.by_speed is not None:
+            speed = self.kinematics.spin(self.forest.frames[drive.body])
+            name = f"{drive.name}_by_speed"
+            torque = piecewise.term(write, name, len(drive.by_speed), speed)
+            return Column("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
             torque = write.let(drive.name, torque * self._turned(drive.name))
