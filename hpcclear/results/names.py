@@ -146,7 +146,7 @@ KINDS = {
 """Every result file by its kind."""
 
 
-FURTHER_DIMS = {"body", "point", "pin", "wave", "angle", "mode"}
+FURTHER_DIMS = {"body", "point", "pin", "wave", "angle", "mode", "guide"}
 """Coordinates that only some files have."""
 
 ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
