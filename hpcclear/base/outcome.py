@@ -16,7 +16,7 @@ MAX_JOINTS = 8
 
 CORNERS = {
     "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
-    "back_left": (-1.0, 1.0), "back_right": (-1.0, -1.0),
+    "back_right": (-1.0, -1.0), "back_left": (-1.0, 1.0),
 }  # fmt: skip
 """Contacts of a guide with clearance, the corners of its slider: before or behind its middle along the line, left or right."""
 

@@ -97,7 +97,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         lives.check(scene)
     states = 2 * (coordinate_count(scene) - scene.bristles)
     bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
-    open_joints = len(scene.clearance_joints())
+    open_joints = len(scene.contact_labels())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
     method = integrator_of(scene)
     rows += [

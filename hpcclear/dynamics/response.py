@@ -156,6 +156,8 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     found = planar_labels(scene, linkage_of(scene).mechanism)
     if scene.modes:
         found["mode"] = scene.mode_labels
+    if scene.guides():
+        found["guide"] = scene.guides()
     if scene.template is None and not coordinate_count(scene):
         found["pin"] = pins_of(scene)
     return found or None

@@ -150,7 +150,7 @@ KINDS = {
 
 
 FURTHER_DIMS = {
-    *("body", "point", "pin", "wave", "angle", "mode"),
+    *("body", "point", "pin", "wave", "angle", "mode", "guide"),
     *("record", "particle", "feature", "candidate", "revolutions"),
 }
 """Coordinates that only some files have."""

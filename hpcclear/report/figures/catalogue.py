@@ -11,6 +11,7 @@ from hpcclear.report.figures import (
     accuracy,
     designs,
     effects,
+    guides,
     maps,
     motion,
     portraits,
@@ -36,6 +37,8 @@ class Entry(NamedTuple):
     """Of the file."""
     draw: "Callable[[xr.Dataset], Figure]"
     caption: str
+    along: str = "time"
+    """A dimension that the file must have; any file of a response has instants."""
 
 
 def section_figure(found: xr.Dataset) -> "Figure":
@@ -132,6 +135,7 @@ RESPONSE: tuple[Entry, ...] = (
         "contact force by its direction",
     ),
     Entry("penetration", "response", response.penetration_figure, "penetration"),
+    Entry("guide", "response", guides.guide_figure, "offset, tilt and contacts in guides", "guide"),
     Entry("phase", "response", portraits.phase_figure, "phase portraits"),
     Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
     Entry("spectrum", "response", response.spectrum_figure, "spectra"),
@@ -166,5 +170,7 @@ def drawings(
     if responses:
         one = responses.get("original", next(iter(responses.values())))
         made["response"] = partial(response.response_figure, one)
-        made |= {entry.name: partial(entry.draw, one) for entry in RESPONSE}
+        made |= {
+            entry.name: partial(entry.draw, one) for entry in RESPONSE if entry.along in one.dims
+        }
     return made
