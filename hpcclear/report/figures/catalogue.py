@@ -12,6 +12,7 @@ from hpcclear.report.figures import (
     designs,
     effects,
     guides,
+    identified,
     maps,
     motion,
     portraits,
@@ -119,6 +120,24 @@ RESULTS: tuple[Entry, ...] = (
         "wear",
         wear.profile_figure,
         "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over all runs.",
+    ),
+    Entry(
+        "posterior",
+        "identify",
+        identified.posterior_figure,
+        "Posterior of each unknown with its calibrated 95 % interval.",
+    ),
+    Entry(
+        "features",
+        "identify",
+        identified.features_figure,
+        "Measured less predicted features of the last record, in standard deviations of the prediction.",
+    ),
+    Entry(
+        "growth",
+        "identify",
+        identified.growth_figure,
+        "Unknowns over the dates of the records, with 95 % intervals and the median rate.",
     ),
     Entry("timing", "timing", timing.timing_figure, "Time of the ranks, by rank and by stage."),
 )
