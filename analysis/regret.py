@@ -171,7 +171,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, help="another seed than the study's")
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
-    print(f"{'study':24} {'searched by':12} {'R2 of f':>8} {'simulations':>12}  regret of the first objective")
+    print(
+        f"{'study':24} {'searched by':12} {'R2 of f':>8} {'simulations':>12}  regret of the first objective"
+    )
     for name in words.studies:
         scene = scene_of(name)
         if words.seed is not None:
@@ -269,7 +271,9 @@ def _ended(run: Any, case: str, known: Known, space: improvement.Space, rng: np.
     order = np.argsort(beliefs.believed[:, 0], kind="stable")[: BEST // 2]
     lucky = np.argsort(known.values[beliefs.allowed][:, 0], kind="stable")[: BEST // 2]
     rows = known.designs[beliefs.allowed][np.union1d(order, lucky)]
-    return refinement._choices(run, case, np.vstack([rows, improvement.finalists(known, space, 4, rng)]))
+    return refinement._choices(
+        run, case, np.vstack([rows, improvement.finalists(known, space, 4, rng)])
+    )
 
 
 if __name__ == "__main__":
