@@ -234,7 +234,7 @@ STAGES = (
             "optimisation": "search on the surrogate",
             "check": "simulation of its designs",
             "infill": "adaptive refinement of the Pareto front",
-            "edge": "search along constraints on rare failures",
+            "edge": "search along constraints",
         },
         files=("front.nc",), samples=_of_search,
     ),
