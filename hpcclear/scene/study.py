@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
@@ -61,6 +61,9 @@ class Study(Moving, Table):
     surrogate: Surrogate = Surrogate()
     swarm: Swarm = Swarm()
     verification: Verification = Verification()
+    worst_case: Annotated[bool, Field(strict=True)] = False
+    """Whether the largest f within the bounds of the random inputs is searched for the best designs (at their corners and
+    inside); inputs without bounds are taken within three standard deviations."""
     certificate: CertificateOfEffects | None = None
     """Left out, the stage is."""
 

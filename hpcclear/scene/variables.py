@@ -192,12 +192,12 @@ class Variable(NamedInput):
             raise invalid(
                 "load cases change the mechanism, and no design chooses them", "Remove it", "over"
             )
-        if self.over != "worst":
-            if len(self.over) != len(self.options) or not sum(self.over) > 0.0:
-                raise invalid(
-                    f"{len(self.options)} load cases need as many weights, some of them above 0",
-                    'Give each a weight, or write over = "worst"', "over",
-                )  # fmt: skip
+        weights = () if self.over == "worst" else self.over
+        if weights and (len(weights) != len(self.options) or not sum(weights) > 0.0):
+            raise invalid(
+                f"{len(self.options)} load cases need as many weights, some of them above 0",
+                'Give each a weight, or write over = "worst"', "over",
+            )  # fmt: skip
         return self
 
     @model_validator(mode="after")
