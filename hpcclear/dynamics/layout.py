@@ -38,13 +38,18 @@ class Effects(NamedTuple):
     journal_waves: Any = None
     threshold: Any = None  # of the pressure, below which nothing wears
     profile: Any = None  # where around these the sliding work is done
-    films: tuple[Any, ...] = (None,) * MAX_JOINTS  # names of laws of oil films, by places of joints
+    films: Any = None  # names of laws of oil films, by places of joints
     objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
     def latched(self) -> Any:
         """Whether the normal force's law asks for the impact speed, which is latched."""
         return None if self.contact is None else self.contact.latched
+
+    @property
+    def film_at(self) -> tuple[Any, ...]:
+        """The same, of scenes without oil as well."""
+        return self.films or (None,) * MAX_JOINTS
 
     @property
     def bristled(self) -> Any:

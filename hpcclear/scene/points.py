@@ -94,7 +94,7 @@ def check_points(
     if isinstance(scene.mechanism, Mechanism):
         reason = "the rod no longer than the crank"
         pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
-    for joint in scene.clearance_joints():
+    for joint in scene.pins():
         key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
         pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
     for small, large, reason in pairs:

@@ -11,7 +11,8 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
-from hpcclear.results.dataset import provenance, variable_name
+from hpcclear.results.dataset import variable_name
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
