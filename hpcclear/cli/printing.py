@@ -301,6 +301,7 @@ def describe_study(place: Path) -> None:
         "kriging",
         "verification",
         "contributions",
+        "worst",
         "chaos",
         "timing",
     )

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
 
 HALF_WIDTH = 1.96
@@ -42,6 +43,29 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
         "tolerances",
         f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}",
     )
+
+
+def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+    """Yield the worst case of a design, and where it lies; none where it was not searched."""
+    found, name = files.get("worst"), str(best["design"].item())
+    if found is None or name not in found["design"].to_numpy():
+        return
+    own = found.sel(design=name)
+    value, corner = float(own["worst"]), float(own["worst_corner"])
+    if not np.isfinite(value):
+        return
+    unit = str(own["worst"].attrs["units"])
+    there = zip(*(own[key].to_numpy() for key in ("input", "at", "input_unit")), strict=True)
+    listed = ", ".join(f"{n} = {quantity(float(x), str(u))}" for n, x, u in there if np.isfinite(x))
+    text = f"f reaches at least {quantity(value, unit)} within the bounds of the random inputs, at {listed} "
+    text += f"({int(own['tried'])} simulations"
+    if np.isfinite(corner) and corner < value:
+        text += f"; {quantity(corner, unit)} at their corners"
+    text += "; a search finds a lower limit)"
+    loose = [str(one) for one in own["input"].to_numpy()[own["without_bounds"].to_numpy() != 0]]
+    if loose:
+        text += f". Without bounds, taken within three standard deviations: {', '.join(loose)}"
+    yield Line("worst case", text)
 
 
 def _listed(parts: list[tuple[str, float, float]]) -> str:

@@ -71,9 +71,10 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
-    """Whether its limits are as narrow as asked for."""
+def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
+    """Whether its limits are as narrow as asked for, or as a part of that."""
     share, relative = wanted(goal, accuracy)
+    share *= part
     half = (one.upper - one.lower) / 2.0
     return bool(half <= share * (abs(one.value) if relative else 1.0))
 

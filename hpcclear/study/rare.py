@@ -159,7 +159,7 @@ def _together(
     """Answer procedures of several designs by f, all they ask for at a time in one batch."""
     wanted = {k: next(one) for k, one in enumerate(going)}
     while wanted:
-        parts = _simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
+        parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
         fresh = {}
         for k, part in zip(wanted, parts, strict=True):
             try:
@@ -169,9 +169,9 @@ def _together(
         wanted = fresh
 
 
-def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
+def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
     """f of designs at standard normals, (n,) each; NaN where it failed, or where inputs so far out make no mechanism."""
-    rows = [_rows(run, choice, u) for choice, u in where]
+    rows = [rows_of(run, choice, u) for choice, u in where]
     makes = [_valid(run, names, values) for names, values in rows]
     batches = [
         run.simulations.filled(names, values[good])
@@ -204,7 +204,7 @@ def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
     return np.ones(len(values), bool)
 
 
-def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
+def rows_of(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
     """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
     random = run.study.case(choice.case).random
     design = dict(choice.design)

@@ -16,6 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
@@ -178,7 +179,8 @@ def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
         chosen += _distinct(own)
         names = run.study.design_variables(case.name)
         region, rng = box(run.scene, names), run.rng("search", case.name)
-        middle = next(choice for choice in own if choice.name == f"{case.name} best beta")
+        end = ENDS[min(len(case.goals), 2) - 1]
+        middle = next(choice for choice in own if choice.name == f"{case.name} best {end}")
         centre = to_coordinates(run.scene, names, np.array([list(middle.design.values())]))[0]
         for k in range(len(names)):
             ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))

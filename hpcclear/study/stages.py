@@ -30,6 +30,7 @@ from hpcclear.study import (
     truth,
     verdicts,
     verification,
+    worst,
 )
 from hpcclear.study.certificate import Extent
 from hpcclear.study.goals import ends_in_all
@@ -142,6 +143,11 @@ def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result 
     )
 
 
+def _worst(run: StudyRun, verified: Verified) -> None:
+    choices = verified.table.choices
+    worst.write(run, choices, run.stage("worst", worst.of_designs, choices))
+
+
 def _chaos(run: StudyRun, verified: Verified) -> None:
     scatter = run.stage("chaos", chaos.simulate, verified.designs)
     rows = verified.table.rows
@@ -234,7 +240,7 @@ STAGES = (
             "optimisation": "search on the surrogate",
             "check": "simulation of its designs",
             "infill": "adaptive refinement of the Pareto front",
-            "edge": "search along constraints on rare failures",
+            "edge": "search along constraints",
         },
         files=("front.nc",), samples=_of_search,
     ),
@@ -252,6 +258,11 @@ STAGES = (
     Stage(
         "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
         needs=("verification",), files=("contributions.nc",),
+    ),
+    Stage(
+        "worst", _worst, needs=("verification",), applies=lambda scene: scene.required_study.worst_case,
+        words={"worst": "worst case of the best designs"}, files=("worst.nc",),
+        samples=lambda scene: {"worst": worst.simulations(scene) if scene.required_study.worst_case else 0},
     ),
     Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
     Stage(

@@ -6,6 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
+from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
@@ -21,6 +22,9 @@ FIRST = 512
 
 TIED = 0.4
 """Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
+
+CLOSE = 0.25
+"""Of the accuracy asked for: what a constraint that is not decided is known to, unless it is a probability."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
@@ -253,8 +257,8 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is a probability or
-    quantile that surely keeps or breaks its threshold, as one of `many` designs."""
+    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
+    breaks its threshold, as one of `many` designs. What does neither is known better, so that it may be decided."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))
     reach = _reaches(settings, values)
@@ -262,13 +266,14 @@ def _accurate(
     good &= reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
     if good and not case.plain:
         good = all(
-            goals.accurate(goal, one, wanted)
-            or (goal in case.kept and verdicts.settled(goal, values, choice, settings, many))
+            goals.accurate(goal, one, wanted, 1.0 if goal.statistic == "exceedance" else CLOSE)
+            or verdicts.settled(goal, values, choice, settings, many)
+            if isinstance(goal, Constraint)
+            else goals.accurate(goal, one, wanted)
             for goal, one in zip(
                 (*case.goals, *case.kept), _goals(run, choice, values), strict=True
             )
-            if goal.statistic in ("quantile", "exceedance")
-            and not (goal in case.kept and verdicts.rare(goal, settings))
+            if not goal.exact and not (goal in case.kept and verdicts.rare(goal, settings))
         )
     return bool(good)
 

@@ -265,7 +265,7 @@ def write(
     )
     if "first_goal" in content:
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
-        asked = f"{', '.join(others)} and {last}"
+        asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
             words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
