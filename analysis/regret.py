@@ -34,8 +34,8 @@ from hpcclear.study.optimisation import Choice
 
 HERE = Path(__file__).parent
 JOBS = HERE.parent / "jobs"
-WIDE, ROUNDS, BATCH, POINTS = 60, 12, 10, 512
-JUDGED, BEST = 8192, 12
+WIDE, ROUNDS, BATCH, POINTS = 40, 8, 10, 256
+JUDGED, BEST = 4096, 8
 
 SMALL: dict[str, Any] = {
     "seed": 5,

@@ -152,13 +152,15 @@ def search(
 
 
 def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
-    """Designs of a case in each round. A search by statistics has as many in all as the other one, first designs included."""
+    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included: those
+    that the swarm spreads over its front are left out."""
     settings = run.study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
     each = length(run.study) * SCRAMBLINGS
     cases = len(run.study.cases)
-    left = sum(simulations(run.study)) // each // cases - len(begun["case"]) // cases
+    most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
+    left = (most - len(begun["case"])) // cases
     count = max(settings.infill_designs // PARTS, 1)
     return [count] * (left // count)
 

@@ -115,10 +115,9 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
     remarks = list(found.remarks)
-    if run.study.paired:
-        text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
-        run.tell(text)
-        remarks += more
+    text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
+    run.tell(text)
+    remarks += more
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:
         run.tell(text)
@@ -126,12 +125,8 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
 
 
 def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
-    if run.study.paired:
-        true = tolerance.verified(run, designs)
-    else:
-        true = truth.simulate(run, designs, "verification")
-    return rare.decided(run, designs, true, "verification")
+    """Moments of designs, with what the tolerance does to them and with rare failures."""
+    return rare.decided(run, designs, tolerance.verified(run, designs), "verification")
 
 
 def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:

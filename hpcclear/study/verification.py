@@ -215,7 +215,7 @@ def write(
     run : StudyRun
     table : Table
     true : dict of arrays, shape (n, ...)
-        Of `hpcclear.study.truth.simulate`, over the same designs.
+        Of `hpcclear.study.tolerance.verified`, over the same designs.
     model : Piecewise
         The surrogate that was searched.
     remarks : sequence of str
@@ -244,7 +244,7 @@ def write(
             data[f"life_{name}_lower"], data[f"life_{name}_upper"] = value - reach, value + reach
         if study.paired:
             data[f"{name}_within"] = true[f"{name}_reach"] / abs(true[name])
-            data[f"{name}_tolerance"] = true["tolerance"][:, column]
+        data[f"{name}_tolerance"] = true["tolerance"][:, column]
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     for name in ("percentile", "percentile_lower", "percentile_upper"):
