@@ -138,7 +138,7 @@ def search(
         for name, its in met.items()
         if not _stands(run, name, its, patience) and (won := _won(run, name, its[-2:]))
     ]
-    named = [choice for choice in start if choice.name]
+    named = [] if statistics else [choice for choice in start if choice.name]
     finalists = [
         one
         for name, its in met.items()
@@ -339,6 +339,7 @@ def _finalists(
     where = tried.coordinates[best[cut(tried.values[best], most)]]
     with contextlib.suppress(InputError):  # too few designs that did not fail for a model
         if statistics:
+            most = run.study.verification.designs
             where = improvement.finalists(*_problem(run, case, tried), most, rng)
         else:
             believed = believed_ends(

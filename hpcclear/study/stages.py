@@ -106,7 +106,7 @@ def _search(run: StudyRun, models: Models) -> Found:
     fronts.write(run, found, [*ends, *between], models.searched)
     statistics = refinement.by_statistics(run.study, surrogates.checked_r2(run.study, models.kept))
     better, remarks = refinement.search(run, [*ends, *between], statistics)
-    designs = [*ends, *(better or between)]
+    designs = better if better and statistics else [*ends, *(better or between)]
     return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
 
 

@@ -10,7 +10,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
+from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
@@ -250,11 +250,11 @@ def _values(
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation."""
-    return tuple(
-        one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
-        for one in moments(values)
-    )  # type: ignore[return-value]
+    """Half-widths of the limits of mean and deviation, the larger one where they are not symmetric."""
+    mean, deviation = (
+        limits(one, settings.confidence)[1] - one.value for one in moments(values)
+    )
+    return mean, deviation
 
 
 def _accurate(

@@ -234,7 +234,8 @@ def write(
     data["case"] = np.array([choice.case for choice in choices])
     for column, name in enumerate(("mean", "deviation")):
         data[f"{name}_true"] = true[name]
-        data[f"{name}_lower"] = true[name] - true[f"{name}_reach"]
+        least = 0.0 if name == "deviation" else -np.inf
+        data[f"{name}_lower"] = np.maximum(true[name] - true[f"{name}_reach"], least)
         data[f"{name}_upper"] = true[name] + true[f"{name}_reach"]
         data[f"{name}_surrogate"] = surrogate[:, column]
         data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
