@@ -35,7 +35,7 @@ from hpcclear.study.optimisation import Choice
 HERE = Path(__file__).parent
 JOBS = HERE.parent / "jobs"
 WIDE, ROUNDS, BATCH, POINTS = 40, 8, 10, 256
-JUDGED, BEST = 4096, 8
+JUDGED, BEST = 4096, 6
 
 SMALL: dict[str, Any] = {
     "seed": 5,
@@ -258,8 +258,9 @@ def reference(scene: Scene, case: str) -> np.ndarray:
         }  # fmt: skip
         tried = refinement._tried(run, case, made, tried)
         known, space = refinement._problem(run, case, tried)
-        if round_ < ROUNDS:
-            where = improvement.proposals(known, space, BATCH, rng)
+        where = improvement.proposals(known, space, BATCH, rng)
+        if not len(where):
+            break
     return np.array([list(one.design.values()) for one in _ended(run, case, known, space, rng)])
 
 
@@ -269,7 +270,8 @@ def _ended(run: Any, case: str, known: Known, space: improvement.Space, rng: np.
     order = np.argsort(beliefs.believed[:, 0], kind="stable")[: BEST // 2]
     lucky = np.argsort(known.values[beliefs.allowed][:, 0], kind="stable")[: BEST // 2]
     rows = known.designs[beliefs.allowed][np.union1d(order, lucky)]
-    return refinement._choices(run, case, np.vstack([rows, improvement.finalists(known, space, 4, rng)]))
+    ends = improvement.finalists(known, space, 2, rng)
+    return refinement._choices(run, case, np.unique(np.vstack([rows, ends]), axis=0))
 
 
 if __name__ == "__main__":

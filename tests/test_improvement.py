@@ -1,12 +1,28 @@
 """Expected improvement: closed forms against draws, searches of noisy functions, constraints, catalogues, and when it is used."""
 
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
 import moocore
 import numpy as np
 import pytest
+from commands import warm
+from patience import crowded
 
 from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import alone
+from hpcclear.results import dataset
+from hpcclear.scene import load_scene
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known, Space
+from hpcclear.study import extent, refinement, run_study
+
+PROGRAMS = Path(__file__).parent / "mpi_programs"
+sys.path.insert(0, str(PROGRAMS))
+
+import formula  # noqa: E402
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -101,3 +117,99 @@ def test_too_few_designs_for_a_model_are_refused():
     known = Known(np.full((3, 2), 0.5), np.ones((3, 2)), np.ones((3, 2)))
     with pytest.raises(InputError, match="too few valid samples"):
         improvement.proposals(known, Space(BOUNDS, np.eye(2), (None, None)), 4, np.random.default_rng(1))  # fmt: skip
+
+
+# -- a study ----------------------------------------------------------------------------------------
+
+STUDY = """
+[study]
+seed = 3
+samples = 20
+test_samples = 8
+[study.variables]
+m2 = { range = [0.105, 0.42] }
+m3 = { range = [0.07, 0.28] }
+C = { range = ["0.3 mm", "1 mm"] }
+[study.random]
+C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
+[study.cases.robust]
+random = ["C"]
+objectives = [{ statistic = "quantile", level = 0.9 }, { formula = "0 - m2 - m3" }]
+[study.sensitivity]
+groups = []
+[study.surrogate]
+of = "statistics"
+r2 = 0.5
+restarts = 0
+[study.swarm]
+particles = 10
+iterations = 5
+runs = 1
+archive = 8
+[study.verification]
+designs = 4
+infill_rounds = 1
+infill_designs = 6
+infill_samples = 64
+most_samples = 512
+response_windows = 2
+response_copies = 2
+"""
+
+
+def study():
+    return load_scene(tomllib.loads(formula.PHYSICS + STUDY))
+
+
+def contents(place: Path) -> dict[str, bytes]:
+    paths = [path for path in sorted(place.rglob("*.nc")) if path.name != "timing.nc"]
+    return {str(path.relative_to(place)): path.read_bytes() for path in paths}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    place = tmp_path_factory.mktemp("improved") / "whole"
+    with pytest.MonkeyPatch.context() as patch:
+        formula.replace_dynamics(patch.setattr)
+        run_study(study(), place, alone(), progress_style="quiet")
+    return place
+
+
+def test_statistics_are_searched_by_name_or_where_f_is_rough():
+    asked = study().required_study
+    assert refinement.by_statistics(asked, 1.0)
+    for of, r2, expected in (("f", 0.1, False), (None, 0.5, True), (None, 0.95, False), (None, np.nan, True)):  # fmt: skip
+        scene = study().with_({"study.surrogate.of": of})
+        assert refinement.by_statistics(scene.required_study, r2) is expected
+
+
+def test_a_search_by_statistics_ends_at_the_front(done):
+    """f rises with both masses: the front ends at their bounds; the swarm's own designs are not verified."""
+    found = dataset.read(done / "verification.nc", "verification")
+    alpha, beta = (found.sel(design=f"robust {end}") for end in ("alpha", "beta"))
+    region = refinement.box(study(), ("m2", "m3"))
+    np.testing.assert_allclose([float(beta[n]) for n in ("m2", "m3")], region.upper, rtol=1e-3)
+    assert float(alpha["first_true"]) == float(found["first_true"].min())
+    assert not any("averaged" in name for name in found["design"].to_numpy())
+    counted = extent.samples_of(study())
+    samples = dataset.read(done / "samples.nc", "samples")
+    assert samples.sizes["sample"] < sum(counted.values())
+
+
+def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
+    formula.replace_dynamics(monkeypatch.setattr)
+    assert formula.run_in_pieces(study(), str(tmp_path / "out"), alone()) > 4
+    assert contents(tmp_path / "out") == contents(done)
+
+
+@pytest.mark.mpi
+def test_a_search_by_statistics_has_the_same_bytes_on_two_ranks(done, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(study().text)
+    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
+    made = subprocess.run(
+        [str(Path(sys.executable).parent / "mpiexec"), "-n", "2", *program],
+        capture_output=True, text=True, timeout=crowded(120), check=False,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert contents(tmp_path / "out") == contents(done)

@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 
 import moocore
 import numpy as np
+from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.statistics.search.infill import NEAR, eligible
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -187,7 +188,7 @@ def proposals(known: Known, space: Space, count: int, rng: np.random.Generator) 
                 break
             merit = _merit(beliefs, turns[turn % len(turns)], rng)
             point, worth = _best(beliefs, merit, rng)
-            if worth > 0.0 and _apart(point, beliefs):
+            if worth > 0.0:
                 chosen.append(point)
                 beliefs.take(point)
         return np.reshape(chosen, (-1, len(space.bounds)))
@@ -245,7 +246,7 @@ def _merit(
             won = volume(beliefs.believed, mean, deviation)
         else:
             won = _scalarised(beliefs.believed, mean + deviation * noise, weights)
-        return won * beliefs.feasible(points)
+        return won * beliefs.feasible(points) * _apart(points, beliefs)
 
     return function
 
@@ -330,8 +331,9 @@ def _about(centre: Array, step: float, space: Space, rng: np.random.Generator) -
     return np.clip(centre + moves, low, high)
 
 
-def _apart(point: Array, beliefs: Beliefs) -> bool:
-    """Whether a design differs from all that were evaluated or chosen."""
+def _apart(points: Array, beliefs: Beliefs) -> Booleans:
+    """Whether designs differ from all that were evaluated or chosen, (n,)."""
     width = beliefs.space.bounds[:, 1] - beliefs.space.bounds[:, 0]
     others = np.vstack([beliefs.known.designs, beliefs.pending])
-    return bool((np.abs(others - point) / width).max(axis=1).min() > NEAR)
+    steps = cdist(points / width, others / width, "chebyshev")
+    return np.asarray(steps.min(axis=1) > NEAR)
