@@ -26,7 +26,7 @@ from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.copies import kicked, scales
+from hpcclear.dynamics.steady.copies import perturbed, scales
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -53,10 +53,10 @@ class Split(NamedTuple):
 
 
 def gaps_at(scene: Scene, rtol: float, stretches: int) -> tuple[np.ndarray, float]:
-    """Mean gaps (stretches, copies, 2) of kicked copies, and processor seconds of one revolution."""
+    """Mean gaps (stretches, copies, 2) of perturbed copies, and processor seconds of one revolution."""
     here = one_turn(scene, rtol, averaged_revolutions=STRETCH)
     par = parameters(here)
-    start = kicked(start_states(here, par), scales(here), range(5000, 5000 + COPIES))
+    start = perturbed(start_states(here, par), scales(here), range(5000, 5000 + COPIES))
     lanes, rows = Lanes(problem_of(here), 32), np.repeat(par, COPIES, axis=0)
     lanes.step(1)
     found = []

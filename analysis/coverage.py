@@ -3,7 +3,7 @@
     python analysis/coverage.py                  # all studies of analysis/regret.py and the paper's; many minutes
     python analysis/coverage.py press my.toml    # some of them, or a scene with one case of one's own
 
-Designs spread over the box are verified as a study does, at relative tolerances of 1e-4, 1e-5 and 1e-6, some for each tolerance.
+Designs spread over the box are verified as a study does, at relative tolerances of 1e-4, 1e-5 and 1e-6.
 The truth of a design is `TRUTH` simulations at 1e-9, on scatter of their own; its own error is taken into account: an interval
 holds if it meets the truth's interval at one standard error.
 """
@@ -17,7 +17,7 @@ from regret import STUDIES, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.sampling import unit_lhs
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.study import tolerance, truth
 from hpcclear.study.optimisation import Choice
 
@@ -45,8 +45,12 @@ def main() -> None:
         for rtol in TOLERANCES:
             found = np.array(checked(scene.with_({"numerics.rtol": rtol}), designs, exact))
             total += found
-            print(f"{name.split('/')[-1]:16} {rtol:7.0e}  {found[0]}, {found[1]}, {found[2]}", flush=True)
-    print(f"{'all':16} {'':7}  {total[0]} ({total[0] / total[2]:.1%}), {total[1]} ({total[1] / total[2]:.1%}), {total[2]}")  # fmt: skip
+            print(
+                f"{name.split('/')[-1]:16} {rtol:7.0e}  {found[0]}, {found[1]}, {found[2]}",
+                flush=True,
+            )
+    hold, plain, count = total
+    print(f"{'all':16} {'':7}  {hold} ({hold / count:.1%}), {plain} ({plain / count:.1%}), {count}")  # fmt: skip
 
 
 def spread_out(scene: Scene) -> list[Choice]:
@@ -62,10 +66,10 @@ def spread_out(scene: Scene) -> list[Choice]:
 def truths(scene: Scene, designs: list[Choice], count: int) -> np.ndarray:
     """Values and standard errors of mean, deviation and percentile by a strict tolerance, (n, 3, 2)."""
     run = run_of(scene.with_({"numerics.rtol": STRICT}))
-    made = truth.doubled(run, designs, "truth", "truth", count // SCRAMBLINGS, count)
+    made = truth.doubled(run, designs, "truth", "truth", count // REPLICATES, count)
     return np.array(
         [
-            [[one.value, one.error] for one in truth.told_each(run, choice, values[0])[:3]]
+            [[one.value, one.error] for one in truth.estimates_of(run, choice, values[0])[:3]]
             for choice, values in zip(designs, made, strict=True)
         ]
     )

@@ -27,7 +27,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.dynamics.energy import energies
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import KICKS, outcome_records
+from hpcclear.dynamics.evaluator import PERTURBATIONS, outcome_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
@@ -107,7 +107,7 @@ def chunks(lanes: Lanes) -> Iterator[np.ndarray]:
 
 def recorded(scene: Scene) -> tuple[Lanes, np.ndarray, np.ndarray]:
     """One lane that keeps every step, its parameters (1, PARAMETERS) and its start as a row of the record (1, columns)."""
-    problem = problem_of(scene, ledger=True, series=True)
+    problem = problem_of(scene, energies=True, series=True)
     n, par = problem.coordinates, parameters(scene)
     start = start_states(scene, par)
     lanes = Lanes(problem, 1, np.zeros((CHUNK, rec.columns(n))))
@@ -163,8 +163,8 @@ def closed_form(scene: Scene) -> Run:
 
 
 def uncertainty(scene: Scene) -> float:
-    """How far f may be off, by kicked and stricter copies, m."""
-    return float(evaluate_records(scene, NOTHING, 1, KICKS)["objective_uncertainty"][0])
+    """How far f may be off, by perturbed and stricter copies, m."""
+    return float(evaluate_records(scene, NOTHING, 1, PERTURBATIONS)["objective_uncertainty"][0])
 
 
 CASES = ("case", "rtol")
@@ -172,7 +172,7 @@ VARIABLES: Columns = {
     "objective": number(CASES, "m", "objective f"),
     "objective_spread": number(CASES, "m", "standard deviation of f between revolutions"),
     "objective_uncertainty": number(
-        CASES, "m", "how far f may be off, by kicked and stricter copies"
+        CASES, "m", "how far f may be off, by perturbed and stricter copies"
     ),
     "off_reference": number(CASES, "1", "f over f at rtol 1e-10, less 1"),
     "energy_residual": number(

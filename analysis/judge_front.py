@@ -19,7 +19,7 @@ from directly import run_of
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates, to_physical
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import truth
 from hpcclear.study.optimisation import Choice
@@ -49,8 +49,8 @@ def main() -> None:
 
 
 def simulated(scene: Scene, designs: list[Choice], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and deviation, (n, 2), and what each scrambling shifts them by, (2, n, 16)."""
-    length = count // SCRAMBLINGS
+    """Mean and deviation, (n, 2), and what each replicate shifts them by, (2, n, 16)."""
+    length = count // REPLICATES
     found = truth.sequences(run_of(scene), designs, "judge", "judge", length, count)
     values = np.column_stack([found["mean"], found["deviation"]])
     return values, np.stack([found["mean_shifts"], found["deviation_shifts"]])

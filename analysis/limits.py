@@ -5,7 +5,7 @@
     python analysis/limits.py --set study.accuracy.deviation=0.01 --truth 32768
 
 Mean, deviation and 95th percentile of the paper's case 2, as `hpcclear run` finds them: scrambled Sobol sequences,
-doubled until the accuracy asked for is met. Each repeat has scramblings of its own; the truth is one long sequence.
+doubled until the accuracy asked for is met. Each repeat has replicates of its own; the truth is one long sequence.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from directly import run_of
 
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import student
 from hpcclear.study import truth
 from hpcclear.study.optimisation import Choice
@@ -48,7 +48,7 @@ def coverage(scene: Scene, choice: Choice, repeats: int, most: int) -> None:
     """Print in how many repeats each limit holds."""
     run = run_of(scene)
     settings = run.study.verification
-    whole = truth.sequences(run, [choice], "truth", "truth", most // SCRAMBLINGS, most)
+    whole = truth.sequences(run, [choice], "truth", "truth", most // REPLICATES, most)
     exact = [float(whole[name][0]) for name in WORDS]
     held, spent = np.zeros(3, int), 0
     for k in range(repeats):
@@ -81,7 +81,7 @@ def cost(scene: Scene, designs: int = 10, count: int = 1024) -> None:
         Choice("", CASE, {name: float(points.column(name)[k]) for name in names})
         for k in range(designs)
     ]
-    found = truth.sequences(run, rows, "cost", "cost", count // SCRAMBLINGS, count)
+    found = truth.sequences(run, rows, "cost", "cost", count // REPLICATES, count)
     draws = [truth.samples_of(run, row, 4096, "draws") for row in rows]
     normal = student(0.95, 10**6)
     gains = []

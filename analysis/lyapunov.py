@@ -97,7 +97,7 @@ def values(revolutions: int, seeds: int) -> None:
         record = ours(scene)
         found = [theirs(scene, revolutions, seed) for seed in range(seeds)]
         mean, error = np.mean(found), np.std(found, ddof=1) / math.sqrt(len(found))
-        growth, limit = float(record["kick_growth"]), float(record["kick_growth_limit"])
+        growth, limit = float(record["lyapunov_exponent"]), float(record["lyapunov_exponent_limit"])
         print(
             f"{damping:7.2f} {1e3 * clearance:5.2f} mm  {growth:6.3f} +- {limit:.3f}  {mean:6.3f} +- {error:.3f} (s.e.)  "
             f"{growth / mean - 1.0:+.1%}",
@@ -112,7 +112,7 @@ def signs(cells: int) -> None:
     for cell in range(cells):
         damping, clearance = 10.0 ** rng.uniform(-1.7, 0.0), rng.uniform(0.1e-3, 1e-3)
         scene = scene_of(damping, clearance)
-        growth, other = float(ours(scene)["kick_growth"]), theirs(scene, 12, cell)
+        growth, other = float(ours(scene)["lyapunov_exponent"]), theirs(scene, 12, cell)
         if abs(other) < CLOSE:
             other = theirs(scene, 240, cell)
         right += growth * other > 0.0

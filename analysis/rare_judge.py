@@ -3,8 +3,8 @@
     python analysis/rare_judge.py OUT scene.toml                      # carries the study out in OUT, then judges
     python analysis/rare_judge.py OUT scene.toml --most 1e-2 1e-3 1e-4 --simulations 100000
 
-For each allowed probability the study is carried out (or found in OUT), and its recommended design is judged on random inputs that
-the study never saw: `REPEATS` independent subset simulations, whose disagreement is the judge's error. Printed are the allowed
+For each allowed probability the study is carried out (or found in OUT), and its recommended design is judged on random inputs
+that the study never saw: `REPEATS` subset simulations, whose disagreement is the judge's error. Printed are the allowed
 probability, what the study states, what the judge finds, and the first objective.
 
 Source: S.-K. Au and J. L. Beck, "Estimation of small failure probabilities in high dimensions by subset simulation", Prob. Eng.
@@ -64,11 +64,12 @@ def judged(scene: Scene, place: Path, simulations: int) -> None:
     each = np.array(json.loads(kept.read_text()))
     reach = student(0.95, REPEATS - 1) * each.std(ddof=1) / REPEATS**0.5
     print(f"allowed {case.kept[0].most:g}; study: {best['constraints'].item()}")
-    print(f"  judge {each.mean():.3g} ± {reach:.2g} (95 %); first objective {float(best['first_true']):.4f}; {choice.design}", flush=True)  # fmt: skip
+    first = float(best["first_true"])
+    print(f"  judge {each.mean():.3g} ± {reach:.2g} (95 %); first objective {first:.4f}; {choice.design}")  # fmt: skip
 
 
 def probability(scene: Scene, choice: Choice, simulations: int, rng: np.random.Generator) -> float:
-    """The probability that f exceeds the limit of the first constraint, by one subset simulation of about so many simulations."""
+    """The probability that f exceeds the limit of the first constraint, by one subset simulation of about that size."""
     run = run_of(scene)
     goal = scene.required_study.case(choice.case).kept[0]
     levels = 1.0 + max(np.log(goal.most) / np.log(SHARE), 0.0)

@@ -3,9 +3,9 @@
     python analysis/regret.py OUT                          # all studies; each some minutes on one core
     python analysis/regret.py OUT press my_study.toml      # some of them, or a scene with one case of one's own
 
-Each study is carried out twice, with models of f (`study.surrogate.of = "f"`) and of the statistics over designs. The reference
-is a search by expected improvement over far more designs, with `POINTS` simulations each. The recommended designs and the best of
-the reference are then judged together, each by `JUDGED` simulations of the same scatter, which no search has seen.
+Each study is carried out with models of f (`study.surrogate.of = "f"`) and of the statistics over designs. The reference
+is a search by expected improvement over far more designs, with `POINTS` simulations each. The recommended designs and the best
+of the reference are then judged together, each by `JUDGED` simulations of the same scatter, which no search has seen.
 Regret is what the first objective of a recommended design is above the least that was judged, with the standard error of that
 difference. Results are kept in OUT, so that the command goes on where it was stopped.
 """
@@ -25,7 +25,7 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import unit_lhs
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known
@@ -171,7 +171,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, help="another seed than the study's")
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
-    print(f"{'study':24} {'searched by':12} {'R2 of f':>8} {'simulations':>12}  regret of the first objective")
+    print(
+        f"{'study':24} {'searched by':12} {'R2 of f':>8} {'simulations':>12}  regret of the first objective"
+    )
     for name in words.studies:
         scene = scene_of(name)
         if words.seed is not None:
@@ -199,7 +201,7 @@ def measured(place: Path, label: str, scene: Scene) -> None:
         np.save(kept, reference(scene, case))
     rows = [list(one.values()) for one in taken] + np.load(kept).tolist()
     choices = [Choice("", case, dict(zip(names, row, strict=True))) for row in rows]
-    found = told(scene, choices, JUDGED // SCRAMBLINGS, "judge")
+    found = told(scene, choices, JUDGED // REPLICATES, "judge")
     values, shifts = found["goal"][:, 0], found["goal_shifts"][:, 0]
     broken = found["excess"] > 0.0
     least = int(np.where(broken, np.inf, values).argmin())
@@ -233,7 +235,7 @@ def carried_out(scene: Scene, place: Path) -> tuple[Path, int]:
 
 def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict[str, np.ndarray]:
     """What designs come to by so many points of each scrambling."""
-    return truth.sequences(run_of(scene), choices, purpose, purpose, length, length * SCRAMBLINGS)
+    return truth.sequences(run_of(scene), choices, purpose, purpose, length, length * REPLICATES)
 
 
 def reference(scene: Scene, case: str) -> np.ndarray:
@@ -245,9 +247,9 @@ def reference(scene: Scene, case: str) -> np.ndarray:
     tried = None
     unit = unit_lhs(WIDE, len(names), rng)
     where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
-    for round_ in range(ROUNDS + 1):
+    for _ in range(ROUNDS + 1):
         choices = refinement._choices(run, case, where)
-        found = told(scene, choices, POINTS // SCRAMBLINGS, "reference")
+        found = told(scene, choices, POINTS // REPLICATES, "reference")
         count = len(scene.required_study.case(case).goals)
         made = {
             "case": np.array([case] * len(choices)),

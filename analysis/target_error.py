@@ -26,7 +26,7 @@ from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.copies import kicked, scales
+from hpcclear.dynamics.steady.copies import perturbed, scales
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -166,7 +166,7 @@ def _long(
     """f of the copies that ended, over so many revolutions, and where they are then."""
     par = parameters(scene)
     if start is None:
-        start = kicked(start_states(scene, par), scales(scene), range(1000, 1000 + copies))
+        start = perturbed(start_states(scene, par), scales(scene), range(1000, 1000 + copies))
     numerics = {
         "rtol": rtol,
         "atol": None,

@@ -90,7 +90,7 @@ def errors(one: Found, exact: Found) -> tuple[float, float]:
 
 
 def work_for(error: float, ladder: list[tuple[float, float]]) -> float:
-    """Evaluations for an error by the first two rungs (error, evaluations) about it; NaN where there are none."""
+    """Evaluations for an error by the first two tolerances (error, evaluations) about it; NaN where there are none."""
     for (worse, few), (better, many) in itertools.pairwise(ladder):
         if worse >= error >= better:
             share = np.log(worse / error) / np.log(worse / better)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import KICKS
+from hpcclear.dynamics.evaluator import PERTURBATIONS
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
@@ -42,7 +42,9 @@ def main() -> None:
         points = latin_hypercube(scene, words.designs)
         truth = evaluate_records(scene.with_({"numerics.rtol": TRUTH}), points)["objective"]
         for rtol in TOLERANCES:
-            found = evaluate_records(scene.with_({"numerics.rtol": rtol}), points, kicks=KICKS)
+            found = evaluate_records(
+                scene.with_({"numerics.rtol": rtol}), points, perturbations=PERTURBATIONS
+            )
             error, stated = np.abs(found["objective"] - truth), found["objective_uncertainty"]
             held = np.mean(error <= stated)  # what is not known is not held
             known = np.isfinite(error) & np.isfinite(stated)

@@ -21,7 +21,7 @@ from scenes import JOB, LAWS, ensemble
 
 from hpcclear import load_scene
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_reported
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.scene import Scene
 
@@ -98,7 +98,7 @@ def task(scene: Scene, samples: int) -> Callable[[], np.ndarray]:
 
     def run() -> np.ndarray:
         outcome = Lanes(made.problem, DEFAULT_LANES).run(made.par, made.start)
-        told = responses_told(made.problem)
+        told = responses_reported(made.problem)
         records = outcome_records(np.arange(samples), outcome, made.par, told, False, objective)
         return np.asarray(asked(records, objective)["objective"])
 

@@ -26,10 +26,10 @@ class Cells(Tree):
         super().handle_data(f" {text} ")
 
 
-Told = tuple[str, float, float]
+GoalValue = tuple[str, float, float]
 
 
-def told(text: str) -> Iterator[Told]:
+def told(text: str) -> Iterator[GoalValue]:
     """Numbers of a text that tell something, and from where to where what they stand for lies, as 1 to 10."""
     for match in NUMBER.finditer(text):
         digits = match[1].replace(".", "").lstrip("0")
@@ -120,7 +120,7 @@ def leading(values: Iterable[float]) -> Array:
     return np.sort(10.0 ** (np.log10(sizes[np.isfinite(sizes) & (sizes > 0.0)]) % 1.0))
 
 
-def foreign(numbers: Iterable[Told], known: Array) -> list[str]:
+def foreign(numbers: Iterable[GoalValue], known: Array) -> list[str]:
     """Numbers that are none of the known ones."""
     return [
         text

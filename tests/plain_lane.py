@@ -18,7 +18,7 @@ from hpcclear.dynamics.physics import angles, friction
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
 GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
-EVERYTHING = On(friction=True, gravity=True, ledger=True, series=True)
+EVERYTHING = On(friction=True, gravity=True, energies=True, series=True)
 CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
 FREE = 500  # rows of what the joints write
 BLOCKS = 700  # of their parameters
@@ -52,7 +52,7 @@ def plain_law(law):
     return types.SimpleNamespace(latched=law.latched, bristled=law.bristled, **own)
 
 
-_ON = effects_with({"fixed", "coulomb", "ledger", "series"})
+_ON = effects_with({"fixed", "coulomb", "energies", "series"})
 EFFECTS = _ON._replace(contact=plain_law(_ON.contact), friction=plain_law(_ON.friction))
 
 

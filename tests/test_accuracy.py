@@ -43,7 +43,7 @@ PRESSED = TWIN.with_(
 TINY = replace(
     QUICK,
     name="tiny",
-    rungs=(1e-3, 1e-5, 1e-7),
+    tolerances=(1e-3, 1e-5, 1e-7),
     designs=1,
     repeats=1,
     revolutions=16,
@@ -67,7 +67,7 @@ def silent(text: str) -> None:
 
 @pytest.mark.full  # test_order.py has it of steps of one length
 def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
-    profile = replace(TINY, rungs=tuple(2.5 * 10.0 ** (-k / 2.0) for k in range(14, 22)))
+    profile = replace(TINY, tolerances=tuple(2.5 * 10.0 ** (-k / 2.0) for k in range(14, 22)))
     found = integration.measure(PRESSED, profile, silent)
     velocity = found.order[:, QUANTITIES.index("slider_velocity")]
     order = dict(zip(found.methods, velocity, strict=True))
@@ -125,8 +125,8 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
 def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
     """scipy on the generated equations, and the kernel; a revolution of a free crank ends at an angle, not at a time."""
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
-    # Pressed against its bearings; left alone it rattles, and a kick grows by e^10 in this revolution. With -20, which the
-    # motor can turn, contacts still come and go: the error of one method is 0.003 or 4 times its first there.
+    # Pressed against its bearings; left alone it rattles, and a perturbation grows by e^10 in this revolution. With -20, which
+    # the motor can turn, contacts still come and go: the error of one method is 0.003 or 4 times its first there.
     hold = {"kind": "torque", "body": "rocker", "torque": -20.0 if drive == "torque" else -120.0}
     scene = scene.with_({"mechanism.loads": {"hold": hold}})
     if drive == "torque":
@@ -401,7 +401,7 @@ def test_without_clearance_there_is_nothing_to_measure():
 
 def test_profiles_differ_in_size_only():
     assert set(vars(QUICK)) == set(vars(FULL))
-    assert set(QUICK.rungs) < set(FULL.rungs) | {1e-11}
+    assert set(QUICK.tolerances) < set(FULL.tolerances) | {1e-11}
 
 
 def test_an_event_has_one_value_at_one_time():

@@ -167,8 +167,8 @@ def test_limits_that_are_not_known_are_no_numbers():
 
 
 def test_limits_are_told_so_far_that_they_differ():
-    told_apart = told(verified(MEAN, DEVIATION, half=1e-9))
-    assert "(95 % CI 0.199999 mm to 0.200001 mm)" in told_apart["mean"]
+    distinguished = told(verified(MEAN, DEVIATION, half=1e-9))
+    assert "(95 % CI 0.199999 mm to 0.200001 mm)" in distinguished["mean"]
     assert "(95 % CI 0.199 mm to 0.201 mm)" in told(verified(MEAN, DEVIATION))["mean"]
 
 
@@ -271,7 +271,7 @@ def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, 
 
 
 def test_designs_of_nearly_the_same_merit_are_listed_and_the_lightest_of_them():
-    """Told apart by their intervals, and 0.4 % from the least mean + 2 deviations: no "none" without them."""
+    """GoalValue apart by their intervals, and 0.4 % from the least mean + 2 deviations: no "none" without them."""
     near = verified([4e-4, 2e-4, 3e-4, 2.005e-4, 1e-4], [6e-5, 4e-5, 4e-5, 4.03e-5, 1e-5], 1e-8)
     near["m2"][1], near["m2"][3] = 0.24, 0.1
     lines = told(near)

@@ -14,7 +14,7 @@ from hpcclear import report
 from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE, KICKS
+from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE, PERTURBATIONS
 from hpcclear.ensemble.api import as_points
 
 ROOT = Path(__file__).parents[1]
@@ -85,7 +85,7 @@ def test_a_response_has_the_bits_of_the_sample_and_its_series_belong_to_it():
 def test_by_itself_a_response_is_integrated_as_a_sample_and_checked_by_its_replicas_and_more():
     scene = hpcclear.load_scene(SCENE, SHORT)
     response = hpcclear.simulate(scene)
-    sample = evaluate_records(scene, as_points(scene, {"m1": 0.3}), kicks=KICKS)[0]
+    sample = evaluate_records(scene, as_points(scene, {"m1": 0.3}), perturbations=PERTURBATIONS)[0]
     assert response.attrs["integrator"] == "tsitouras"
     farthest = float(response["objective_uncertainty"]) / COVERAGE_ALONE
     assert farthest >= float(sample["objective_uncertainty"]) / COVERAGE * (1.0 - 1e-12) > 0.0
@@ -95,7 +95,7 @@ def test_by_itself_a_response_is_integrated_as_a_sample_and_checked_by_its_repli
 def test_commands_are_functions_that_return_datasets(tmp_path):
     scene = hpcclear.load_scene("jobs/hunt_crossley.toml", SHORT)
     cells = hpcclear.map(scene, "C=0.2mm:0.4mm:2", output=tmp_path / "map.nc", progress="quiet")
-    assert cells["kick_growth"].dims == ("C",)
+    assert cells["lyapunov_exponent"].dims == ("C",)
     np.testing.assert_allclose(cells["C"], [2e-4, 4e-4])
     assert (tmp_path / "map.nc").exists()
     seen = hpcclear.bifurcation(

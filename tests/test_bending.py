@@ -77,7 +77,7 @@ class Text:
     """A generated text read by Python, its joints with clearance exerting given forces and moments on bearing and journal."""
 
     def __init__(self, mech, loads=None, cartesian=False, hoist=True):
-        self.on = On(friction=True, gravity=True, ledger=True, series=True)
+        self.on = On(friction=True, gravity=True, energies=True, series=True)
         self.motion = generate(mech, self.on, Rows(), cartesian=cartesian, hoist=hoist)
         base = values(mech, cartesian, gravity=GRAVITY, feedback=(0.0, 0.0))
         self.par = row_of(self.motion, base)
@@ -470,7 +470,7 @@ def test_rods_however_soft_or_stiff_end_in_a_stated_way(contact):
 
 
 def test_errors_of_stiff_modes_hold_no_more_energy_than_those_of_their_speeds():
-    """So that kicks to copies, which are so many tolerances, are no blows: to each mode some 10 um/s."""
+    """So that perturbations to copies, which are so many tolerances, are no blows: to each mode some 10 um/s."""
     for stiffness in (10.0, 1e3, 1e9):
         scene = bending(stiffness=stiffness, modes=3)
         size = scales(scene)

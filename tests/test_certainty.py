@@ -9,7 +9,7 @@ import pytest
 from hpcclear.base.errors import InputError
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import SCRAMBLINGS, Verification
+from hpcclear.scene.stages import REPLICATES, Verification
 from hpcclear.statistics.random.replicates import limits, moments, quantile, student, surely_less
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
@@ -22,9 +22,9 @@ CASE = ("C", "m2", "m3", "u2", "I2")
 DESIGN = {"m2": 0.2, "m3": 0.14, "u2": 0.06, "I2": 3e-4}
 
 
-def points(scene, count=64, first=0, scrambling=0, **more):
+def points(scene, count=64, first=0, replicate=0, **more):
     return monte_carlo(
-        scene, count, random=CASE, design=DESIGN, first=first, scrambling=scrambling, **more
+        scene, count, random=CASE, design=DESIGN, first=first, replicate=replicate, **more
     ).values
 
 
@@ -43,7 +43,7 @@ def test_scramblings_purposes_and_seeds_differ():
     other = load_scene(ROBUST, ["study.seed=21"])
     made = [
         points(scene),
-        points(scene, scrambling=1),
+        points(scene, replicate=1),
         points(scene, purpose="search"),
         points(other),
     ]
@@ -54,7 +54,7 @@ def test_scramblings_purposes_and_seeds_differ():
 def test_every_scrambling_is_balanced_in_every_input():
     """64 points: one in each 64th of every random input's range."""
     scene = load_scene(ROBUST)
-    names = monte_carlo(scene, 64, random=CASE, design=DESIGN, scrambling=3)
+    names = monte_carlo(scene, 64, random=CASE, design=DESIGN, replicate=3)
     for name, (middle, half) in {
         "m2": (0.2, 0.005),
         "u2": (0.06, 0.02),
@@ -80,7 +80,7 @@ def sobol(dimensions, length, seed):
 
     rng = np.random.default_rng(seed)
     return np.stack(
-        [qmc.Sobol(dimensions, scramble=True, rng=rng).random(length) for _ in range(SCRAMBLINGS)]
+        [qmc.Sobol(dimensions, scramble=True, rng=rng).random(length) for _ in range(REPLICATES)]
     )
 
 
@@ -227,17 +227,21 @@ def test_who_contests_an_end_gets_more_simulations(monkeypatch):
     assert contested(monkeypatch, 4, "given") == [512, 512, 512]
 
 
+def outliers(rng, shape):
+    return 0.1 * rng.standard_normal(shape) + 3.0 * (rng.random(shape) < 0.02)
+
+
 @pytest.mark.parametrize(
     ("draw", "exact", "least"),
     [
         (np.random.Generator.standard_normal, 1.0, 0.92),
         (lambda rng, shape: rng.lognormal(size=shape), ((np.e - 1.0) * np.e) ** 0.5, 0.87),
-        (lambda rng, shape: 0.1 * rng.standard_normal(shape) + 3.0 * (rng.random(shape) < 0.02), (0.01 + 9.0 * 0.02 * 0.98) ** 0.5, 0.92),
+        (outliers, (0.01 + 9.0 * 0.02 * 0.98) ** 0.5, 0.92),
     ],
     ids=["normal", "lognormal", "a few far off"],
 )  # fmt: skip
 def test_limits_of_a_deviation_that_few_values_carry_hold(draw, exact, least, shift):
-    """Of 512 values in 400 repetitions. Symmetric limits hold 82 % for the lognormal ones, whose sample may miss its own tail."""
+    """Of 512 values in 400 repetitions. Symmetric limits hold 82 % for the lognormal ones, whose samples miss their tail."""
     rng, held = np.random.default_rng(shift), 0
     for _ in range(400):
         low, high = limits(moments(draw(rng, (16, 32)))[1], 0.95)

@@ -178,7 +178,7 @@ def test_chaos_is_averaged_where_that_helps_and_not_believed_where_it_does_not()
     assert quiet.book.replicates((0,)) > 16  # it took more than a first look
     loud = followed(lambda off: 0.0, 1, noise=0.5)
     assert loud.recommended == ()
-    assert loud.book.verdict((0,)) is Verdict.UNTOLD
+    assert loud.book.verdict((0,)) is Verdict.UNDECIDED
     assert loud.book.replicates((0,)) == 256
 
 
@@ -232,7 +232,7 @@ def test_what_takes_no_work_at_all_is_cheapest():
 
 def test_what_fails_is_not_simulated_on():
     found = followed(lambda off: np.nan if off == (0,) else 0.0, 2)
-    assert found.book.verdict((0,)) is Verdict.UNTOLD
+    assert found.book.verdict((0,)) is Verdict.UNDECIDED
     assert found.book.replicates((0,)) == 16
     assert found.recommended == (1,)
 
@@ -671,9 +671,9 @@ def test_what_cannot_be_told_says_what_would_tell(certified):
     content = dataset.read(place / "e.nc", "effects")
     gravity = int(np.argmax(content["off"].sel(effect="gravity").to_numpy()))
     row = {"variant": gravity, "response": 0}
-    for name, value in (("change", 0.01), ("limit", 0.03), ("told", 2)):
+    for name, value in (("change", 0.01), ("limit", 0.03), ("finding", 2)):
         content[name][row] = value
-    content["decision"][gravity] = int(Verdict.UNTOLD)
+    content["decision"][gravity] = int(Verdict.UNDECIDED)
     # 64 samples whose limits are three times too wide
     assert "undecided with 64 samples, about 600 would suffice" in statement(content, gravity, {})
     content["change"][row] = 0.025

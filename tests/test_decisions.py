@@ -61,9 +61,9 @@ def test_what_breaks_a_constraint_is_hardly_ever_called_kept(share, shift):
             for length in (32, 64, 128, 256, 512, 1024):
                 seen = values[:, :length]
                 if verdicts.settled(goal, seen, Choice("", "", {}), settings, 12):
-                    told = goals.told(goal, seen, {}, verdicts.level(settings, 12, seen.size))
+                    told = goals.goal_value(goal, seen, {}, verdicts.level(settings, 12, seen.size))
                     wrong += (
-                        verdicts.of_limits(goal, told, seen.size, 0.9).standing is Standing.KEPT
+                        verdicts.of_interval(goal, told, seen.size, 0.9).standing is Standing.KEPT
                     )
                     break
     assert wrong <= most(300, 0.05), wrong
@@ -72,15 +72,15 @@ def test_what_breaks_a_constraint_is_hardly_ever_called_kept(share, shift):
 def test_what_is_not_decided_has_a_price():
     """Half the reach needs four times the simulations; where nothing was exceeded the upper limit falls as one over them."""
     goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
-    one = goals.Told(0.008, 0.004, 0.012, np.zeros(16))
-    assert verdicts.of_limits(goal, one, 2048, 0.95) == (Standing.UNDECIDED, 8192.0)
-    none = goals.told(goal, np.zeros((16, 8)), {}, 0.95)
-    found = verdicts.of_limits(goal, none, 128, 0.95)
+    one = goals.GoalValue(0.008, 0.004, 0.012, np.zeros(16))
+    assert verdicts.of_interval(goal, one, 2048, 0.95) == (Standing.UNDECIDED, 8192.0)
+    none = goals.goal_value(goal, np.zeros((16, 8)), {}, 0.95)
+    found = verdicts.of_interval(goal, none, 128, 0.95)
     assert found == (Standing.UNDECIDED, 512.0)  # 368, by doubling
-    enough = goals.told(goal, np.zeros((16, 32)), {}, 0.95)
-    assert verdicts.of_limits(goal, enough, 512, 0.95).standing is Standing.KEPT
-    at = goals.Told(0.01, 0.004, 0.012, np.zeros(16))
-    assert np.isnan(verdicts.of_limits(goal, at, 2048, 0.95).price)
+    enough = goals.goal_value(goal, np.zeros((16, 32)), {}, 0.95)
+    assert verdicts.of_interval(goal, enough, 512, 0.95).standing is Standing.KEPT
+    at = goals.GoalValue(0.01, 0.004, 0.012, np.zeros(16))
+    assert np.isnan(verdicts.of_interval(goal, at, 2048, 0.95).price)
 
 
 def test_designs_that_surely_satisfy_all_constraints_come_first():

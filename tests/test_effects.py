@@ -114,7 +114,7 @@ ZEROS = {  # flags of the kernel and rows of parameters, or entries of the scene
     "load": ({}, {}, {"effects.slider_load": 0.0}),
     "load_table": ({}, {}, {"effects.slider_load": [[0.0, 0.0], [3.0, 0.0]]}),
     "guide": ({}, {}, {"effects.guide_friction": {"coefficient": 0.0}}),
-    "film": (dict.fromkeys(("film", "short_film", "long_film"), 1), {}, {}),  # of no viscosity
+    "film": ({"films": ("short", "long", *[None] * 6)}, {}, {}),  # of no viscosity
 }
 
 
@@ -154,7 +154,7 @@ def test_hunt_crossley_without_damping_is_hertz():
 def test_looking_on_changes_nothing(without):
     """Energies and forces for time series leave the motion alone."""
     scene = scene_with({"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}})
-    assert_same_motion(run(scene, ledger=True, series=True), without)
+    assert_same_motion(run(scene, energies=True, series=True), without)
 
 
 def torque_scene(flywheel, torque, revolutions=1, rtol=1e-9):
@@ -165,7 +165,7 @@ def torque_scene(flywheel, torque, revolutions=1, rtol=1e-9):
 @pytest.mark.parametrize(("flywheel", "torque"), [(1e-3, 10.0), (1e-2, -20.0)])
 def test_torque_drive_keeps_the_energy_balance(flywheel, torque):
     scene = torque_scene(flywheel, torque, revolutions=3)
-    result = run(scene, ledger=True)
+    result = run(scene, energies=True)
     rest, passed = energy_residual(scene, result)
     assert abs(rest) < 1e-6 * passed
 
@@ -173,10 +173,10 @@ def test_torque_drive_keeps_the_energy_balance(flywheel, torque):
 @pytest.mark.full
 def test_a_heavy_flywheel_tends_to_constant_speed_like_its_inverse():
     """The crank's speed is disturbed by 1/J, and so is the state after one turn: ten times heavier, a tenth."""
-    constant = run(scene_with({"effects.contact": HUNT_CROSSLEY}, rtol=1e-11), ledger=True)
+    constant = run(scene_with({"effects.contact": HUNT_CROSSLEY}, rtol=1e-11), energies=True)
     differences = []
     for flywheel in (1e2, 1e3, 1e4):
-        free = run(torque_scene(flywheel, 0.0, rtol=1e-11), ledger=True)
+        free = run(torque_scene(flywheel, 0.0, rtol=1e-11), energies=True)
         change = np.concatenate(
             [free.q[-1, :4] - constant.q[-1], (free.v[-1, :4] - constant.v[-1]) / 500]
         )

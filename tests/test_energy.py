@@ -44,7 +44,7 @@ def test_energy_balance_closes(contact: dict, rtol: float):
     response = simulate(paper_case(contact, rtol))
     assert response.status == 0
     assert residual(response) < BOUNDS[rtol]
-    # a ledger of zeros would close, too: damping and friction take out far more than the residual
+    # a balance of zeros would close, too: damping and friction take out far more than the residual
     assert float(response.dissipated_energy[-1]) > 1e4 * BOUNDS[rtol]
     assert (np.diff(response.dissipated_energy) > -1e-9).all()
 

@@ -196,7 +196,7 @@ def test_a_plan_answers_row_by_row(monkeypatch, capsys):
     """A first look at once, then each rung as it is measured, and its samples counted meanwhile."""
     monkeypatch.setattr(planning, "_busy", lambda *others: (1e-3, np.zeros(1, OUTCOME)))
     monkeypatch.setattr(planning, "cost", lambda scene, *others: (2e-3, np.zeros(1, OUTCOME)))
-    monkeypatch.setattr(planning.telling, "in_short", lambda *given: "")
+    monkeypatch.setattr(planning.wording, "in_short", lambda *given: "")
     seen: list[str] = []
     variables = {"m3": {"range": [0.07, 0.28]}}
     scene = load_scene(JOBS / "hunt_crossley.toml").with_(

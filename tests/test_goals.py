@@ -182,7 +182,7 @@ def test_what_is_told_and_guessed_of_a_goal() -> None:
              Goal(statistic="exceedance", limit=3.0), Goal(formula="a*b")]  # fmt: skip
     exact = [0.0, SPREAD, SPREAD * stats.norm.ppf(0.9), stats.norm.sf(3.0 / SPREAD), 6.0]
     for goal, truth in zip(asked, exact, strict=True):
-        found = goals.told(goal, values, {"a": 2.0, "b": 3.0}, 0.95)
+        found = goals.goal_value(goal, values, {"a": 2.0, "b": 3.0}, 0.95)
         assert found.lower <= truth <= found.upper
         assert found.value == pytest.approx(truth, abs=0.06)  # of 4096 points
         guess = goals.guessed(

@@ -164,7 +164,7 @@ def test_every_number_that_is_not_finite_is_refused(latched: Scene, bad: float):
 @pytest.mark.parametrize("bad", BAD)
 def test_kernel_survives_every_number_that_is_not_finite(latched: Scene, bad: float):
     """Behind the validation: each parameter and each part of the start state in turn, one sample each."""
-    problem = problem_of(latched, ledger=True, series=True)
+    problem = problem_of(latched, energies=True, series=True)
     par = np.repeat(parameters(latched), Parameters.size + Start.size, axis=0)
     start = start_states(latched, par)
     for k in range(Parameters.size):

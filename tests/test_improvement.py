@@ -1,4 +1,4 @@
-"""Expected improvement: closed forms against draws, searches of noisy functions, constraints, catalogues, and when it is used."""
+"""Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
 
 import subprocess
 import sys

@@ -23,7 +23,7 @@ from hpcclear.ensemble.wear import check_worn
 from hpcclear.report import fan_figure, survival_figure
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_limits
+from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_interval
 
 SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
 PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
@@ -228,7 +228,7 @@ def test_a_life_ends_where_a_limit_is_passed_first():
 
 
 def test_limits_of_shares_are_clopper_and_pearsons():
-    lower, upper = share_limits(np.array([0, 3, 20]), 20)
+    lower, upper = share_interval(np.array([0, 3, 20]), 20)
     assert lower[0] == 0.0
     assert upper[2] == 1.0
     assert binom.sf(2, 20, lower[1]) == pytest.approx(0.025, rel=1e-9)

@@ -56,7 +56,7 @@ def scene() -> Scene:
 
 def state_after(scene: Scene, tableau: Tableau, steps: int) -> np.ndarray:
     """Coordinates, velocities and both mean gaps after a stretch in equal steps."""
-    problem = replace(problem_of(scene, ledger=True), tableau=tableau)
+    problem = replace(problem_of(scene, energies=True), tableau=tableau)
     problem = ConstantSteps(**vars(problem))
     par = parameters(scene)
     p = Parameters(par)

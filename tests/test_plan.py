@@ -88,7 +88,7 @@ def test_simulations_of_a_study_are_counted():
 
 def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
     told: list[str] = []
-    found = measure(SCENE, alone(), (1e-2, 1e-5), tell=told.append)
+    found = measure(SCENE, alone(), (1e-2, 1e-5), notify=told.append)
     assert told == [
         f"measuring {k} of 3: {what}"
         for k, what in (

@@ -43,8 +43,8 @@ def cells(*shape: int) -> xr.Dataset:
         attributes = {"role": "design_variable", "scene_path": "drive.speed", "units": "rad/s"}
         samples["drive_speed"] = ("sample", np.pi * (1 + grid[1]), attributes)
     for name, values in {
-        "kick_growth": np.linspace(-2, 1, count),
-        "kick_growth_limit": np.full(count, 0.1),
+        "lyapunov_exponent": np.linspace(-2, 1, count),
+        "lyapunov_exponent_limit": np.full(count, 0.1),
         "objective_limit": np.full(count, 1e-6),
         "period": np.where(np.arange(count) < 3, 1.0, np.nan),
         "attractors": np.ones(count),

@@ -122,7 +122,7 @@ def test_sobol_and_latin_hypercube_have_them_with_few_points(name: str) -> None:
     entry, (mean, deviation, _) = CLOSED[name]
     scene = _with("C", **entry)
     sobol = [
-        monte_carlo(scene, 1024, random=("C", "m2"), design=DESIGN, scrambling=k).column("C")
+        monte_carlo(scene, 1024, random=("C", "m2"), design=DESIGN, replicate=k).column("C")
         for k in range(4)
     ]
     strata = sampled(scene.with_({"study.method": "random-lhs", "study.samples": 4096}))
@@ -132,12 +132,12 @@ def test_sobol_and_latin_hypercube_have_them_with_few_points(name: str) -> None:
 
 
 @EACH
-@pytest.mark.parametrize("scrambling", [None, 3])
-def test_samples_do_not_depend_on_how_many_are_drawn(name: str, scrambling: int | None) -> None:
+@pytest.mark.parametrize("replicate", [None, 3])
+def test_samples_do_not_depend_on_how_many_are_drawn(name: str, replicate: int | None) -> None:
     scene = _with("C", **CLOSED[name][0]).with_({"study.correlation": MOULD})
-    whole = monte_carlo(scene, 1024, design=DESIGN, scrambling=scrambling).values
+    whole = monte_carlo(scene, 1024, design=DESIGN, replicate=replicate).values
     for first, count in ((0, 1), (1, 1), (2, 6), (512, 512)):
-        part = monte_carlo(scene, count, design=DESIGN, first=first, scrambling=scrambling).values
+        part = monte_carlo(scene, count, design=DESIGN, first=first, replicate=replicate).values
         assert (part == whole[first : first + count]).all()
 
 

@@ -98,7 +98,7 @@ def test_limits_of_a_rare_failure_hold(name, limit, shift):
     f, dimensions, exact = CASES[name]
     share = float(exact(limit))
     made = [estimated(f, dimensions, limit, 1000 * shift + seed) for seed in range(20)]
-    found = [one.told(0.95) for one in made]
+    found = [one.interval(0.95) for one in made]
     assert np.mean([one.simulations for one in made]) < 1e4
     held = sum(one.lower <= share <= one.upper for one in found)
     assert held >= fewest(20, 0.93), held
@@ -111,9 +111,9 @@ def test_limits_of_a_rare_failure_hold(name, limit, shift):
 def test_limits_of_a_rare_failure_hold_what_the_tolerance_takes(off, expected):
     """A plane that is too low by a tenth: at 3.1 its probability is 1.37 times larger at a stricter tolerance."""
     made = estimated(plane, 4, 3.1, 3)
-    before = made.told(0.95)
+    before = made.interval(0.95)
     answered(made.paired(0.0), lambda u: plane(u) + off)
-    found = made.told(0.95)
+    found = made.interval(0.95)
     assert made.factor == pytest.approx(expected, abs=0.15)
     assert (found.lower, found.upper) == pytest.approx(
         (before.lower / made.factor, before.upper * made.factor)
@@ -125,7 +125,7 @@ def test_limits_of_a_rare_failure_hold_what_the_tolerance_takes(off, expected):
 def test_what_cannot_fail_has_an_upper_limit_all_the_same():
     """f is bounded below the limit; an upper limit is that of a lower level."""
     made = estimated(lambda u: np.tanh(plane(u)), 3, 1.0 + 1e-9, 1)
-    found = made.told(0.95)
+    found = made.interval(0.95)
     assert (found.value, found.lower) == (0.0, 0.0)
     assert 0.0 < found.upper < 1e-6
     soon = Rare(3, 1.0 + 1e-9, negligible=1e-2)
@@ -140,7 +140,7 @@ def test_values_that_failed_are_left_out_and_weights_are_bounded():
     made = estimated(failing, 3, 3.1, 5)
     assert (made.weights <= 1.0 / OWN).all()
     share = stats.norm.sf(3.1)
-    found = made.told(0.95)
+    found = made.interval(0.95)
     assert 0.5 * share < found.value < 3.0 * share
 
 

@@ -190,7 +190,7 @@ def test_a_small_record_changes_no_step():
         {"numerics.method": "dormand-prince"}
     )
     steps, _, _ = integrate(scene)
-    problem, par = problem_of(scene, ledger=True, series=True), parameters(scene)
+    problem, par = problem_of(scene, energies=True, series=True), parameters(scene)
     n = problem.coordinates
     chunks = kept_steps(problem, par, start_states(scene, par), 50, 1_000_000)
     rows = np.concatenate(chunks)

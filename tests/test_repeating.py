@@ -50,7 +50,7 @@ def test_what_was_made_here_is_the_same(made):
         "samples.nc: 5 of 12 samples: the same",
     ]
     (alone,) = repeated(made / "samples.nc", 100)
-    assert alone.told == "12 of 12 samples"
+    assert alone.extent == "12 of 12 samples"
 
 
 def test_a_last_bit_tells(made, tmp_path):
@@ -89,7 +89,7 @@ def test_a_scene_that_reads_otherwise_is_not_simulated(made, tmp_path):
     def rehash(content):
         content.attrs["scene_hash"] = "0" * 64
 
-    assert "reads otherwise" in changed(made, tmp_path, "samples.nc", rehash)["told"]
+    assert "reads otherwise" in changed(made, tmp_path, "samples.nc", rehash)["extent"]
 
 
 def test_a_scene_that_is_none_is_refused(made, tmp_path):
@@ -101,7 +101,7 @@ def test_a_scene_that_is_none_is_refused(made, tmp_path):
             made, tmp_path, "samples.nc", change
         )  # in a directory the others are compared all the same
         assert found["unread"]
-        assert str(found["told"]).startswith("not simulated")
+        assert str(found["extent"]).startswith("not simulated")
         with pytest.raises(InputError):
             list(repeated(tmp_path / "samples.nc", 5))
     assert write_crate(tmp_path).exists()

@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from hpcclear.ranks.schedule import QUANTUM, Desk, HandOut, Need, allot
+from hpcclear.ranks.schedule import QUANTUM, HandOut, Need, WorkQueue, allot
 
 
 class SimulatedWorker:
@@ -44,7 +44,7 @@ def simulate(costs: np.ndarray, ranks: int, lanes: int) -> float:
     """Summed busy time over ranks x makespan; root answers between its quanta, as in a job."""
     book = HandOut(costs.size, np.empty(0, np.int64), ranks)
     workers = [SimulatedWorker(lanes) for _ in range(ranks)]
-    desks = [Desk(worker, lambda worker=worker: worker.now) for worker in workers]
+    queues = [WorkQueue(worker, lambda worker=worker: worker.now) for worker in workers]
     requests: deque[tuple[float, int]] = deque()
     replies: list[tuple[float, tuple] | None] = [None] * ranks
     asked = [False] * ranks
@@ -52,31 +52,31 @@ def simulate(costs: np.ndarray, ranks: int, lanes: int) -> float:
     finished = np.zeros(ranks)
     while not book.done:
         now, rank = heapq.heappop(turns)
-        desk, worker = desks[rank], workers[rank]
+        queue, worker = queues[rank], workers[rank]
         worker.now = now
         if rank == 0:
             while requests and requests[0][0] <= now:
                 other = requests.popleft()[1]
-                index, ask_below = book.grant(desks[other].need)
+                index, ask_below = book.grant(queues[other].need)
                 replies[other] = (now, (index, costs[index], ask_below))
-            if desk.hungry:
-                index, ask_below = book.grant(desk.need)
-                desk.take(index, costs[index], ask_below)
+            if queue.hungry:
+                index, ask_below = book.grant(queue.need)
+                queue.take(index, costs[index], ask_below)
         else:
             reply = replies[rank]
             if reply is not None and reply[0] <= now:
-                desk.take(*reply[1])
+                queue.take(*reply[1])
                 asked[rank], replies[rank] = False, None
-            if desk.hungry and not asked[rank]:
+            if queue.hungry and not asked[rank]:
                 requests.append((now, rank))
                 asked[rank] = True
-        if desk.idle:
+        if queue.idle:
             worker.now = now + 0.005
         else:
-            book.accept(desk.work(QUANTUM))
+            book.accept(queue.work(QUANTUM))
             finished[rank] = worker.now
         heapq.heappush(turns, (worker.now, rank))
-    return sum(desk.busy for desk in desks) / (ranks * finished.max())
+    return sum(queue.busy for queue in queues) / (ranks * finished.max())
 
 
 def tenfold(total: int, mean: float) -> np.ndarray:
@@ -164,23 +164,23 @@ def test_the_pace_of_a_stage_is_known_to_the_next_like_it():
     recent = np.zeros(2)
     for expected in (0.0, 10.0):
         worker = SimulatedWorker(1)
-        desk = Desk(worker, lambda worker=worker: worker.now, recent)
-        assert desk.need.rate == pytest.approx(expected)
-        desk.take(np.arange(20), np.column_stack([np.full(20, 0.1)]).ravel(), 1)
-        while not desk.idle:
-            desk.work(1.0)
+        queue = WorkQueue(worker, lambda worker=worker: worker.now, recent)
+        assert queue.need.rate == pytest.approx(expected)
+        queue.take(np.arange(20), np.column_stack([np.full(20, 0.1)]).ravel(), 1)
+        while not queue.idle:
+            queue.work(1.0)
 
 
 def test_a_rank_looks_out_before_it_is_hungry():
     worker = SimulatedWorker(1)
-    desk = Desk(worker, lambda: worker.now, np.array([1000.0, 1.0]))  # a thousand a second
-    desk.take(np.arange(200), np.full(200, 1e-3), 10)
-    assert not desk.soon_hungry
-    desk.work(0.15)  # 50 are left, which it finishes within two quanta
-    assert not desk.hungry
-    assert desk.soon_hungry
-    desk.exhausted = True
-    assert not desk.soon_hungry
+    queue = WorkQueue(worker, lambda: worker.now, np.array([1000.0, 1.0]))  # a thousand a second
+    queue.take(np.arange(200), np.full(200, 1e-3), 10)
+    assert not queue.soon_hungry
+    queue.work(0.15)  # 50 are left, which it finishes within two quanta
+    assert not queue.hungry
+    assert queue.soon_hungry
+    queue.exhausted = True
+    assert not queue.soon_hungry
 
 
 @pytest.mark.parametrize("completed", [[3], [-1], [1, 1]])
@@ -194,12 +194,12 @@ def test_a_desk_knows_its_samples_when_the_worker_raises():
         def advance(self, seconds: float) -> np.ndarray:
             raise ArithmeticError
 
-    desk = Desk(Failing(1))
-    desk.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
-    assert desk.suspects == []
+    queue = WorkQueue(Failing(1))
+    queue.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
+    assert queue.suspects == []
     with pytest.raises(ArithmeticError):
-        desk.work()
-    assert desk.suspects == [3, 7]
+        queue.work()
+    assert queue.suspects == [3, 7]
 
 
 @pytest.mark.parametrize("strange", [[5], [7, 7], [-1]])
@@ -208,7 +208,7 @@ def test_a_worker_may_only_return_what_it_was_given_and_once(strange):
         def advance(self, seconds: float) -> np.ndarray:
             return records(strange)
 
-    desk = Desk(Confused(1))
-    desk.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
+    queue = WorkQueue(Confused(1))
+    queue.take(np.array([7, 3]), np.array([1.0, 1.0]), 1)
     with pytest.raises(RuntimeError, match=f"sample {strange[-1]}, which it does not have"):
-        desk.work()
+        queue.work()

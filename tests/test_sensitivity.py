@@ -372,7 +372,7 @@ def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say(shift: in
     held = []
     for seed in range(shift, shift + 40):
         found = small(seed)
-        limits = np.vstack([found.first_limits, found.total_limits])
+        limits = np.vstack([found.first_interval, found.total_interval])
         held.append((limits[:, 0] <= truth + 1e-12) & (truth - 1e-12 <= limits[:, 1]))
     at_least(np.count_nonzero(held), fewest(np.size(held), 0.95))
 
@@ -380,8 +380,10 @@ def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say(shift: in
 def test_wider_confidence_gives_wider_limits_around_the_estimate() -> None:
     narrow, wide = small(1, confidence=0.5), small(1, confidence=0.99)
     np.testing.assert_array_equal(narrow.first, wide.first)
-    assert (np.ptp(wide.total_limits, axis=1) > np.ptp(narrow.total_limits, axis=1)).all()
-    assert ((wide.total_limits[:, 0] < wide.total) & (wide.total < wide.total_limits[:, 1])).all()
+    assert (np.ptp(wide.total_interval, axis=1) > np.ptp(narrow.total_interval, axis=1)).all()
+    assert (
+        (wide.total_interval[:, 0] < wide.total) & (wide.total < wide.total_interval[:, 1])
+    ).all()
 
 
 def test_additive_function_on_a_skewed_box_shares_its_variance_exactly(shift: int) -> None:
@@ -407,14 +409,14 @@ def test_failed_rows_are_dropped_whole_and_counted() -> None:
     same = analyse_sobol(kept, 3, np.random.default_rng(1))
     assert (found.n_rows, found.n_dropped) == (1021, 3)
     np.testing.assert_array_equal(found.first, same.first)
-    np.testing.assert_array_equal(found.total_limits, same.total_limits)
+    np.testing.assert_array_equal(found.total_interval, same.total_interval)
 
 
 def test_constant_has_no_indices_and_a_seed_of_zero_is_a_seed() -> None:
     found = small(0, lambda x: np.full(len(x), 0.1))
     assert np.isnan(found.first).all()
-    assert np.isnan(found.total_limits).all()
-    np.testing.assert_array_equal(small(0).total_limits, small(0).total_limits)
+    assert np.isnan(found.total_interval).all()
+    np.testing.assert_array_equal(small(0).total_interval, small(0).total_interval)
     assert (small(0).first != small(1).first).any()
 
 
@@ -441,7 +443,7 @@ def test_chaotic_scatter_is_no_inputs(shift: int) -> None:
         share, error = noise_share(values[:64], f(points[:64]), found.variance)
         assert share == pytest.approx(0.5, abs=6.0 * error)
         assert found.total[1] > 0.3
-        errors = np.hypot(np.ptp(found.total_limits, axis=1) / 3.92, error)
+        errors = np.hypot(np.ptp(found.total_interval, axis=1) / 3.92, error)
         beyond += int((abs(found.total[1:] - share) > 1.96 * errors[1:]).sum())
     at_most(beyond, most(120, 0.05))
     assert np.isnan(noise_share(np.array([1.0, np.nan]), np.array([1.0, 2.0]), 1.0)).all()

@@ -27,4 +27,4 @@ def test_each_row_is_of_its_variant_and_its_copy():
             one = scene.with_(changes)
             expected = told(one, simulate(one, one.objective, copy))
             np.testing.assert_array_equal(found[k, copy], expected)
-    assert len(np.unique(found[:, :, 0, 0])) == 6  # copies are kicked, variants differ
+    assert len(np.unique(found[:, :, 0, 0])) == 6  # copies are perturbed, variants differ

@@ -14,7 +14,7 @@ from hpcclear.base.outcome import Flag
 from hpcclear.report import spread
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
-from hpcclear.statistics.random.survival import fewest, order_limits
+from hpcclear.statistics.random.survival import fewest, order_interval
 
 
 def drawn(count=60, failed=0, method="monte-carlo", **more) -> xr.Dataset:
@@ -30,22 +30,22 @@ def text(lines, label):
 def test_limits_of_a_quantile_hold_and_end_where_the_values_do(level):
     count = fewest(level)
     values = np.arange(count, dtype=float)
-    assert np.isfinite(order_limits(values, level)).all()
-    assert not np.isfinite(order_limits(values[1:], level)).all()
+    assert np.isfinite(order_interval(values, level)).all()
+    assert not np.isfinite(order_interval(values[1:], level)).all()
     rng = np.random.default_rng(1)
     ranked = rng.random((2000, count + 40))  # of a uniform distribution the quantile is its level
-    ends = np.array([order_limits(row, level) for row in ranked])
+    ends = np.array([order_interval(row, level) for row in ranked])
     held = (ends[:, 0] <= level) & (level <= ends[:, 1])
     assert held.mean() > 0.95 - 3 * np.sqrt(0.05 * 0.95 / 2000)
 
 
 def test_limits_of_a_quantile_hold_wherever_unknown_values_lie():
     values = np.random.default_rng(2).random(500)
-    low, high = order_limits(values, 0.5, unknown=20)
+    low, high = order_interval(values, 0.5, unknown=20)
     for elsewhere in (-1.0, 2.0):
-        own = order_limits(np.append(values, np.full(20, elsewhere)), 0.5)
+        own = order_interval(np.append(values, np.full(20, elsewhere)), 0.5)
         assert low <= own[0] < own[1] <= high
-    assert np.isnan(order_limits(np.array([]), 0.5)).all()
+    assert np.isnan(order_interval(np.array([]), 0.5)).all()
 
 
 def test_quantiles_are_stated_only_where_the_samples_reach_them():

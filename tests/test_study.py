@@ -67,7 +67,7 @@ def results(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     formula.replace_dynamics(patch.setattr)
     told: list[str] = []
-    run_study(scene_of(), place, alone(), progress_style="quiet", tell=told.append)
+    run_study(scene_of(), place, alone(), progress_style="quiet", notify=told.append)
     patch.undo()
     assert all("ended with its rounds" in text for text in told)  # there is one round
     return place
@@ -395,9 +395,12 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
     again = calls[0]
     assert again > before
     told: list[str] = []
-    run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
+    run_study(scene, place, alone(), progress_style="quiet", notify=told.append)
     assert calls[0] == again  # nothing is done twice
     assert "finished" in told[0]
+    with pytest.warns(DeprecationWarning, match="notify"):
+        run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
+    assert "finished" in told[-1]
 
 
 @pytest.mark.mpi
@@ -455,7 +458,7 @@ def test_the_front_is_true_where_the_surrogate_fails(tmp_path, monkeypatch):
     monkeypatch.setattr(formula, "objective", hill)
     told: list[str] = []
     scene = scene_of("study.verification.infill_rounds=4", "study.seed=5")
-    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", tell=told.append)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", notify=told.append)
     assert any(text.startswith("Surrogate error at ") for text in told)
     found = dataset.read(tmp_path / "out" / "verification.nc")
     ours, swarms = found.sel(design="first alpha"), found.sel(design="first best alpha")
@@ -472,7 +475,7 @@ def test_the_front_is_true_where_the_surrogate_fails(tmp_path, monkeypatch):
 def test_a_surrogate_that_never_holds_is_reported(tmp_path):
     told: list[str] = []
     scene = scene_of("study.verification.tolerance=1e-9")
-    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", tell=told.append)
+    run_study(scene, tmp_path / "out", alone(), progress_style="quiet", notify=told.append)
     assert "Use the simulated values." in told[-1]
     found = dataset.read(tmp_path / "out" / "verification.nc")
     assert told[-1] in found.attrs["remarks"]
@@ -491,7 +494,9 @@ def test_fresh_starts_beside(results, tmp_path, monkeypatch):
     told: list[str] = []
     monkeypatch.setattr(formula, "FAILS_ABOVE", 0.0)  # ends at once
     with pytest.raises(InputError, match="failed"):
-        run_study(scene_of(), place, alone(), fresh=True, progress_style="quiet", tell=told.append)
+        run_study(
+            scene_of(), place, alone(), fresh=True, progress_style="quiet", notify=told.append
+        )
     assert (tmp_path / "taken-2").is_dir()
     assert str(tmp_path / "taken-2") in told[0]
 
@@ -521,7 +526,7 @@ def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, m
     assert not (place / "readings.nc").exists()
     assert "mean_paper" not in dataset.read(place / "verification.nc")
     told: list[str] = []
-    run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
+    run_study(scene, place, alone(), progress_style="quiet", notify=told.append)
     assert told == [f"{place} holds the finished study."]
 
 
@@ -747,7 +752,7 @@ def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch)
     monkeypatch.setattr(responses, "simulate", failing)
     monkeypatch.setattr(single, "simulate", failing)
     told: list[str] = []
-    run_study(scene_of(), tmp_path, alone(), progress_style="quiet", tell=told.append)
+    run_study(scene_of(), tmp_path, alone(), progress_style="quiet", notify=told.append)
     (about,) = (text for text in told if "has no file" in text)
     assert "response of original" in about
     assert "step_cap" in about

@@ -266,7 +266,7 @@ STUDY_CASES = [
     "call hpcclear.study.surrogates:fit_all",
     "call hpcclear.study.surrogates:_packed",
     "call hpcclear.study.optimisation:optimise",
-    "call hpcclear.study.truth:_told",
+    "call hpcclear.study.truth:results_of",
     "call hpcclear.study.responses:simulate_all",
     "call hpcclear.study.paper.readings:_over_steps",
     "call hpcclear.study.paper.claims:judge",

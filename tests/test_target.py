@@ -18,7 +18,7 @@ from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import procedure
-from hpcclear.dynamics.steady.copies import kicked, scales, separation
+from hpcclear.dynamics.steady.copies import perturbed, scales, separation
 from hpcclear.ensemble.api import evaluate
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -31,7 +31,7 @@ CHAOTIC = {
     "joints.crank_rod.clearance": 1e-3,
     "joints.rod_slider.clearance": 1e-3,
 }
-"""The journals bounce: a kick grows by a factor of a hundred in a revolution."""
+"""The journals bounce: a perturbation grows by a factor of a hundred in a revolution."""
 
 SLOWING = {
     "drive": {"kind": "torque", "torque": -0.5, "initial_speed": 500.0},
@@ -56,7 +56,7 @@ def truth(chaotic: bool) -> tuple[float, float]:
     }
     problem = problem_of(scene.with_({f"numerics.{k}": v for k, v in numerics.items()}))
     par = parameters(scene)
-    start = kicked(start_states(scene, par), scales(scene), range(1000, 1064))
+    start = perturbed(start_states(scene, par), scales(scene), range(1000, 1064))
     gaps = Lanes(problem, 16).run(np.repeat(par, 64, axis=0), start).mean_gap
     return float(objective(gaps.mean(axis=0))), float(objective(gaps).std(ddof=1) / 8.0)
 
@@ -75,7 +75,7 @@ def test_a_regular_motion_is_told_and_its_limits_hold(target: float):
 def test_a_chaotic_motion_is_told_and_its_limits_hold(target: float):
     found = record(CHAOTIC, target)
     assert found["regime"] == Regime.CHAOTIC
-    assert found["kick_growth"] > 1.0
+    assert found["lyapunov_exponent"] > 1.0
     assert not found["flags"] & Flag.TARGET_MISSED
     assert found["objective_limit"] <= target * found["objective"]
     mean, error = truth(True)
@@ -129,7 +129,7 @@ def test_neither_lanes_nor_company_change_a_bit():
         for name in (
             "objective",
             "objective_limit",
-            "kick_growth",
+            "lyapunov_exponent",
             "peak_contact_force",
             "rhs_evaluations",
         ):
@@ -200,7 +200,7 @@ def test_the_terminal_says_so_and_the_exit_code(tmp_path: Path):
 
 def test_kicks_are_of_their_size_and_number_nought_is_none():
     start, scale = start_states(BASE, parameters(BASE)), scales(BASE)
-    copies = kicked(start, scale, range(4), 1e-3)
+    copies = perturbed(start, scale, range(4), 1e-3)
     np.testing.assert_array_equal(copies.rows[0], start.rows[0])
     apart = separation(copies, type(copies)(np.repeat(start.rows, 4, axis=0)), scale)
     np.testing.assert_allclose(apart, [0.0, 1e-3, 1e-3, 1e-3], rtol=1e-6)

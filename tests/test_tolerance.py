@@ -150,7 +150,7 @@ def done(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         formula.replace_dynamics(patch.setattr)
         patch.setattr(formula, "BIAS", BIAS)
-        run_study(scene_of(), place, alone(), progress_style="quiet", tell=told.append)
+        run_study(scene_of(), place, alone(), progress_style="quiet", notify=told.append)
     return place, told
 
 
@@ -208,7 +208,7 @@ def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
 def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeypatch):
     monkeypatch.setattr(formula, "BIAS", 100.0)  # 1 % at 1e-4
     told: list[str] = []
-    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", notify=told.append)
     (remark,) = [text for text in told if "tolerance dominates" in text]
     assert "Lower numerics.rtol, to 1e-07 say" in remark  # 1.3 % of 0.25 % by halves
     found = dataset.read(tmp_path / "it" / "verification.nc")
@@ -228,7 +228,7 @@ def test_the_share_is_that_of_the_ends_which_are_the_worst(tmp_path, monkeypatch
 def test_designs_that_most_samples_end_are_named(tmp_path):
     told: list[str] = []
     few = scene_of("study.verification.most_samples=128", "study.accuracy=0.003")
-    run_study(few, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    run_study(few, tmp_path / "it", alone(), progress_style="quiet", notify=told.append)
     assert any("did not reach the target" in text and "most_samples" in text for text in told)
 
 
@@ -329,5 +329,5 @@ def test_an_accuracy_of_verification_beside_another_is_not_used_and_said_so():
 def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path):
     scene = scene_of("study.verification.samples=100")
     told: list[str] = []
-    run_study(scene, tmp_path / "it", alone(), progress_style="quiet", tell=told.append)
+    run_study(scene, tmp_path / "it", alone(), progress_style="quiet", notify=told.append)
     assert any("study.accuracy is not used" in text for text in told)

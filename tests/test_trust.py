@@ -6,7 +6,7 @@ from margins import at_least, at_most, bootstrap, fewest, ratio_of_medians
 
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import KICKS
+from hpcclear.dynamics.evaluator import PERTURBATIONS
 from hpcclear.ensemble.api import as_points
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube
@@ -20,7 +20,7 @@ def box(shift):
     scene = load_scene(SCENE, [f"study.seed={2 + shift}"])
     points = latin_hypercube(scene, 600)
     both = (scene.with_({"numerics.rtol": rtol}) for rtol in (1e-6, 3e-7))
-    return [evaluate_records(one, points, kicks=KICKS) for one in both]
+    return [evaluate_records(one, points, perturbations=PERTURBATIONS) for one in both]
 
 
 def test_runs_at_two_tolerances_overlap_within_their_stated_uncertainties(box):
@@ -54,7 +54,7 @@ def test_well_posed_scenes_state_a_small_uncertainty(shift):
     contact = 'effects.contact={law="hunt-crossley", damping=0.5}'
     seed = f"study.seed={1 + shift}"
     scene = load_scene(SCENE, [contact, seed])
-    records = evaluate_records(scene, latin_hypercube(scene, 24), kicks=KICKS)
+    records = evaluate_records(scene, latin_hypercube(scene, 24), perturbations=PERTURBATIONS)
     at_most(np.median(records["objective_uncertainty"] / records["objective"]), 1e-5)
     assert (records["flags"] & Flag.LATCHED == 0).all()
 
@@ -120,7 +120,9 @@ def test_the_stated_uncertainty_holds_the_true_objective(contact, rtol, shift):
     scene = load_scene(SCENE, [f"study.seed={3 + shift}"]).with_({"effects.contact": contact})
     points = latin_hypercube(scene, 300)
     truth = evaluate_records(scene.with_({"numerics.rtol": 1e-11}), points)["objective"]
-    records = evaluate_records(scene.with_({"numerics.rtol": rtol}), points, kicks=KICKS)
+    records = evaluate_records(
+        scene.with_({"numerics.rtol": rtol}), points, perturbations=PERTURBATIONS
+    )
     error, stated = np.abs(records["objective"] - truth), records["objective_uncertainty"]
     at_least(np.count_nonzero(error <= stated), fewest(len(truth), 0.92))
     known = np.isfinite(stated)

@@ -212,8 +212,9 @@ METHODS = (
     "failed in ask",
     "failed in tell",
     "as ask() returned",
+    "notify instead of tell",
 )
-"""The methods of a search as a plug-in."""
+"""The methods of a search as a plug-in, and former names."""
 
 NO_PROSE = ("base/width.py", "dynamics/linkage/compiled.py")
 """Modules whose long strings are source text."""

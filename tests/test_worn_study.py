@@ -87,7 +87,7 @@ def test_draws_are_the_values_each_as_often():
     there, times = np.unique(drawn, return_counts=True)
     np.testing.assert_array_equal(there, sorted(given))
     assert stats.chisquare(times).pvalue > 1e-6
-    sobol = monte_carlo(scene, 64, scrambling=1).column("C23")
+    sobol = monte_carlo(scene, 64, replicate=1).column("C23")
     assert (np.unique(sobol, return_counts=True)[1] == 16).all()
 
 

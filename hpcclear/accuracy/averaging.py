@@ -25,7 +25,7 @@ from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
 
-KICK = 1e-10
+PERTURBATION = 1e-10
 """Relative size of the perturbations at the start."""
 
 STRICTER = 10.0
@@ -83,7 +83,8 @@ def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, 
     par = np.repeat(parameters(here), copies, axis=0)
     Parameters(par[1::2]).strictness = STRICTER**2  # squared, as the kernel keeps it
     start = Start(np.repeat(start_states(here, parameters(here)).rows, copies, axis=0))
-    start.moving *= 1.0 + np.random.default_rng(0).uniform(-KICK, KICK, start.moving.shape)
+    low, high = -PERTURBATION, PERTURBATION
+    start.moving *= 1.0 + np.random.default_rng(0).uniform(low, high, start.moving.shape)
     lanes = Lanes(problem, DEFAULT_LANES)
     lanes.step(1)  # without samples it only compiles
     started = time.perf_counter()

@@ -73,30 +73,30 @@ def rms(errors: Array) -> Array:
     return np.sqrt(np.mean(np.square(errors), axis=0))
 
 
-def measure(scene: Scene, profile: Profile, tell: Callable[[str], object]) -> Integration:
+def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> Integration:
     """Measure every method that can integrate this scene.
 
     Parameters
     ----------
     scene : Scene
     profile : Profile
-    tell : callable
+    notify : callable
         Gets the name of each method as its turn comes.
 
     Returns
     -------
     Integration
     """
-    tell("integration: reference")
+    notify("integration: reference")
     reference = reference_of(scene, profile.designs)
     methods = methods_of(scene, profile.designs, profile.more_methods)
-    shape = (len(methods), len(profile.rungs))
+    shape = (len(methods), len(profile.tolerances))
     seconds, evaluations, setting = (np.full(shape, np.nan) for _ in range(3))
     error = np.full((*shape, len(QUANTITIES)), np.nan)
     for m, method in enumerate(methods):
-        tell(f"integration: {method.name}")
+        notify(f"integration: {method.name}")
         repeats = profile.repeats if method.compiled else profile.outside_repeats
-        for r, rtol in enumerate(profile.rungs):
+        for r, rtol in enumerate(profile.tolerances):
             run, share = method.prepare(rtol)
             outcome, total = timed(run, repeats)
             seconds[m, r] = total * share

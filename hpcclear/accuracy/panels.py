@@ -13,7 +13,7 @@ from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.steady.telling import in_a_line
+from hpcclear.dynamics.steady.wording import in_a_line
 from hpcclear.ensemble.session import command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -25,7 +25,7 @@ GLANCE = 1e-2
 """Target error of f at which the kind of motion is judged."""
 
 Values = Mapping[str, Any]
-Tell = Callable[[str], object]
+Notify = Callable[[str], object]
 
 
 class Store(Protocol):
@@ -57,7 +57,7 @@ class Panels:
     scene : Scene
     ranks : Ranks
     profile : Profile
-    tell : callable
+    notify : callable
         Gets what is going on, a line at a time.
     store : Store
     show : callable
@@ -69,13 +69,13 @@ class Panels:
         scene: Scene,
         ranks: Ranks,
         profile: Profile,
-        tell: Tell,
+        notify: Notify,
         store: Store,
         show: Callable[[xr.Dataset], object],
     ) -> None:
         self.scene, self.ranks, self.profile = scene, ranks, profile
         self._store, self._show = store, show
-        self._listener = tell
+        self._listener = notify
         self.values: dict[str, Any] = {}
         self.attributes: dict[str, Any] = {
             **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
@@ -87,7 +87,7 @@ class Panels:
             "mpi_ranks": ranks.size,
         }
 
-    def tell(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Say what is going on, after looking whether the run shall stop."""
         self.ranks.raise_if_stopped()
         self._listener(text)
@@ -96,7 +96,7 @@ class Panels:
         """What `work` gives, or gave before."""
         found = self._store.load_stage(name)
         if found is None:
-            self.tell(name.replace("-", " "))
+            self.notify(name.replace("-", " "))
             found = dict(work())
             self._store.save_stage(name, found)
         return found
@@ -119,7 +119,7 @@ class Panels:
             self.panel(
                 "integration",
                 lambda: _integration(
-                    integration.measure(self.scene, self.profile, self.tell), self.scene
+                    integration.measure(self.scene, self.profile, self.notify), self.scene
                 ),
             )
 
@@ -145,7 +145,7 @@ class Panels:
         found = self._store.load_stage("copies")
         run = spending.Run.of(self.scene) if found is None else spending.Run(**found)
         if found is None:
-            self.tell("tolerance and revolutions")
+            self.notify("tolerance and revolutions")
         else:
             self._shown(run)
         with self.ranks.stage("spending"):

@@ -14,7 +14,7 @@ from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
-from hpcclear.dynamics.steady import telling
+from hpcclear.dynamics.steady import wording
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
@@ -34,7 +34,7 @@ PROBE = 2 * DEFAULT_LANES
 STEADY_PROBE = 8
 """Likewise where each is a steady mean: its copies fill the lanes."""
 
-FILE_SECONDS, RUNG_SECONDS = 4.0, 1.0
+FILE_SECONDS, LEVEL_SECONDS = 4.0, 1.0
 """How long the settings of the file, and each target error, are measured on every rank."""
 
 LARGEST_DESIGN = 4096
@@ -133,7 +133,7 @@ def measure(
     ranks: Ranks,
     errors: tuple[float, ...] = TARGETS,
     workers: int = 1,
-    tell: Callable[[str], object] = lambda text: None,
+    notify: Callable[[str], object] = lambda text: None,
     show: Callable[["Plan"], object] = lambda plan: None,
     progress_style: Style = "quiet",
 ) -> Plan:
@@ -149,7 +149,7 @@ def measure(
     workers : int
         Ranks planned for: a lone process keeps as many cores busy beside it, since cores that share caches and
         clock are slower together.
-    tell : callable
+    notify : callable
         Gets what is measured, line by line, as it begins.
     show : callable
         Gets a first look at once, and the plan as far as it is measured after each of its rows but the last.
@@ -180,7 +180,7 @@ def measure(
         return Plan(tuple(rows), study.samples, whole, startup, peak, columns, single, workers)
 
     if not np.isfinite([host.peak_memory(), process_age_at_start()]).all():
-        tell(
+        notify(
             f"start-up and memory are not measured on this system; {USUAL_STARTUP:g} s and "
             f"{USUAL_MEMORY / 2**20:g} MB a rank are assumed"
         )
@@ -188,13 +188,15 @@ def measure(
     rows.append(Row(None, scene, seconds, ""))
     show(replace(made(), first=True))
     rows.clear()
-    with _company(scene, points, workers if ranks.size == 1 else 1, tell):
+    with _company(scene, points, workers if ranks.size == 1 else 1, notify):
         for k, (error, one) in enumerate(wanted):
-            limit = FILE_SECONDS if error is None else RUNG_SECONDS
-            told = "the settings of the file" if error is None else f"a target error of {error:g}"
-            tell(f"measuring {k + 1} of {len(wanted)}: {told}")
+            limit = FILE_SECONDS if error is None else LEVEL_SECONDS
+            setting = (
+                "the settings of the file" if error is None else f"a target error of {error:g}"
+            )
+            notify(f"measuring {k + 1} of {len(wanted)}: {setting}")
             seconds, records = cost(one, points, ranks, limit, str(k), progress_style)
-            rows.append(Row(error, one, seconds, telling.in_short(one, records)))
+            rows.append(Row(error, one, seconds, wording.in_short(one, records)))
             if k + 1 < len(wanted):
                 show(made())
     return made()
@@ -234,7 +236,7 @@ def _busy(
 
 @contextmanager
 def _company(
-    scene: Scene, points: Points, workers: int, tell: Callable[[str], object] = lambda text: None
+    scene: Scene, points: Points, workers: int, notify: Callable[[str], object] = lambda text: None
 ) -> Iterator[None]:
     """Keep other cores busy with the same work, as the ranks of the job will."""
     others = max(min(workers, len(host.cores())) - 1, 0)
@@ -246,7 +248,7 @@ def _company(
         for _ in range(others)
     ]
     if processes:
-        tell(
+        notify(
             f"starting {others} more processes, to measure on cores that are as busy as those of the job"
         )
     for process in processes:
@@ -263,7 +265,7 @@ def _company(
 
 
 def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -> None:
-    """Simulate points over and over until told to stop."""
+    """Simulate points over and over until asked to stop."""
     evaluator = Evaluator(
         load_scene(content, trust=True).with_({"numerics.target_error": None}), points
     )

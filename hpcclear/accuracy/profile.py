@@ -8,7 +8,7 @@ class Profile:
     """Sizes of every panel; of the whole picture, unless said otherwise."""
 
     name: str = "full"
-    rungs: tuple[float, ...] = tuple(10.0**-k for k in range(3, 13))
+    tolerances: tuple[float, ...] = tuple(10.0**-k for k in range(3, 13))
     """Tolerances of the ladder, loosest first."""
     designs: int = 4
     """Designs near the scene that each method integrates; errors are root mean squares over them."""
@@ -40,7 +40,7 @@ class Profile:
 
 QUICK = Profile(
     name="quick",
-    rungs=tuple(10.0**-k for k in range(3, 12, 2)),
+    tolerances=tuple(10.0**-k for k in range(3, 12, 2)),
     designs=2,
     repeats=3,
     outside_repeats=1,

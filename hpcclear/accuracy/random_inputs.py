@@ -134,5 +134,5 @@ def root_mean_square(errors: Array, known: int) -> tuple[Array, Array, Array]:
     """
     freedom = len(errors) - known
     square = np.square(errors).sum(axis=0)
-    limits = [np.sqrt(square / chi2.ppf(p, freedom)) for p in (0.975, 0.025)]
-    return np.sqrt(square / freedom), limits[0], limits[1]
+    ends = [np.sqrt(square / chi2.ppf(p, freedom)) for p in (0.975, 0.025)]
+    return np.sqrt(square / freedom), ends[0], ends[1]

@@ -6,7 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from hpcclear.accuracy import surrogate
-from hpcclear.accuracy.panels import Nowhere, Panels, Store, Tell
+from hpcclear.accuracy.panels import Notify, Nowhere, Panels, Store
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
@@ -23,7 +23,7 @@ def measure(
     scene: Scene,
     ranks: Ranks,
     profile: Profile,
-    tell: Tell = lambda text: None,
+    notify: Notify = lambda text: None,
     store: Store | None = None,
     show: Callable[[xr.Dataset], object] = lambda content: None,
 ) -> xr.Dataset:
@@ -35,7 +35,7 @@ def measure(
         With a clearance joint at least.
     ranks : Ranks
     profile : Profile
-    tell : callable
+    notify : callable
         Gets what is going on, a line at a time.
     store : Store, optional
         Where finished work is kept, and found again.
@@ -62,8 +62,8 @@ def measure(
         raise InputError(
             "joints", "ideal", "the objective is 0 without clearance", "Give a joint clearance"
         )
-    panels = Panels(scene, ranks, profile, tell, Nowhere() if store is None else store, show)
-    tell("compilation")
+    panels = Panels(scene, ranks, profile, notify, Nowhere() if store is None else store, show)
+    notify("compilation")
     studied, case, _ = with_case(scene)
     surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen
     panels.add_motion()
@@ -79,13 +79,13 @@ def run_accuracy(
     directory: Path,
     ranks: Ranks,
     profile: Profile,
-    tell: Tell,
+    notify: Notify,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[xr.Dataset, dict[str, Path]]:
     """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
 
     Each figure is written as soon as its panel is measured, and what is measured is kept: the same command goes on from
-    there. `tell` gets what is going on, a line at a time.
+    there. `notify` gets what is going on, a line at a time.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def run_accuracy(
         else:
             session.describe(scene)
             store = session.opened()
-            content = measure(scene, ranks, profile, tell, store, draw)
+            content = measure(scene, ranks, profile, notify, store, draw)
             content.attrs.update(session.attributes)
             dataset.write(content, place.output / FILE)
             shown.clear()  # all say now what they were made of

@@ -24,7 +24,7 @@ from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import kicked, scales
+from hpcclear.dynamics.steady.copies import perturbed, scales
 from hpcclear.dynamics.steady.ensemble import POOLED
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
@@ -106,7 +106,7 @@ class Run:
         here = one_turn(scene)
         first, scale = start_states(here, parameters(here)), scales(here)
         starts = [
-            kicked(first, scale, range(1 + k * COPIES, 1 + (k + 1) * COPIES)).rows
+            perturbed(first, scale, range(1 + k * COPIES, 1 + (k + 1) * COPIES)).rows
             for k in range(len(TOLERANCES))
         ]
         nothing = np.empty((0, len(TOLERANCES), COPIES, MAX_JOINTS))

@@ -14,7 +14,7 @@ LINE = 8
 
 
 def aligned(count: int) -> Array:
-    """Noughts, shape (count,), that begin where a line of the cache does: vectors across two lines take twice as long to fetch,
+    """Zeros, shape (count,), that begin where a line of the cache does: vectors across two lines take twice as long to fetch,
     and where NumPy puts an array is left to chance."""
     room = np.zeros(count + LINE)
     first = -(room.ctypes.data // room.itemsize) % LINE

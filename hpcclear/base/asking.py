@@ -12,9 +12,9 @@ def answered(asking: Generator[Asked, Answer, Found], answer: Callable[[Asked], 
     """What a procedure finds when all it requests is answered; raises what `answer` does."""
     asked = next(asking)
     while True:
-        told = answer(asked)
+        answered = answer(asked)
         try:
-            asked = asking.send(told)
+            asked = asking.send(answered)
         except StopIteration as end:
             found: Found = end.value
             return found

@@ -142,10 +142,10 @@ RESPONSES = (
 ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
 """Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene requests them."""
 
-STEADY = ("objective_limit", "kick_growth", "period", "steady_rtol", "steady_revolutions")
+STEADY = ("objective_limit", "lyapunov_exponent", "period", "steady_rtol", "steady_revolutions")
 """Fields of `OUTCOME` that a target error fills in, and that datasets hold where a `regime` was judged."""
 
-MAPPED = ("kick_growth_limit", "attractors")
+MAPPED = ("lyapunov_exponent_limit", "attractors")
 """Fields that a map fills in besides."""
 
 JUDGED = (*STEADY, *MAPPED, "regime")
@@ -159,7 +159,7 @@ OUTCOME = np.dtype(
         (
             "objective_uncertainty",
             np.float64,
-        ),  # m, its half-width: over kicked copies, or of the steady mean; NaN where nothing checked it
+        ),  # m, its half-width: over perturbed copies, or of the steady mean; NaN where nothing checked it
         ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
         (
             "peak_contact_force",
@@ -185,11 +185,11 @@ OUTCOME = np.dtype(
             "sliding_waves",
             np.float64,
             WAVE_ROWS,
-        ),  # likewise, by the contact's angle; NaN unless told
+        ),  # likewise, by the contact's angle; NaN unless recorded
         ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
         ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
-        ("kick_growth", np.float64),  # mean logarithm of the growth of a kick per revolution
-        ("kick_growth_limit", np.float64),  # of its limits; NaN outside maps
+        ("lyapunov_exponent", np.float64),  # largest Lyapunov exponent, per revolution
+        ("lyapunov_exponent_limit", np.float64),  # of its limits; NaN outside maps
         ("attractors", np.float64),  # kinds of motion found from several starts; NaN outside maps
         ("period", np.float64),  # revolutions; NaN where none was found
         ("steady_rtol", np.float64),  # the tightest tolerance used

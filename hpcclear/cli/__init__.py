@@ -23,7 +23,7 @@ from hpcclear.base.errors import (
 from hpcclear.base.remarks import listen
 from hpcclear.cli import cite, ensembles, laws, results, scenes, studies
 from hpcclear.cli.options import is_root, say
-from hpcclear.ranks.launcher import is_launched, pin_threads
+from hpcclear.ranks.launcher import end_job, is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
 _ROOT_ALONE = (
@@ -112,10 +112,7 @@ def main(arguments: list[str] | None = None) -> None:
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop, _numbers_in_silence():
         try:
-            if (
-                not is_launched()
-            ):  # ranks tell each other, so that none waits for one that cannot begin
-                check_address_space()
+            check_address_space()
             _check_words(sys.argv[1:] if arguments is None else arguments)
             code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
         except click.ClickException as error:
@@ -125,8 +122,11 @@ def main(arguments: list[str] | None = None) -> None:
         except InputError as error:
             say(f"Error: {error}")
             code = Exit.BAD_INPUT
-        except (StorageError, LimitError) as error:
+        except StorageError as error:
             say(f"Error: {error}")
+            code = Exit.FAILED
+        except LimitError as error:
+            end_job(f"Error: {error}", Exit.FAILED)
             code = Exit.FAILED
         except BrokenPipeError:  # the reader of a pipe has seen enough
             sys.stderr.close()

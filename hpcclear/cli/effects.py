@@ -77,7 +77,7 @@ def _times(place: Path) -> xr.Dataset | None:
     try:
         return dataset.read(place, "timing")
     except InputError:
-        return None  # or written over by another command: savings are told by evaluations
+        return None  # or written over by another command: savings are estimated from evaluations
 
 
 def _failed(content: xr.Dataset) -> str:
@@ -90,7 +90,7 @@ def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> 
     what = f"Changes in % with effects disabled, against all enabled; tolerance {tolerance}"
     made = Table(title=what, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     made.add_column("off", overflow="fold")
-    kept = [k for k in range(content.sizes["response"]) if _is_told(content, k)]
+    kept = [k for k in range(content.sizes["response"]) if _is_reported(content, k)]
     labels = [str(content["response"].to_numpy()[k]) for k in kept]
     for name in labels:
         made.add_column(name.replace("mean", "mean f"), justify="right", no_wrap=True)
@@ -108,7 +108,7 @@ def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> 
     return made
 
 
-def _is_told(content: xr.Dataset, response: int) -> bool:
+def _is_reported(content: xr.Dataset, response: int) -> bool:
     return bool(np.isfinite(content["change"].isel(response=response)[1:]).any())
 
 

@@ -96,7 +96,7 @@ def sample(
 
         chosen = None if part is None else Part.parse(part)
         scene, place = written.scene(), place_of(output)
-        limits = [beyond(units_of(scene.objective), words) for words in thresholds]
+        levels = [beyond(units_of(scene.objective), words) for words in thresholds]
         if statistics:
             kept = None if raw is None else place_of(raw)
             describe_statistics(
@@ -106,7 +106,7 @@ def sample(
             found = run_sample(
                 scene, place, ranks, table=points, part=chosen, options=how.options()
             )
-            describe_samples(found, limits)
+            describe_samples(found, levels)
 
     return on_ranks(program, how.time_limit)
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
-PATH = click.Path(path_type=Path, readable=False)  # what cannot be read is told by who reads it
+PATH = click.Path(path_type=Path, readable=False)  # an unreadable file is reported where it is read
 FILE = click.argument("file", type=PATH)
 SET = click.option(
     "--set",

@@ -16,7 +16,7 @@ from rich.text import Text
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
-from hpcclear.dynamics.steady.telling import in_a_line
+from hpcclear.dynamics.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.report.answer import answer
@@ -158,12 +158,12 @@ def _locked(scene: Scene) -> list[str]:
     """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
     from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
 
-    told = refused_of(scene)
-    if told is None:
+    refusal = refused_of(scene)
+    if refusal is None:
         return []
     if not varies_geometry(scene):
-        raise told[1]
-    return [f"the scene's own design {told[1].reason}; its run time is not measured"]
+        raise refusal[1]
+    return [f"the scene's own design {refusal[1].reason}; its run time is not measured"]
 
 
 def _mpi(ranks: "Ranks | None") -> str:
@@ -361,7 +361,7 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
         throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
-        if evaluations:  # without play there is nothing to integrate
+        if evaluations:  # without clearance there is nothing to integrate
             throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns per force evaluation"
         rows.append(("throughput", throughput))
     out.print(table("Samples", rows + _load(found)))
@@ -395,9 +395,9 @@ def describe_map(found: "Finished") -> None:
         if count and regime is not Regime.UNJUDGED:
             rows.append((regime.name.lower(), f"{count} {regime.meaning.partition(': ')[2]}"))
     periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
-    told = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
-    rows.append(("period, revolutions", ", ".join(told) or "none found"))
-    growth = content["kick_growth"].to_numpy()[good]
+    parts = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
+    rows.append(("period, revolutions", ", ".join(parts) or "none found"))
+    growth = content["lyapunov_exponent"].to_numpy()[good]
     if len(growth):
         text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"
         rows.append(("largest Lyapunov exponent", text))

@@ -174,7 +174,7 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.dynamics.steady.telling import why_missed
+    from hpcclear.dynamics.steady.wording import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
@@ -246,7 +246,7 @@ def reproduce(place: Path, samples: int, trust: bool) -> int:
         found = list(repeated(place, samples))
     for one in found:
         said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
-        show(f"{one.file}: {one.told}" + ("" if one.told.startswith("not") else f": {said}"))
+        show(f"{one.file}: {one.extent}" + ("" if one.extent.startswith("not") else f": {said}"))
     for text in dict.fromkeys(text for one in found for text in one.changed):
         show(f"made by another {text}")
     if not found:

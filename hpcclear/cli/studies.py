@@ -52,7 +52,7 @@ def run(
             ranks,
             fresh=fresh,
             progress_style=progress,
-            tell=lambda text: say(text),
+            notify=lambda text: say(text),
         )
         describe_study(place)
 
@@ -85,12 +85,12 @@ def accuracy(
         from hpcclear.cli.accuracy import describe
         from hpcclear.ensemble.session import Options
 
-        def tell(text: str) -> None:
+        def notify(text: str) -> None:
             say(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
         scene, place = written.scene(), place_of(output)
-        describe(*run_accuracy(scene, place, ranks, profile, tell, Options(fresh=fresh)))
+        describe(*run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh)))
 
     return on_ranks(program, time_limit)
 

@@ -11,7 +11,7 @@ from hpcclear.cli.printing import _load, console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
-from hpcclear.statistics.random.survival import order_limits, quantiles
+from hpcclear.statistics.random.survival import order_interval, quantiles
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -81,7 +81,7 @@ def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
 
     shown = []
     for level in (0.5, 0.05, 0.95):
-        low, high = order_limits(known, level, len(lives) - len(known))
+        low, high = order_interval(known, level, len(lives) - len(known))
         ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
         value = one(float(content[f"{name}_quantile"].sel(quantile=level)))
         shown.append(f"{value} (95 % CI {ends[0]} to {ends[1]})")
@@ -106,11 +106,11 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
             _spread(content, "lifetime_hours", float((cycles * each).min())),
         ),
     ]
-    limits = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
+    interval = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
     rows.append(
         (
             f"survival at {cycles:.4g}",
-            f"{float(last['survival']):.3g} of the service lives ({limits})",
+            f"{float(last['survival']):.3g} of the service lives ({interval})",
         )
     )
     if "exceedance" in content:
@@ -137,11 +137,11 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
         )
         rows.append((f"largest around {name}", f"{largest} at the end{beside} (medians)"))
     if any(name.startswith("limit_") for name in content.attrs):
-        cycles, told = float(content["cycle"][-1]), []
+        cycles, parts = float(content["cycle"][-1]), []
         for name in ("lifetime_quantile", "even_lifetime_quantile"):
             value = float(content[name].sel(quantile=0.5))
-            told.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
-        rows.append(("median life", f"{told[0]}; {told[1]} with uniform wear"))
+            parts.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
+        rows.append(("median life", f"{parts[0]}; {parts[1]} with uniform wear"))
     return rows
 
 

@@ -81,7 +81,7 @@ def errors(scene: Scene, par: Array, before: Array, outcome: Outcome, n: int) ->
     before : ndarray, shape (m,)
         Energy at the start, J.
     outcome : Outcome
-        Of m samples, with the ledger on.
+        Of m samples, with the energy balance on.
     n : int
         Coordinates.
 

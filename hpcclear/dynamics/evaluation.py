@@ -13,21 +13,21 @@ from hpcclear.scene.points import Points
 
 
 def evaluator_of(
-    scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, kicks: Sequence[int] = ()
+    scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = ()
 ) -> Evaluator | SteadyEvaluator:
     """The steady mean to a named error, or the stretch of revolutions that the scene names; arguments and errors are those of
     either.
     """
     if scene.numerics.target_error is not None and scene.clearance_joints():
         return SteadyEvaluator(scene, columns, lanes)
-    return Evaluator(scene, columns, lanes, kicks)
+    return Evaluator(scene, columns, lanes, perturbations)
 
 
 def evaluate_records(
-    scene: Scene, points: Points, lanes: int = DEFAULT_LANES, kicks: Sequence[int] = ()
+    scene: Scene, points: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = ()
 ) -> Records:
     """Simulate all points here and now, by replicas beside them (`Evaluator`) if asked; records in the points' order (n,)."""
-    evaluator = evaluator_of(scene, points, lanes, kicks)
+    evaluator = evaluator_of(scene, points, lanes, perturbations)
     evaluator.submit(np.arange(len(points)), points.values)
     done = []
     while evaluator.pending:

@@ -59,24 +59,26 @@ def default_lanes() -> int:
 DEFAULT_LANES = default_lanes()
 """Lanes of an ensemble in this process; root's are everybody's."""
 
-KICK = 1e-10
-"""Relative size of the kicks to the start of a sample's copies."""
+PERTURBATION = 1e-10
+"""Relative size of the perturbations to the start of a sample's copies."""
 
-KICKS = (0, 1, -1)
-"""Signs of the kicks to copies of a response at a tight tolerance."""
+PERTURBATIONS = (0, 1, -1)
+"""Signs of the perturbations to copies of a response at a tight tolerance."""
 
-KICKS_ALONE = (*KICKS, 10, -10, 100, -100, 1000, -1000)
+PERTURBATIONS_ALONE = (*PERTURBATIONS, 10, -10, 100, -100, 1000, -1000)
 """Perturbations of the replicas of a single response, which take lanes that would stay empty. With the larger ones chaotic
-replicas separate before the average begins; none is beyond `KICK_OF_TOLERANCE`."""
+replicas separate before the average begins; none is beyond `PERTURBATION_OF_TOLERANCE`."""
 
-KICK_OF_TOLERANCE = 0.1
+PERTURBATION_OF_TOLERANCE = 0.1
 """Largest perturbation over the relative tolerance: errors of the sample's own steps are larger."""
 
 
 def alone(rtol: float) -> tuple[int, ...]:
-    """Perturbations of the replicas of a single response at a tolerance: `KICKS_ALONE`, where those are too large `KICKS`."""
-    large = max(map(abs, KICKS_ALONE)) * KICK > 1.001 * KICK_OF_TOLERANCE * rtol
-    return KICKS if large else KICKS_ALONE
+    """Perturbations of replicas of a single response: `PERTURBATIONS_ALONE`, or `PERTURBATIONS` at tight tolerances."""
+    large = (
+        max(map(abs, PERTURBATIONS_ALONE)) * PERTURBATION > 1.001 * PERTURBATION_OF_TOLERANCE * rtol
+    )
+    return PERTURBATIONS if large else PERTURBATIONS_ALONE
 
 
 STRICTER = 300.0
@@ -105,8 +107,8 @@ class Evaluator:
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
         Samples in lockstep.
-    kicks : sequence of int, optional
-        Perturbations, in units of `KICK`, of replicas of tighter tolerance that run beside each sample and give its objective a
+    perturbations : sequence of int, optional
+        In units of `PERTURBATION`, of replicas at a tighter tolerance that run beside each sample and give its objective a
         half-width, as `alone` gives those of a single response; none by default.
     objective : Objective
         Of which that half-width is.
@@ -124,15 +126,15 @@ class Evaluator:
         scene: Scene,
         columns: Points,
         lanes: int = DEFAULT_LANES,
-        kicks: Sequence[int] = (),
+        perturbations: Sequence[int] = (),
         objective: Objective = MEAN_GAP,
         recorder: Lanes | None = None,
     ) -> None:
         self.scene = scene
         self.lanes = lanes
         self._columns = columns
-        self._kicks = tuple(kicks)
-        self._copies = 1 + len(self._kicks)
+        self._perturbations = tuple(perturbations)
+        self._copies = 1 + len(self._perturbations)
         self._objective = objective
         problem = problem_of(scene)
         if recorder is not None:
@@ -161,9 +163,9 @@ class Evaluator:
         labels = np.asarray(index, np.int64) * self._copies
         if self._copies > 1:
             par, start, labels = with_copies(
-                par, start, labels, self.scene.numerics.rtol, self._kicks
+                par, start, labels, self.scene.numerics.rtol, self._perturbations
             )
-        if self._problem.effects.ledger and self._problem.coordinates:
+        if self._problem.effects.energies and self._problem.coordinates:
             before = energy.of_starts(self.scene, par, start, self._problem.coordinates)
             self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
         self._lanes.queue(par, start, labels)
@@ -173,9 +175,9 @@ class Evaluator:
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
         effects = self._problem.effects
-        told = responses_told(self._problem)
+        responses = responses_reported(self._problem)
         records = outcome_records(
-            labels, outcome, par, told, bool(effects.wear), self.scene.objective
+            labels, outcome, par, responses, bool(effects.wear), self.scene.objective
         )
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
@@ -197,8 +199,8 @@ class Evaluator:
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
 
 
-def responses_told(problem: Problem) -> tuple[str, ...]:
-    """Which of `RESPONSES` samples tell: those asked for, of a slider where one is followed, of a point where one is."""
+def responses_reported(problem: Problem) -> tuple[str, ...]:
+    """Which of `RESPONSES` samples notify: those asked for, of a slider where one is followed, of a point where one is."""
     if not problem.effects.responses:
         return ()
     linkage = problem.linkage
@@ -212,18 +214,22 @@ _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evalua
 
 
 def with_copies(
-    par: Array, start: Start, labels: Integers, rtol: float, kicks: Sequence[int] = KICKS
+    par: Array,
+    start: Start,
+    labels: Integers,
+    rtol: float,
+    perturbations: Sequence[int] = PERTURBATIONS,
 ) -> tuple[Array, Start, Integers]:
-    """Each sample followed by its copies: kicked starts, and stricter tolerances."""
-    sizes = np.array([0, *kicks])
+    """Each sample followed by its copies: perturbed starts, and stricter tolerances."""
+    sizes = np.array([0, *perturbations])
     count = len(sizes)
-    strict = np.array([1.0] + len(kicks) * [max(1.0, min(STRICTER, rtol / TIGHTEST))])
+    strict = np.array([1.0] + len(perturbations) * [max(1.0, min(STRICTER, rtol / TIGHTEST))])
     par, start = np.repeat(par, count, axis=0), Start(np.repeat(start.rows, count, axis=0))
     Parameters(par).strictness = np.tile(strict**2, len(labels))
-    # Signs alternate over the coordinates, so that the kick is no motion of the mechanism as a whole.
+    # Signs alternate over the coordinates, so that the perturbation is no motion of the mechanism as a whole.
     signs = np.where(np.arange(at.MAX_COORDINATES) % 2 == 0, 1.0, -1.0)
     pattern = np.concatenate([signs, -signs])  # of coordinates, then of velocities
-    start.moving *= 1.0 + KICK * np.tile(sizes, len(labels))[:, None] * pattern
+    start.moving *= 1.0 + PERTURBATION * np.tile(sizes, len(labels))[:, None] * pattern
     copies = (labels[:, None] + np.arange(count)).ravel()
     return par, start, copies
 
@@ -235,7 +241,7 @@ def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Reco
     record["flags"] &= ~_ARRIVED
     values = objective.of(group)
     # A copy that failed leaves the uncertainty unknown, and NaN says so.
-    coverage = COVERAGE if len(group) == 1 + len(KICKS) else COVERAGE_ALONE
+    coverage = COVERAGE if len(group) == 1 + len(PERTURBATIONS) else COVERAGE_ALONE
     record["objective_uncertainty"] = coverage * np.max(np.abs(values[1:] - values[0]))
     return record
 
@@ -245,13 +251,13 @@ NO_RATE = -1e299
 
 
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, told: Sequence[str] = (), worn: bool = False,
+    labels: Integers, outcome: Outcome, par: Array, responses: Sequence[str] = (), worn: bool = False,
     objective: Objective = MEAN_GAP,
 ) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
     Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
-    `told` (as of `responses_told`), sliding work unless `worn`,
+    `responses` (as of `responses_reported`), sliding work unless `worn`,
     what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """
     records = np.zeros(len(labels), OUTCOME)
@@ -275,7 +281,7 @@ def outcome_records(
     for name in (*STEADY, *MAPPED):
         records[name] = np.nan
     for name in RESPONSES:
-        records[name][~(valid & (name in told))] = np.nan
+        records[name][~(valid & (name in responses))] = np.nan
     records["sliding_work"] = sliding_work(outcome) if worn else np.nan
     records["sliding_work"][~valid] = np.nan
     records["sliding_waves"] = (

@@ -11,7 +11,7 @@ from hpcclear.base.beside import compiled_beside, note_compiled
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.explicit.steps import explicit_code
-from hpcclear.dynamics.implicit.abreast import abreast_code
+from hpcclear.dynamics.implicit.batch import batch_code
 from hpcclear.dynamics.implicit.columns import new_columns
 from hpcclear.dynamics.implicit.memory import COLUMNS
 from hpcclear.dynamics.linkage.observe import observe, observing_code
@@ -39,7 +39,7 @@ NO_LIMIT = 1 << 40  # of block steps in a call
 SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
 TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
 OBSERVER = f"{observing_code.__module__}:{observing_code.__name__}"
-ABREAST = f"{abreast_code.__module__}:{abreast_code.__name__}"
+BATCH = f"{batch_code.__module__}:{batch_code.__name__}"
 
 
 class Lanes:
@@ -130,14 +130,14 @@ class Lanes:
         stiff = self._memory is not None
         apart = [SPECIAL, *self.motions]
         apart += [OBSERVER] if len(self.record) else []
-        with compiled_beside([ABREAST] if stiff else apart):  # either is half of it
+        with compiled_beside([BATCH] if stiff else apart):  # either is half of it
             explicit = explicit_code(self.width, problem.tableau.stages).address
             self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
             if stiff:  # implicit steps take as long as all of this together
                 special_code()
                 for width in widths:
                     problem.motion(effects, width)
-        implicit = abreast_code().address if stiff else 0
+        implicit = batch_code().address if stiff else 0
         self._codes = Codes(special_code().address, explicit, implicit)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0

@@ -25,7 +25,7 @@ class Effects(NamedTuple):
     friction: Any = None
     torque: Any = None  # the body that gives the period is free, driven by a torque
     baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
-    ledger: Any = None  # energies
+    energies: Any = None  # energy balance
     series: Any = None  # friction forces and crank moment, for time series
     responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
@@ -38,10 +38,7 @@ class Effects(NamedTuple):
     journal_waves: Any = None
     threshold: Any = None  # of the pressure, below which nothing wears
     profile: Any = None  # where around these the sliding work is done
-    film: Any = None  # oil in joints with clearance
-    short_film: Any = None
-    long_film: Any = None
-    finite_film: Any = None
+    films: tuple[Any, ...] = (None,) * MAX_JOINTS  # names of laws of oil films, by places of joints
     objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
@@ -143,9 +140,7 @@ INVERSE_RAMP = OF_JOINT("one over the sliding speed within which friction change
 STEEPNESS = OF_JOINT("largest slope of friction over normal force", "s/m")
 CONTACT_NUMBERS = OF_JOINT("of its law of contact", size=LAW_NUMBERS)
 FRICTION_NUMBERS = OF_JOINT("of its law of friction", size=LAW_NUMBERS)
-FILM_SHORT = OF_JOINT("mu R L^3/c^3 of a short film; 0 where there is none", "N s/m")
-FILM_FINITE = OF_JOINT("the same of a finite one", "N s/m")
-FILM_LONG = OF_JOINT("12 mu L R^3/c^3", "N s/m")
+FILM_SCALE = OF_JOINT("of the film's force; 0 where there is none", "N s/m")
 FILM_SHEAR = OF_JOINT("2 pi mu L R^3/c", "N m s")
 FILM_FLOOR = OF_JOINT("least thickness over the clearance")
 FILM_STEEPNESS = OF_JOINT(
@@ -163,9 +158,9 @@ THRESHOLDS = OF_SAMPLE(
     "of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1",
     size=2 * MAX_JOINTS,
 )
-FINITE_ROWS = 180
-FINITE = OF_SAMPLE(
-    "what films of finite length have besides, joint by joint", size=MAX_JOINTS * FINITE_ROWS
+FURTHER_ROWS = 180
+FURTHER = OF_SAMPLE(
+    "what laws of films have besides, joint by joint", size=MAX_JOINTS * FURTHER_ROWS
 )
 PARAMETERS = OF_SAMPLE.end
 
@@ -177,10 +172,10 @@ EACH = MAX_JOINTS
 GAP = WRITTEN("distance from the clearance circle, positive in contact", "m", EACH, "joints")
 FORCE = WRITTEN("normal force", "N", EACH, "responses")
 GAP_RATE = WRITTEN("rate of the gap", "m/s", EACH)
-DRIVE_POWER = WRITTEN("of all drives", "W", asked_by="ledger")
-ABS_DRIVE_POWER = WRITTEN("its size", "W", asked_by="ledger")
-DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="ledger")
-LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="ledger")
+DRIVE_POWER = WRITTEN("of all drives", "W", asked_by="energies")
+ABS_DRIVE_POWER = WRITTEN("its size", "W", asked_by="energies")
+DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="energies")
+LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="energies")
 FRICTIONS = WRITTEN("tangential force, for time series and objectives", "N", EACH)
 DRIVE_MOMENT = WRITTEN("for time series, responses and objectives", "N m")
 FOLLOWED_ACCELERATION = WRITTEN(
@@ -390,7 +385,7 @@ class Joint(NamedTuple):
 
     place: int
     block: int  # of parameters
-    finite: int
+    further: int
     gap: int  # rates
     force: int
     rate: int
@@ -409,7 +404,7 @@ class Joint(NamedTuple):
 
 JOINTS = tuple(
     Joint(
-        k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
+        k, JOINT_BLOCKS + JOINT_ROWS * k, FURTHER + FURTHER_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
         FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
         OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
         ACTIVE + k, INVERSE_IMPACT + k,
@@ -457,7 +452,7 @@ class Rules(NamedTuple):
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
-    profile: Any  # where around joints sliding work is done is told
+    profile: Any  # where around joints sliding work is done is recorded
     largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
     end: Any  # and before `end`

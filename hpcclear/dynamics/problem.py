@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -151,14 +151,14 @@ def coordinate_count(scene: Scene) -> int:
     return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
 
 
-def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> at.Effects:
+def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
     count = len(scene.clearance_joints())
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
-    models = {film.model for film in scene.films().values()}
+    films = {scene.joint_labels.index(name): film.model for name, film in scene.films().items()}
     return at.Effects(
         joints=count,
         first=next(iter(scene.open_places), 0),
@@ -168,7 +168,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         torque=_flag(isinstance(main, TorqueDrive)),
         baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
-        ledger=_flag(scene.numerics.energy if ledger is None else ledger),
+        energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
         responses=_flag(scene.responses_asked()),
         wear=_flag(bool(scene.worn_joints())),
@@ -177,10 +177,7 @@ def effects_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        film=_flag(bool(models)),
-        short_film=_flag("short" in models),
-        long_film=_flag("long" in models),
-        finite_film=_flag("finite" in models),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)),
     )
 
 
@@ -240,7 +237,8 @@ def check_objective(scene: Scene) -> None:
         )  # fmt: skip
 
 
-def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None) -> Problem:
+@lru_cache(maxsize=16)
+def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects
     check_objective(scene)
@@ -253,7 +251,7 @@ def problem_of(scene: Scene, *, series: bool = False, ledger: bool | None = None
     )
     return Problem(
         linkage=linkage,
-        effects=effects_of(scene, series=series, ledger=ledger),
+        effects=effects_of(scene, series=series, energies=energies),
         coordinates=coordinate_count(scene),
         tableau=tableau_of(scene),
         rtol=scene.numerics.rtol,

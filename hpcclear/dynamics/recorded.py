@@ -20,7 +20,7 @@ from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.problem import refused_of
 from hpcclear.dynamics.problem import effects_of, problem_of
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.copies import kicked, scales
+from hpcclear.dynamics.steady.copies import perturbed, scales
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Rates
 from hpcclear.scene import Scene
@@ -73,7 +73,7 @@ class Recording:
     scene : Scene
     copy : int
         Perturb the start in the direction of this number (`hpcclear.dynamics.steady.copies`); 0 does not.
-    kicks, objective
+    perturbations, objective
         Replicas beside it, and what they give a half-width, as of `hpcclear.dynamics.evaluator.Evaluator`.
     """
 
@@ -81,7 +81,7 @@ class Recording:
         self,
         scene: Scene,
         copy: int = 0,
-        kicks: Sequence[int] = (),
+        perturbations: Sequence[int] = (),
         objective: Objective = MEAN_GAP,
     ) -> None:
         self.problem = problem_of(scene)
@@ -89,12 +89,12 @@ class Recording:
         self._start = start_states(scene, self._par, walk=False)
         self._refused = refused_of(scene)
         if copy:
-            self._start = kicked(self._start, scales(scene), range(copy, copy + 1))
+            self._start = perturbed(self._start, scales(scene), range(copy, copy + 1))
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
-        observed = effects_of(scene, series=True, ledger=True)
+        observed = effects_of(scene, series=True, energies=True)
         self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed)
         self._evaluator = Evaluator(
-            scene, ITSELF, kicks=kicks, objective=objective, recorder=self._lanes
+            scene, ITSELF, perturbations=perturbations, objective=objective, recorder=self._lanes
         )
         self._done: list[Records] = []
 

@@ -11,7 +11,7 @@ from hpcclear.base.outcome import STEADY
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import alone, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import alone, outcome_records, responses_reported
 from hpcclear.dynamics.joint_laws import widest_contact
 from hpcclear.dynamics.parameters import Numbers, parameters
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
@@ -23,7 +23,7 @@ from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.telling import recorded
+from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -110,8 +110,10 @@ def simulate(
     if still:
         times, data, record = _prescribed(scene)
     else:
-        kicks = alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
-        times, data, record = _integrated(scene, Recording(scene, copy, kicks, objective))
+        perturbations = (
+            alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
+        )
+        times, data, record = _integrated(scene, Recording(scene, copy, perturbations, objective))
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady
@@ -119,7 +121,9 @@ def simulate(
     record = asked(record, objective)
     record["objective_uncertainty"] = half_width
     labels = scene.joint_labels
-    names = [name for name in (*_TOLD, *STEADY, "regime") if name in _TOLD or steady is not None]
+    names = [
+        name for name in (*_REPORTED, *STEADY, "regime") if name in _REPORTED or steady is not None
+    ]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(
             scene.effects.slider_load,
@@ -127,10 +131,14 @@ def simulate(
             _turns(scene),
             scene.numerics.interpolation,
         )
-    told = {name: dataset.at_joints(record[name], labels)[0] for name in names}
+    reported = {name: dataset.at_joints(record[name], labels)[0] for name in names}
     return dataset.response_dataset(
         times,
-        {**data, **told, **widest_contact(scene, Numbers(scene, None), told["peak_contact_force"])},
+        {
+            **data,
+            **reported,
+            **widest_contact(scene, Numbers(scene, None), reported["peak_contact_force"]),
+        },
         dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
@@ -159,11 +167,11 @@ def _turns(scene: Scene) -> int:
 
 def _reason(scene: Scene) -> dict[str, str | int]:
     """Where a linkage that cannot turn locks, as an attribute."""
-    told = refused_of(scene)
-    return {} if told is None else {"ended": told[1].reason}
+    refusal = refused_of(scene)
+    return {} if refusal is None else {"ended": refusal[1].reason}
 
 
-_TOLD = (
+_REPORTED = (
     "objective",
     "objective_spread",
     "objective_uncertainty",
@@ -206,7 +214,9 @@ def _prescribed(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = outcome_records(*lanes.collect(), responses_told(problem), bool(problem.effects.wear))
+    record = outcome_records(
+        *lanes.collect(), responses_reported(problem), bool(problem.effects.wear)
+    )
     return *prescribed_series(scene, problem.transient + problem.averaged), record
 
 

@@ -1,4 +1,4 @@
-"""A run told revolution by revolution: mean gaps of each, every one started from the end of the last."""
+"""A run by revolutions: mean gaps of each, every one started from the end of the last."""
 
 import numpy as np
 

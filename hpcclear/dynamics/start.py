@@ -47,9 +47,9 @@ def start_states(
     start = Start.at_rest(len(par))
     places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
     if points is None or not _moved(scene, points):
-        places[:], speeds[:] = coordinates(trees, put_together(mechanism_of(scene.linkage)))
-        told = refused_of(scene) if walk else None
-        found = np.full(len(par), int(Status.OK if told is None else told[0]))
+        places[:], speeds[:] = _of_scene(scene)
+        refusal = refused_of(scene) if walk else None
+        found = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
         samples = Samples(scene, points)
         places.T[:], speeds.T[:] = samples.coordinates(trees)
@@ -57,6 +57,12 @@ def start_states(
     _start_contacts(scene, par, points, start)
     start.fail(found)
     return start
+
+
+@lru_cache(maxsize=16)
+def _of_scene(scene: Scene) -> tuple[Array, Array]:
+    """Coordinates and velocities (n,) that all samples start with whose geometry is the scene's."""
+    return coordinates(linkage_of(scene).forest, put_together(mechanism_of(scene.linkage)))
 
 
 def _moved(scene: Scene, points: Points) -> bool:

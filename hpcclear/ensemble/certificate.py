@@ -58,7 +58,7 @@ class Verdict(IntEnum):
 
     WITHIN = 0
     BEYOND = 1
-    UNTOLD = 2
+    UNDECIDED = 2
 
 
 class Asked(NamedTuple):
@@ -173,7 +173,7 @@ def judged(changes: Sequence[Change], tolerance: float) -> Verdict:
     """Within the tolerance if all are, beyond it if any is; NaN is undecided."""
     if any(change.beyond(tolerance) for change in changes):
         return Verdict.BEYOND
-    return Verdict.WITHIN if all(c.within(tolerance) for c in changes) else Verdict.UNTOLD
+    return Verdict.WITHIN if all(c.within(tolerance) for c in changes) else Verdict.UNDECIDED
 
 
 def _largest(on: Array, off: Array) -> tuple[Array, Array]:
@@ -192,14 +192,14 @@ def certificate(plan: Plan) -> Asking:
     """The procedure; see the module."""
     book = Book(plan)
     singles = [(k,) for k in range(plan.effects) if plan.possible((k,))]
-    yield from _told(book, [()], plan.budget)
-    yield from _told(book, singles, SINGLY * plan.budget)
+    yield from _judge(book, [()], plan.budget)
+    yield from _judge(book, singles, SINGLY * plan.budget)
     good = [one for one in singles if book.verdict(one) is Verdict.WITHIN]
     yield from _together(book, [one[0] for one in good])
     return Certificate(tuple(book.seen), _recommended(book), book)
 
 
-def _told(book: Book, variants: Sequence[Variant], budget: float) -> Part:
+def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
     """Simulate variants, more and more replicates of those that are undecided, as far as a budget goes."""
     count = min(FIRST, book.plan.most)
     pending = [one for one in variants if book.replicates(one) < count]
@@ -210,16 +210,18 @@ def _told(book: Book, variants: Sequence[Variant], budget: float) -> Part:
         ]  # fmt: skip
         for one, seen in zip(asked, (yield asked), strict=True):
             book.seen.setdefault(one.off, []).append(seen)
-        pending = [one for one in pending if one and _may_be_told(book, one)]
+        pending = [one for one in pending if one and _decidable(book, one)]
         if count >= book.plan.most:
             return
         count = min(2 * count, book.plan.most)
         pending = _afforded(book, pending, count, budget)
 
 
-def _may_be_told(book: Book, off: Variant) -> bool:
+def _decidable(book: Book, off: Variant) -> bool:
     """Whether more replicates may tell a change: not where too many have failed."""
-    return book.verdict(off) is Verdict.UNTOLD and bool(np.isfinite(book.changes(off).mean.value))
+    return book.verdict(off) is Verdict.UNDECIDED and bool(
+        np.isfinite(book.changes(off).mean.value)
+    )
 
 
 def _afforded(book: Book, pending: list[Variant], count: int, budget: float) -> list[Variant]:
@@ -241,13 +243,13 @@ def _together(book: Book, good: list[int]) -> Part:
     explicit = plan.implicit(()) and not plan.implicit(_set(book, good))
     for effects in [good, cheap] if explicit else [cheap]:  # what is stiff saves nothing alone
         chosen = _set(book, effects)
-        yield from _told(book, [one for one in [chosen] if one not in book.seen], plan.budget)
+        yield from _judge(book, [one for one in [chosen] if one not in book.seen], plan.budget)
         if len(chosen) < 3 or book.verdict(chosen) is Verdict.WITHIN or book.spent() > plan.budget:
             continue
         pairs = [p for p in itertools.combinations(chosen, 2) if plan.possible(p)]
-        yield from _told(book, pairs[:MOST_PAIRS], plan.budget)
+        yield from _judge(book, pairs[:MOST_PAIRS], plan.budget)
         chosen = _set(book, effects)
-        yield from _told(book, [one for one in [chosen] if one not in book.seen], plan.budget)
+        yield from _judge(book, [one for one in [chosen] if one not in book.seen], plan.budget)
 
 
 def _set(book: Book, effects: list[int]) -> Variant:

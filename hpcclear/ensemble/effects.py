@@ -122,7 +122,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     """
     book, plan, variants = found.book, found.book.plan, found.variants
     whole = book.all(())
-    _refuse_nought(trial.scene, whole)
+    _refuse_zero(trial.scene, whole)
     changes = [book.changes(off) for off in variants]
     counted = np.array([True, plan.scattered, plan.forces])
     reduced = trial.variant(found.recommended).scene
@@ -130,7 +130,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
         "off": np.array([[k in off for k in range(plan.effects)] for off in variants], np.int8),
         "change": np.array([[one.value for one in _three(c)] for c in changes]),
         "limit": np.array([[one.limit for one in _three(c)] for c in changes]),
-        "told": np.array(
+        "finding": np.array(
             [[int(judged([one], plan.tolerance)) for one in _three(c)] for c in changes], np.int8
         ),
         "decision": np.array([int(book.verdict(off)) for off in variants], np.int8),
@@ -149,14 +149,14 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
         "effect": np.array([one.name for one in trial.switches], dtype=str),
         "response": np.array(RESPONSES, dtype=str),
     }
-    told = {
+    attrs = {
         **attributes,
         "tolerance": plan.tolerance,
         "confidence": plan.confidence,
         "reduced_scene": reduced.to_toml(),
         "kept": json.dumps(trial.kept),
     }
-    return dataset.dataset("effects", coords, data, told, objective=trial.scene.objective)
+    return dataset.dataset("effects", coords, data, attrs, objective=trial.scene.objective)
 
 
 def _three(changes: Changes) -> tuple[Any, Any, Any]:
@@ -167,7 +167,7 @@ def _mean(values: Array) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
-def _refuse_nought(scene: Scene, whole: Seen) -> None:
+def _refuse_zero(scene: Scene, whole: Seen) -> None:
     known = whole.objective[np.isfinite(whole.objective)]
     if known.size and not known.any():
         raise InputError(

@@ -57,7 +57,7 @@ def map(
     Returns
     -------
     xarray.Dataset
-        With the entries as coordinates: largest Lyapunov exponent per revolution (``kick_growth``), ``period``, ``regime``,
+        With the entries as coordinates: ``lyapunov_exponent`` (largest, per revolution), ``period``, ``regime``,
         and f with the half-width of its 95 % confidence interval.
 
     Raises

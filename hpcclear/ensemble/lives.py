@@ -17,7 +17,7 @@ from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_limits
+from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_interval
 
 HOUR = 3600.0
 """s."""
@@ -144,12 +144,12 @@ def lives_dataset(
         coords["angle"] = angles
     units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
     words = None if inputs is None else inputs.words
-    told = {
+    attrs = {
         **attributes,
         "tolerance": scene.wear.tolerance,
         **{f"limit_{name}": value for name, value in limits.items()},
     }
-    return dataset.dataset("wear", coords, data, told, units, scene.objective, words)
+    return dataset.dataset("wear", coords, data, attrs, units, scene.objective, words)
 
 
 def _reason(one: Life) -> str:
@@ -237,7 +237,7 @@ def statistics(
     objective = np.where(gone, np.inf, values["objective"])
     known = ends[~np.isnan(ends)]
     dead = (known[:, None] <= cycles).sum(axis=0)
-    dead_lower, dead_upper = share_limits(dead, len(known))
+    dead_lower, dead_upper = share_interval(dead, len(known))
     share = dead / len(known) if len(known) else np.full(len(cycles), np.nan)
     made = {
         "clearance_quantile": quantiles(clearance, LEVELS),
@@ -259,7 +259,7 @@ def _exceeded(clearance: Array, limit: float) -> Iterator[tuple[str, Array]]:
     above = (clearance > limit).sum(axis=0)
     lower, upper = np.zeros(above.shape), np.ones(above.shape)
     for place in np.ndindex(*above.shape):
-        low, high = share_limits(above[place], int(total[place]))
+        low, high = share_interval(above[place], int(total[place]))
         lower[place], upper[place] = float(low), float(high)
     with np.errstate(invalid="ignore", divide="ignore"):
         yield "exceedance", above / total

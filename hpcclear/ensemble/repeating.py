@@ -24,7 +24,7 @@ class Repeated:
     """What came of one file."""
 
     file: str
-    told: str
+    extent: str
     """How much of it was simulated again, or why nothing was."""
     differing: tuple[str, ...] = ()
     """Variables that are other ones here, with the largest relative difference."""
@@ -81,12 +81,15 @@ def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated
             name, "not simulated: its scene reads otherwise in this version", (), changed
         )
     if kind == "response":
-        told, (ours, theirs) = "its series", _series(content, scene)
+        extent, (ours, theirs) = "its series", _series(content, scene)
     else:
         chosen = np.unique(np.linspace(0, content.sizes["sample"] - 1, count).round().astype(int))
         theirs = content.isel(sample=chosen)
-        told, ours = f"{len(chosen)} of {content.sizes['sample']} samples", _samples(theirs, scene)
-    return Repeated(name, told, tuple(_differing(ours, theirs)), changed)
+        extent, ours = (
+            f"{len(chosen)} of {content.sizes['sample']} samples",
+            _samples(theirs, scene),
+        )
+    return Repeated(name, extent, tuple(_differing(ours, theirs)), changed)
 
 
 def _samples(content: xr.Dataset, scene: Scene) -> xr.Dataset:

@@ -6,7 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.steady.telling import recorded
+from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
 from hpcclear.ensemble.simulate import sample_points, saving
@@ -99,7 +99,7 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.
     units = dict(zip(points.names, points.units, strict=True))
     session.describe(scene)
     if len(points) * MEMORY >= NOTABLE:
-        session.tell(
+        session.notify(
             f"root keeps all {len(points)} samples in memory, {len(points) * MEMORY:.1f} GB at the end; "
             "Monte Carlo samples it can write as they come: --statistics --raw DIR"
         )

@@ -211,7 +211,7 @@ class Session:
         What makes the run what it is (`hpcclear.ensemble.identity`).
     ranks : Ranks
     options : Options
-    tell : callable
+    notify : callable
         Gets what was found on disk and could not be used, a sentence at a time.
 
     Attributes
@@ -226,17 +226,17 @@ class Session:
         key: Mapping[str, str],
         ranks: Ranks,
         options: Options,
-        tell: Callable[[str], object] = lambda text: sys.stderr.write(f"{plain(text)}\n"),
+        notify: Callable[[str], object] = lambda text: sys.stderr.write(f"{plain(text)}\n"),
     ) -> None:
         self.place = place
         self.key = dict(key)
         self.ranks = ranks
         self.options = options
         self.joints: tuple[str, ...] = JOINTS
-        self.tell = tell
+        self.notify = notify
         self.attributes: dict[str, str] = {}
         self._checkpoint: Checkpoint | None = None
-        self._told = 0
+        self._reported = 0
         self._lock = Lock(place.lock.parent, place.lock.name)
 
     def __enter__(self) -> Self:
@@ -290,15 +290,15 @@ class Session:
                 attributes=self.attributes,
                 joints=self.joints,
             )
-        self.tell_problems()
+        self.notify_problems()
         return self._checkpoint
 
-    def tell_problems(self) -> None:
+    def notify_problems(self) -> None:
         """Report what was found in the checkpoint and could not be used, each once."""
         problems = [] if self._checkpoint is None else self._checkpoint.problems
-        for problem in problems[self._told :]:
-            self.tell(problem)
-        self._told = len(problems)
+        for problem in problems[self._reported :]:
+            self.notify(problem)
+        self._reported = len(problems)
 
     def write(self, content: xr.Dataset) -> xr.Dataset:
         """Write the result file; returns what was written."""

@@ -16,13 +16,13 @@ from hpcclear.scene import Scene, load_scene
 def responses_of(
     scene: Scene,
     variants: Sequence[Mapping[str, Any]],
-    told: Callable[[Scene, xr.Dataset], Array],
+    evaluate: Callable[[Scene, xr.Dataset], Array],
     shape: tuple[int, ...],
     ranks: Ranks,
     stage: str,
     copies: int = 1,
 ) -> Array:
-    """What each response comes to, NaN where `told` says so; call it on root.
+    """What each response comes to, NaN where `evaluate` returns it; call it on root.
 
     Parameters
     ----------
@@ -30,14 +30,14 @@ def responses_of(
         Its study is left out; the objective is its own.
     variants : sequence of mapping
         Entries that are other ones, by their paths.
-    told : callable
+    evaluate : callable
         A function of a module, of a variant and its response: values of `shape`.
     shape : tuple of int
     ranks : Ranks
     stage : str
         Name for reports and timing.
     copies : int
-        Starts of each variant; all but the first are kicked.
+        Starts of each variant; all but the first are perturbed.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def responses_of(
     payload = {
         "scene": content_of(scene),
         "variants": list(variants),
-        "told": told,
+        "evaluate": evaluate,
         "dtype": dtype,
     }
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
@@ -66,7 +66,7 @@ class Responses:
 
     def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
         self._scene = load_scene(payload["scene"], trust=True)
-        self._variants, self._told = payload["variants"], payload["told"]
+        self._variants, self._evaluate = payload["variants"], payload["evaluate"]
         self._dtype = payload["dtype"]
         self._queue: list[tuple[int, int, int]] = []
 
@@ -87,5 +87,5 @@ class Responses:
             record["sample"], variant, copy = self._queue.pop(0)
             scene = self._scene.with_(self._variants[variant])
             response = simulate(scene, copy=copy, checked=False)
-            record["values"] = self._told(scene, response).ravel()
+            record["values"] = self._evaluate(scene, response).ravel()
         return records

@@ -125,7 +125,7 @@ def _keeping(raw: Path | None, session: Session) -> Iterator[Path | None]:
     collection.check_place(place.output)
     files.refuse_foreign(place.output / collection.NAME, netcdf.SEAL)
     if place.output != raw:
-        session.tell(f"The samples themselves go to {place.output}.")
+        session.notify(f"The samples themselves go to {place.output}.")
     with Session(place, session.key, session.ranks, session.options):
         yield place.output
 
@@ -177,13 +177,13 @@ class _Streaming:
         self._leaders = len(leaders) if session.ranks.size >= SHARED_FROM else 0
         self._sums = self._new_sums()
         earlier = self._checkpoint.load_stage(STAGE)
-        session.tell_problems()
+        session.notify_problems()
         if earlier is not None and raw is not None and not earlier["kept"]:
-            session.tell("what was summed up without keeping the samples is simulated again")
+            session.notify("what was summed up without keeping the samples is simulated again")
         elif earlier is not None:
             self._sums.restore(earlier)
             if raw is not None and (gone := RawFiles.missing(raw, self._whole_blocks())):
-                session.tell(
+                session.notify(
                     f"{gone[0]} is missing in {raw}: what was summed up is simulated again"
                 )
                 self._sums = self._new_sums()
@@ -210,9 +210,9 @@ class _Streaming:
                 self._run_rest(seconds)
             if self._files is not None:
                 with self._session.ranks.stage("files"), self._session.ranks.writing():
-                    told = self._files.finish()
-                if told:
-                    self._session.tell(told)
+                    message = self._files.finish()
+                if message:
+                    self._session.notify(message)
         return self._session.write(self._dataset())
 
     def _run_rest(self, seconds: float) -> None:

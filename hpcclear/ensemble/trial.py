@@ -73,13 +73,13 @@ class Drawn:
             return self._vicinity(first, count)
         designs = monte_carlo(
             self._scene, count * (1 if self.scattered else self.size), random=(),
-            purpose="designs of effects", scrambling=0, first=first * (1 if self.scattered else self.size),
+            purpose="designs of effects", replicate=0, first=first * (1 if self.scattered else self.size),
         )  # fmt: skip
         if not self.scattered:
             return designs
         parts = [
             monte_carlo(
-                self._scene, self.size, purpose="effects", scrambling=first + k,
+                self._scene, self.size, purpose="effects", replicate=first + k,
                 design=dict(zip(designs.names, row.tolist(), strict=True)),
             )
             for k, row in enumerate(designs.values)
@@ -264,13 +264,13 @@ class Trial:
     def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
         """Follow the effect screening to its end; raises what `simulate` does."""
 
-        def told(wanted: Sequence[Asked]) -> list[Seen]:
+        def answer(wanted: Sequence[Asked]) -> list[Seen]:
             return [
                 self.seen(one, simulate(self.simulated(one.off), self.points(one)))
                 for one in wanted
             ]
 
-        return answered(certificate(plan), told)
+        return answered(certificate(plan), answer)
 
     def seconds(self, variants: Sequence[Variant], rounds: int = 3) -> dict[str, float]:
         """Processor time of a sample of each, by names, measured here in turn: the least of some rounds, s."""

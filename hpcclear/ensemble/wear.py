@@ -33,7 +33,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 
-KICK = 1e-9
+PERTURBATION = 1e-9
 """Relative difference of the clearances of two copies."""
 
 
@@ -103,7 +103,7 @@ def _check_bounds(scene: Scene) -> None:
 
 
 def of_lives(scene: Scene) -> Scene:
-    """The scene without inputs that its lives are to tell: their clearances are new ones, with what scatter these have."""
+    """The scene without inputs that its lives are to notify: their clearances are new ones, with what scatter these have."""
     if scene.study is None or not scene.study.worn:
         return scene
     changes: dict[str, Any] = {"study.cases": {}}
@@ -146,17 +146,17 @@ class States:
     def rows(self, number: int, asked: Asked) -> Array:
         """Designs of a life's copies, shape (copies, names)."""
         clearance, radius = self._joints[number].worn(asked.work)
-        kicks = 1.0 + KICK * np.array(asked.copies)[:, None]
+        factors = 1.0 + PERTURBATION * np.array(asked.copies)[:, None]
         state = np.stack(
-            [clearance * kicks, np.broadcast_to(radius, kicks.shape[:1] + radius.shape)], -1
+            [clearance * factors, np.broadcast_to(radius, factors.shape[:1] + radius.shape)], -1
         )
-        fixed = np.repeat(self._fixed[number][None], len(kicks), axis=0)
-        parts = [fixed, state.reshape(len(kicks), -1)]
+        fixed = np.repeat(self._fixed[number][None], len(factors), axis=0)
+        parts = [fixed, state.reshape(len(factors), -1)]
         if self.relief.size:
             worn = np.zeros(self._new.shape[1])
             if asked.moments is not None:
                 worn = self.relief.waves(self._joints[number], asked.moments).ravel()
-            parts.append(np.repeat((self._new[number] + worn)[None], len(kicks), axis=0))
+            parts.append(np.repeat((self._new[number] + worn)[None], len(factors), axis=0))
         return np.concatenate(parts, axis=1)
 
     def points(self, rows: Array) -> Points:

@@ -27,7 +27,7 @@ from hpcclear.base.errors import (
 from hpcclear.base.extras import installing
 from hpcclear.base.plain import plain
 from hpcclear.ranks import launcher
-from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
+from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.stopping import (
     ANEW,
     GRACE,
@@ -81,13 +81,17 @@ def run_on_ranks(
         stop = stack.enter_context(StopSwitch()) if stop is None else stop
         stop.outlook = RESUMES if resumes else ANEW
         try:
+            check_address_space(launcher.launched_size()[1] > 1)
             mail = _open_mail()
+        except LimitError as error:  # MPI might end the process with a code of its own
+            launcher.end_job(f"Error: {error}", Exit.FAILED)
+            return Exit.FAILED
         except InputError as error:
             if launcher.launched_rank() in (0, None):  # every copy finds the same
                 _say(f"Error: {error}")
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
-        refused = _refused(mail, *_want(mail.size > 1))
+        refused = _refused(mail)
         if refused:
             return refused
         ranks = Ranks(mail, stop)
@@ -112,7 +116,7 @@ def _watch(ranks: Ranks) -> Watch:
             f"or the network is gone"
         )
         if ranks.is_root:
-            mail.tell_itself(
+            mail.notify_itself(
                 Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
             )
             return
@@ -142,38 +146,29 @@ def refuse_together(complaint: str) -> int:
         if launcher.launched_rank() in (0, None):
             _say(complaint)
     else:
-        _refused(mail, complaint, Exit.BAD_INPUT)
+        _refused(mail, complaint)
     return Exit.BAD_INPUT
 
 
-def _want(others: bool) -> tuple[str, int]:
-    """What this rank's process lacks for the work, and the exit code of that."""
-    try:
-        check_address_space(others)
-    except LimitError as error:
-        return f"Error: {error}", Exit.FAILED
-    return "", Exit.DONE
-
-
-def _refused(mail: Mail, complaint: str, code: int) -> int:
+def _refused(mail: Mail, complaint: str = "") -> int:
     """Exit code if the ranks cannot begin together, which root says, or 0; every rank calls it and hears the same."""
-    said = mail.everyone((complaint, code, os.environ.get("HPCCLEAR_LANES", "")))
-    complaints = [(rank, text, code) for rank, (text, code, _) in enumerate(said) if text]
-    lanes = sorted({asked for _, _, asked in said})
+    said = mail.everyone((complaint, os.environ.get("HPCCLEAR_LANES", "")))
+    complaints = [(rank, text) for rank, (text, _) in enumerate(said) if text]
+    lanes = sorted({asked for _, asked in said})
     if complaints:
-        rank, text, code = complaints[0]
+        rank, text = complaints[0]
         text = text if rank == 0 else f"rank {rank} of {mail.size}: {text}"
     elif len(lanes) > 1:
         shown = ", ".join(asked or "nothing" for asked in lanes)
         reason = "it differs from rank to rank"
         remedy = "Set it to the same value on all ranks, or on none"
-        text, code = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}", Exit.BAD_INPUT
+        text = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}"
     else:
         return Exit.DONE
     if mail.rank == 0:
         _say(text)
     mail.finalize()
-    return code
+    return Exit.BAD_INPUT
 
 
 def alone() -> Ranks:
@@ -253,7 +248,7 @@ def _after_mpi() -> Mail:
 
 def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     """Run the program, say how it ended, and send the others home with the same exit code."""
-    text = told = ""
+    text = note = ""
     try:
         code = program(ranks) or Exit.DONE
     except Stopped as error:
@@ -263,42 +258,42 @@ def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
     except StorageError as error:
         code, text = Exit.FAILED, f"Error: {error}"
     except RankFailed as error:
-        code, told = error.code, str(error)
+        code, note = error.code, str(error)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
     except BaseException as error:  # noqa: BLE001 - the rank boundary
         user_error = isinstance(mendable(error), InputError)
         code = Exit.BAD_INPUT if user_error else Exit.FAILED
         text = _report(ranks, error)
-    if text or told:
-        ranks.stop_switch.told = True
+    if text or note:
+        ranks.stop_switch.reported = True
     if text:
         _say(text)
-    return _dismiss(ranks, int(code), told)
+    return _dismiss(ranks, int(code), note)
 
 
-def _dismiss(ranks: Ranks, code: int, told: str = "") -> int:
-    """Tell the others to leave; after a failure those who do not listen are ended.
+def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:
+    """Notify the others to leave; after a failure those who do not listen are ended.
 
     An error of another rank is reported last. A rank that cannot reach root reports the error itself and ends the job.
     """
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
-    ranks.mail.tell_others(Tag.LEAVE, code)
-    waited_for, nap = set(range(1, ranks.size)), Nap()
+    ranks.mail.notify_others(Tag.LEAVE, code)
+    waited_for, backoff = set(range(1, ranks.size)), Backoff()
     patience = time.monotonic() + 1.5
     while waited_for:
         message = ranks.mail.poll()
         if message is None:
             if code != Exit.DONE and time.monotonic() > patience:
-                _say_and_abort(ranks, told, code)
-            nap.take()
+                _say_and_abort(ranks, note, code)
+            backoff.wait()
         elif message.tag == Tag.LEFT:
             waited_for.discard(message.source)
         elif message.tag == Tag.ERROR and code == Exit.DONE:
             _say_and_abort(ranks, *message.body[:2])
-    if told:
-        _say(told)
+    if note:
+        _say(note)
     return code
 
 
@@ -309,26 +304,26 @@ def _as_worker(ranks: Ranks, ahead: Sequence[str]) -> int:
     except Leave as leave:
         code = leave.code
     except BaseException as error:  # noqa: BLE001 - the rank boundary
-        code = _tell_root(ranks, error)
+        code = _notify_root(ranks, error)
     if code != Exit.DONE:
         ranks.stop_switch.leave_within(GRACE, code)
     ranks.mail.send(0, Tag.LEFT)
     return code
 
 
-def _tell_root(ranks: Ranks, error: BaseException) -> int:
+def _notify_root(ranks: Ranks, error: BaseException) -> int:
     """Send a report and finished records to root; if root is deaf, report and end the job here."""
     known = isinstance(error, InputError)
-    told = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
-    ranks.mail.send(0, Tag.ERROR, (*told, ranks.outbox()))
-    patience, nap = time.monotonic() + 2.0, Nap()
+    note = (f"Error: {error}", Exit.BAD_INPUT) if known else (_report(ranks, error), Exit.FAILED)
+    ranks.mail.send(0, Tag.ERROR, (*note, ranks.outbox()))
+    patience, backoff = time.monotonic() + 2.0, Backoff()
     while time.monotonic() < patience:
         message = ranks.mail.poll()
         if message is not None and message.tag == Tag.LEAVE:
             return int(message.body)
-        nap.take()
-    _say_and_abort(ranks, *told)
-    return told[1]
+        backoff.wait()
+    _say_and_abort(ranks, *note)
+    return note[1]
 
 
 def _report(ranks: Ranks, error: BaseException) -> str:

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
+from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Desk, HandOut, Kept, Need, Points
+from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, HandOut, Kept, Need, Points, WorkQueue
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 EARLY = 1.0
@@ -31,7 +31,7 @@ class Process(Protocol):
     stop_switch: StopSwitch
     rank: int
 
-    def make_desk(self, task: Any, /) -> tuple[Desk, float]:
+    def make_queue(self, task: Any, /) -> tuple[WorkQueue, float]:
         """A worker for a task, and the seconds it took to make it."""
 
     def raise_if_stopped(self) -> None:
@@ -113,15 +113,15 @@ class Lead:
         index, ask_below = self.book.grant(need)
         self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
 
-    def _work_along(self, desk: Desk, nap: Nap) -> None:
+    def _work_along(self, queue: WorkQueue, backoff: Backoff) -> None:
         """Take samples oneself when it is time, and work on them for a moment; sleep if there is nothing to do."""
-        if desk.hungry and self._can_answer:
-            index, ask_below = self.book.grant(desk.need)
-            desk.take(index, self._points[index], ask_below)
-        if desk.idle:
-            nap.take()
+        if queue.hungry and self._can_answer:
+            index, ask_below = self.book.grant(queue.need)
+            queue.take(index, self._points[index], ask_below)
+        if queue.idle:
+            backoff.wait()
         else:
-            self._accept(desk.work(GLANCE if self._awaited else QUANTUM))
+            self._accept(queue.work(GLANCE if self._awaited else QUANTUM))
 
     @property
     def _awaited(self) -> bool:
@@ -167,7 +167,7 @@ class RootLead(Lead):
         """
         self._spent = spent
         self._ranks.raise_if_stopped()
-        self._mail.tell(self._members, Tag.STAGE, task)
+        self._mail.notify(self._members, Tag.STAGE, task)
         try:
             self._hand_out(task)
         except BaseException as error:
@@ -178,27 +178,27 @@ class RootLead(Lead):
 
     def _hand_out(self, task: object) -> None:
         """Answer the others and work along until every sample is finished."""
-        desk, self._spent[0, _COMPILE] = self._ranks.make_desk(task)
-        nap = Nap()
+        queue, self._spent[0, _COMPILE] = self._ranks.make_queue(task)
+        backoff = Backoff()
         while not self.book.done:
             while (message := self._mail.poll()) is not None:
                 self._answer(message)
-                nap.reset()
+                backoff.reset()
             if self._ranks.stop_switch.is_set():
                 raise Stopped(self._ranks.stop_switch.reason)
-            self._work_along(desk, nap)
-            self._spent[0, _BUSY] = desk.busy
+            self._work_along(queue, backoff)
+            self._spent[0, _BUSY] = queue.busy
             self.progress.refresh()
 
     def _gather(self, until: float | None) -> None:
         """End the stage on every rank; after an error or a stop, do not wait for ever."""
         self._closing = True
-        self._mail.tell(self._members, Tag.END)
-        nap = Nap()
+        self._mail.notify(self._members, Tag.END)
+        backoff = Backoff()
         while self._present and (until is None or time.monotonic() < until):
             message = self._mail.poll()
             if message is None:
-                nap.take()
+                backoff.wait()
             elif until is None:
                 self._answer(message)
             else:  # one failure is on its way up already: the records count, not another report
@@ -236,9 +236,9 @@ class RootLead(Lead):
 class NodeLead(Lead):
     """A leader's part in a stage: it takes bundles from root, and shares out what they hold with the others on its node."""
 
-    def __init__(self, ranks: Process, sharing: Sharing, crew: list[int]) -> None:
-        super().__init__(ranks, HandOut(0, _NONE, 1 + len(crew)), sharing.points, crew)
-        self._sharing, self._crew = sharing, crew
+    def __init__(self, ranks: Process, sharing: Sharing, group: list[int]) -> None:
+        super().__init__(ranks, HandOut(0, _NONE, 1 + len(group)), sharing.points, group)
+        self._sharing, self._group = sharing, group
         self._sizes: list[int] = []  # samples of each bundle
         self._waiting: list[tuple[int, Need]] = []  # asked while nothing was there
         self._ask_below = 1  # bundles
@@ -247,28 +247,30 @@ class NodeLead(Lead):
 
     def work(self, task: object) -> None:
         """Serve the node until root ends the stage."""
-        self._mail.tell(self._crew, Tag.STAGE, task)  # before the worker is made: nodes meet there
-        desk, setup = self._ranks.make_desk(task)
+        self._mail.notify(
+            self._group, Tag.STAGE, task
+        )  # before the worker is made: nodes meet there
+        queue, setup = self._ranks.make_queue(task)
         try:
-            self._share_out(desk)
+            self._share_out(queue)
             self._close()
         except Exception:
             self._report()  # what is finished; the error follows
             raise
-        self._times.append((self._ranks.rank, desk.busy, setup))
+        self._times.append((self._ranks.rank, queue.busy, setup))
         self._report()
         self._mail.send(0, Tag.DONE, (None, self._times))
 
-    def _share_out(self, desk: Desk) -> None:
+    def _share_out(self, queue: WorkQueue) -> None:
         """Answer root and the others, and work along."""
-        nap = Nap()
+        backoff = Backoff()
         while not self._over:
             while (message := self._mail.poll()) is not None:
                 self._hear(message)
-                nap.reset()
+                backoff.reset()
             self._ranks.pass_on_stop()
             self._speak()
-            self._work_along(desk, nap)
+            self._work_along(queue, backoff)
 
     def _hear(self, message: Message) -> None:
         """Root's word, or an answer to one of the others."""
@@ -320,12 +322,12 @@ class NodeLead(Lead):
     def _close(self) -> None:
         """Let the others end the stage, and take what they have."""
         self._closing = True
-        self._mail.tell(self._crew, Tag.END)
-        nap = Nap()
+        self._mail.notify(self._group, Tag.END)
+        backoff = Backoff()
         while self._present:
             message = self._mail.poll()
             if message is None:
-                nap.take()
+                backoff.wait()
             else:
                 self._hear(message)
 

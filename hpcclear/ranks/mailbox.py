@@ -37,7 +37,7 @@ class Tag(IntEnum):
     ASK = 6  # wants samples: (finished records or None, need)
     RECORDS = 7  # finished records
     DONE = 8  # stage or call are over here: (finished records or None, [(rank, busy and set-up seconds)])
-    STOP = 9  # was told to stop: reason
+    STOP = 9  # has to stop: reason
     ERROR = 10  # failed: (report or InputError, finished records or None)
     LEFT = 11  # has heard LEAVE
 
@@ -50,14 +50,14 @@ class Message(NamedTuple):
     body: Any
 
 
-class Nap:
+class Backoff:
     """Sleeps longer and longer while nothing happens, so that waiting costs no processor time."""
 
     def __init__(self, longest: float = 0.01) -> None:
         self._longest = longest
         self._seconds = _SHORTEST
 
-    def take(self) -> None:
+    def wait(self) -> None:
         """Sleep, half as long again as last time."""
         time.sleep(self._seconds)
         self._seconds = min(1.5 * self._seconds, self._longest)
@@ -87,7 +87,7 @@ class Mail:
         Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
     leaders : list of int
         The first rank of each node but for root, which is none of them.
-    crew : list of int
+    group : list of int
         Of a leader: the other ranks of its node but for root.
     """
 
@@ -97,10 +97,10 @@ class Mail:
         self._sent: list[tuple[Any, bytes]] = []
         self._pulsed: list[Any] = []
         self._lock = threading.Lock()
-        self._news: deque[Message] = deque()  # what this rank has to tell itself
+        self._news: deque[Message] = deque()  # messages of this rank to itself
         self.neighbours: list[int] = []
         self.leaders: list[int] = []
-        self.crew: list[int] = []
+        self.group: list[int] = []
         cores = host.cores()
         if mpi is None:
             self.rank, self.size = 0, 1
@@ -124,7 +124,7 @@ class Mail:
         every = self._comm.allgather((first, working[0] if working else 0))
         self.leaders = sorted({leader for _, leader in every} - {0})
         if self.rank in self.leaders:
-            self.crew = working[1:]
+            self.group = working[1:]
         if threads and self.rank != first:
             self.neighbours = [first]
         elif threads:
@@ -140,11 +140,11 @@ class Mail:
         if self._mpi is not None:
             self._post(to, tag, self._mpi.pickle.dumps(body))
 
-    def tell_others(self, tag: Tag, body: object = None) -> None:
+    def notify_others(self, tag: Tag, body: object = None) -> None:
         """Post one message to every other rank."""
-        self.tell((other for other in range(self.size) if other != self.rank), tag, body)
+        self.notify((other for other in range(self.size) if other != self.rank), tag, body)
 
-    def tell(self, others: Iterable[int], tag: Tag, body: object = None) -> None:
+    def notify(self, others: Iterable[int], tag: Tag, body: object = None) -> None:
         """Post one message to each of these ranks."""
         if self._mpi is not None:
             data = self._mpi.pickle.dumps(body)
@@ -170,7 +170,7 @@ class Mail:
                 return None
             return Message(status.source, status.tag, message.recv())
 
-    def tell_itself(self, message: Message) -> None:
+    def notify_itself(self, message: Message) -> None:
         """Let `poll` return a message that nobody sent; for the other thread."""
         self._news.append(message)
 
@@ -193,9 +193,9 @@ class Mail:
     def meet_on_node(self) -> None:
         """Wait until every rank of this node is here."""
         if self._mpi is not None:
-            request, nap = self._node.Ibarrier(), Nap()
+            request, backoff = self._node.Ibarrier(), Backoff()
             while not self._is_complete(request):
-                nap.take()
+                backoff.wait()
 
     def _is_complete(self, request: Any) -> bool:
         with self._lock:

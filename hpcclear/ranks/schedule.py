@@ -208,7 +208,7 @@ class Kept:
         return self._records if self._there.all() else self._records[self._there]
 
 
-class Desk:
+class WorkQueue:
     """One rank's side of it: feeds the worker, knows its stock, its speed and its busy time.
 
     Parameters

@@ -59,7 +59,7 @@ class StopSwitch:
     """Collects the signals and the time limit of one process; loops poll `is_set`.
 
     A thread of its own listens, since Python runs signal handlers only between two bytecodes of the
-    main thread, which a long fit in compiled code may not reach in time. Once told to stop, the
+    main thread, which a long fit in compiled code may not reach in time. Once asked to stop, the
     process has `GRACE` seconds before `last_resort` ends it: files are written whole and renamed,
     so that nothing breaks. A second SIGINT ends it at once.
 
@@ -91,7 +91,7 @@ class StopSwitch:
         self.last_resort: Callable[[int], object] = os._exit
         self.outlook = ANEW
         self._is_first = launched_rank() in (0, None)  # one of all copies tells how it ended
-        self.told = not self._is_first
+        self.reported = not self._is_first
 
     @property
     def reason(self) -> str:
@@ -144,7 +144,7 @@ class StopSwitch:
         if self._ends_process:
             for number in STOP_SIGNALS:
                 signal.signal(number, signal.SIG_IGN)
-            return  # the thread stays: who was told to leave leaves in time
+            return  # the thread stays: a rank that has to leave leaves in time
         for former, handler in self._previous.items():
             signal.signal(former, handler)  # type: ignore[arg-type]
         signal.set_wakeup_fd(self._previous_fd)
@@ -187,8 +187,8 @@ class StopSwitch:
         self.request(f"{signal.Signals(number).name} was received")
 
     def _end(self, code: int) -> None:
-        if code == Exit.STOPPED and not self.told:
-            self.told = True
+        if code == Exit.STOPPED and not self.reported:
+            self.reported = True
             text = f"Stopped early: {self.reason}, in the midst of something. {self.outlook}.\n"
             os.write(2, text.encode())  # the main thread may hold what sys.stderr needs
             time.sleep(0.2)  # the launcher passes it on

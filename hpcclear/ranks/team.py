@@ -18,17 +18,17 @@ import numpy as np
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
-from hpcclear.ranks.mailbox import Leave, Mail, Message, Nap, Tag
+from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import (
     COLUMNS,
     GLANCE,
     QUANTUM,
-    Desk,
     HandOut,
     Kept,
     Points,
     Worker,
+    WorkQueue,
 )
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
@@ -78,12 +78,15 @@ class Ranks:
         self.mail = mail
         self.stop_switch = stop
         self._stage = "start"
-        self._desk: Desk | None = None
+        self._queue: WorkQueue | None = None
         self._unsent: list[np.ndarray] = []
         self._writing = Stopwatch()  # output not booked yet
         self._booked = 0.0  # wall seconds booked in `stage_seconds`
         self._passed_on = False
-        self._known, self._recent = b"", np.zeros(2)  # a kind of worker, and its pace (see `Desk`)
+        self._known, self._recent = (
+            b"",
+            np.zeros(2),
+        )  # a kind of worker, and its pace (see `WorkQueue`)
         self.rank = mail.rank
         self.size = mail.size
         self.is_root = mail.rank == 0
@@ -104,7 +107,7 @@ class Ranks:
     @property
     def where(self) -> str:
         """Rank, stage and, after an error of the worker, its samples: for reports."""
-        samples = [] if self._desk is None else self._desk.suspects
+        samples = [] if self._queue is None else self._queue.suspects
         shown = ", ".join(map(str, samples[:8])) + (", ..." if len(samples) > 8 else "")
         place = f"rank {self.rank} of {self.size} in stage '{self._stage}'"
         if len(samples) > 1:
@@ -192,7 +195,7 @@ class Ranks:
         with contextlib.closing(progress), self._timed(task.name) as spent:
             if not run.book.done:
                 run.work(task, spent)
-                self._desk = None
+                self._queue = None
         return earlier[:0] if run.kept is None else run.kept.records()
 
     def everywhere(
@@ -218,13 +221,13 @@ class Ranks:
         """
         with self._timed(name) as spent:
             self.raise_if_stopped()
-            self.mail.tell_others(Tag.CALL, (name, function, payload))
+            self.mail.notify_others(Tag.CALL, (name, function, payload))
             spent[0, COLUMNS.index("compile")] = self._call(function, payload)
-            waited_for, nap = set(range(1, self.size)), Nap()
+            waited_for, backoff = set(range(1, self.size)), Backoff()
             while waited_for and not self.stop_switch.is_set():
                 message = self.mail.poll()
                 if message is None:
-                    nap.take()
+                    backoff.wait()
                 elif message.tag == Tag.DONE:
                     waited_for.discard(message.source)
                     spent[message.source, COLUMNS.index("compile")] = message.body[1][0][2]
@@ -265,69 +268,69 @@ class Ranks:
         elif message.tag == Tag.ERROR:
             raise RankFailed(*message.body[:2])
 
-    def make_desk(self, task: Task) -> tuple[Desk, float]:
+    def make_queue(self, task: Task) -> tuple[WorkQueue, float]:
         """This rank's worker, and the seconds it took to make it."""
         started = time.perf_counter()
         mark = pickle.dumps((task.make, task.payload)) if self.size > 1 else b""
         if mark != self._known:  # of a stage like the last one it is known how long samples take
             self._known, self._recent = mark, np.zeros(2)
-        self._desk = Desk(task.make(task.payload, self), recent=self._recent)
+        self._queue = WorkQueue(task.make(task.payload, self), recent=self._recent)
         working = self.size if task.workers is None else task.workers
-        self._desk.exhausted = self.rank >= working or (task.share is not None and self.is_root)
-        return self._desk, time.perf_counter() - started
+        self._queue.exhausted = self.rank >= working or (task.share is not None and self.is_root)
+        return self._queue, time.perf_counter() - started
 
     def serve(self, ahead: Sequence[str] = ()) -> NoReturn:
         """Work for root, stage after stage, until it says to leave; load the modules `ahead` while it says nothing yet."""
-        nap, waiting = Nap(0.02), list(ahead)
+        backoff, waiting = Backoff(0.02), list(ahead)
         while True:
             message = self.mail.poll()
             self.pass_on_stop()
             if message is None and waiting:
                 importlib.import_module(waiting.pop(0))
             elif message is None:
-                nap.take()
+                backoff.wait()
             elif message.tag == Tag.LEAVE:
                 raise Leave(message.body)
             elif message.tag == Tag.STAGE:
                 self._stage = message.body.name
                 if message.body.share is not None and message.source == 0:
                     sharing = message.body.share(message.body.payload)
-                    NodeLead(self, sharing, self.mail.crew).work(message.body)
+                    NodeLead(self, sharing, self.mail.group).work(message.body)
                 else:
                     self._serve_stage(message.body, message.source)
-                self._desk = None
-                nap.reset()
+                self._queue = None
+                backoff.reset()
             elif message.tag == Tag.CALL:
                 self._stage, function, payload = message.body
                 self.mail.send(
                     0, Tag.DONE, (None, [(self.rank, 0.0, self._call(function, payload))])
                 )
-                nap.reset()
+                backoff.reset()
 
     def _serve_stage(self, task: Task, leader: int) -> None:
         """Ask for samples before the last ones are done, send records along, until who hands them out ends it."""
-        desk, setup = self.make_desk(task)
-        asked, sent_at, nap = False, time.monotonic(), Nap()
+        queue, setup = self.make_queue(task)
+        asked, sent_at, backoff = False, time.monotonic(), Backoff()
         while (message := self.mail.poll()) is None or message.tag != Tag.END:
             self.pass_on_stop()
             if message is not None:
                 if message.tag == Tag.LEAVE:
                     raise Leave(message.body)
-                desk.take(*message.body)
+                queue.take(*message.body)
                 asked = False
-                nap.reset()
-            overdue = desk.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
-            if desk.hungry and not asked:
-                self.mail.send(leader, Tag.ASK, (self.outbox(), desk.need))
+                backoff.reset()
+            overdue = queue.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
+            if queue.hungry and not asked:
+                self.mail.send(leader, Tag.ASK, (self.outbox(), queue.need))
                 asked, sent_at = True, time.monotonic()
             elif self._unsent and overdue:
                 self.mail.send(leader, Tag.RECORDS, self.outbox())
                 sent_at = time.monotonic()
-            if desk.idle:
-                nap.take()
+            if queue.idle:
+                backoff.wait()
             else:
-                self._unsent.append(desk.work(GLANCE if desk.soon_hungry else QUANTUM))
-        self.mail.send(leader, Tag.DONE, (self.outbox(), [(self.rank, desk.busy, setup)]))
+                self._unsent.append(queue.work(GLANCE if queue.soon_hungry else QUANTUM))
+        self.mail.send(leader, Tag.DONE, (self.outbox(), [(self.rank, queue.busy, setup)]))
 
     def outbox(self) -> np.ndarray | None:
         """Finished records that root has not got yet; empties the box."""

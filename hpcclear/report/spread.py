@@ -17,7 +17,7 @@ from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.results.names import KINDS
 from hpcclear.scene.units import UnitError, to_si
-from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_limits, share_limits
+from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_interval, share_interval
 
 LEVELS = (0.5, 0.95, 0.99)
 """Probabilities of the quantiles that are stated."""
@@ -169,7 +169,7 @@ def _quantile(values: Array, level: float, unit: str, drawn: bool) -> str:
     if not drawn:
         return labels.quantity(value, unit)
     failed = len(values) - len(known)
-    low, high = order_limits(known, level, failed)
+    low, high = order_interval(known, level, failed)
     if np.isfinite([low, high]).all():
         return f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
     if failed and len(values) >= fewest(level):
@@ -188,8 +188,8 @@ def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
     label = f"{name} > {labels.quantity(one.value, str(samples[one.name].attrs['units']))}"
     text = f"{_percent(above / (total - failed))} of the samples" if total > failed else "–"
     if drawn and total > failed:
-        low = float(share_limits(np.array([above]), total)[0][0])
-        high = float(share_limits(np.array([above + failed]), total)[1][0])
+        low = float(share_interval(np.array([above]), total)[0][0])
+        high = float(share_interval(np.array([above + failed]), total)[1][0])
         text = f"{text} ({_percent(low)} to {_percent(high)})"
     return Line(label, text)
 

@@ -348,7 +348,7 @@ EFFECTS: Columns = {
     "off": flag(("variant", "effect"), "whether the effect is disabled in the variant", required=True),
     "change": number(("variant", "response"), "1", "relative change from the complete scene", required=True),
     "limit": number(("variant", "response"), "1", "half-width of its confidence interval", required=True),
-    "told": flag(("variant", "response"), "whether the change is within the tolerance", required=True),
+    "finding": flag(("variant", "response"), "whether the change is within the tolerance", required=True),
     "decision": flag(("variant",), "whether all changes that count are within the tolerance", required=True),
     "point_change": number(("variant",), "1",
         "root mean square change of single samples, relative to the mean", required=True),

@@ -22,10 +22,10 @@ PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 _STATED = ("source", "license", "hpcclear_version", "versions", "processor")
 
 
-def write_crate(directory: Path, tell: Callable[[str], object] = lambda text: None) -> Path:
+def write_crate(directory: Path, notify: Callable[[str], object] = lambda text: None) -> Path:
     """Write DIRECTORY/ro-crate-metadata.json from what the result files below it say of themselves.
 
-    Equal files of equal ages give equal bytes. `tell` gets a sentence for each file that is damaged and left out.
+    Equal files of equal ages give equal bytes. `notify` gets a sentence for each file that is damaged and left out.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def write_crate(directory: Path, tell: Callable[[str], object] = lambda text: No
     found = {path: one for path, one in read.items() if isinstance(one, xr.Dataset)}
     for path, one in read.items():
         if isinstance(one, InputError):
-            tell(f"{path} is left out: {one.reason}")
+            notify(f"{path} is left out: {one.reason}")
             if not found:
                 raise one
     place = directory / NAME

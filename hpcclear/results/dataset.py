@@ -31,7 +31,7 @@ from hpcclear.base.outcome import (
     Status,
 )
 from hpcclear.results import netcdf
-from hpcclear.results.names import DESIGN_VARIABLES, FURTHER, KINDS, Column, Kind
+from hpcclear.results.names import DESIGN_VARIABLES, FORMER, FURTHER, KINDS, Column, Kind
 
 CONVENTIONS = "CF-1.11"
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
@@ -97,6 +97,7 @@ def dataset(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
+    data = {**data, **{FORMER[name]: values for name, values in data.items() if name in FORMER}}
     least = set(table.coords) - FURTHER_DIMS if whole else set()
     if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
@@ -247,8 +248,8 @@ def samples_dataset(
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
     if "sliding_waves" in kept:
         coords["wave"] = np.arange(WAVE_ROWS)
-    told = {**(attributes or {}), **_checked(data)}
-    return dataset("samples", coords, data, told, units, objective, words)
+    attrs = {**(attributes or {}), **_checked(data)}
+    return dataset("samples", coords, data, attrs, units, objective, words)
 
 
 def _checked(data: Mapping[str, ArrayLike]) -> dict[str, str]:
@@ -305,8 +306,8 @@ def response_dataset(
     """
     coords = {"time": time, "joint": np.array(joints, dtype=str)}
     coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
-    told = {**(attributes or {}), **_checked(data)}
-    return dataset("response", coords, data, told, objective=objective)
+    attrs = {**(attributes or {}), **_checked(data)}
+    return dataset("response", coords, data, attrs, objective=objective)
 
 
 def timing_dataset(
@@ -330,7 +331,7 @@ def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, s
     references : str
         Published work that its numbers are taken from; "" leaves the attribute out.
     """
-    version = metadata.version("hpcclear")
+    version = _version()
     return {
         "source": f"hpcclear {version}",
         "history": f"written by hpcclear {version}",
@@ -341,6 +342,11 @@ def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, s
         "versions": _versions(),
         "processor": _processor(),
     }
+
+
+@functools.cache
+def _version() -> str:
+    return metadata.version("hpcclear")
 
 
 @functools.cache
@@ -398,6 +404,7 @@ def read(
     """
     place = _path(path)
     content = netcdf.load(place)
+    content = content.rename({o: n for n, o in FORMER.items() if o in content and n not in content})
     fault = _fault(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")

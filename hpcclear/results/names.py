@@ -41,6 +41,13 @@ SECONDS_PER_SAMPLE = "seconds_per_sample"
 ALL_ON = "all on"
 """Name of the whole scene there."""
 
+FORMER = {
+    "lyapunov_exponent": "kick_growth",
+    "lyapunov_exponent_limit": "kick_growth_limit",
+    "finding": "told",
+}
+"""Former names of variables. Files have them as well, deprecated, until the next minor version."""
+
 
 def _meanings(*words: str) -> dict[str, object]:
     """Codes from 0 on, and what they mean."""
@@ -70,7 +77,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "accepted": _meanings("refused", "accepted"),
     "verified": _meanings("not_simulated", "simulated"),
     "off": _meanings("on", "off"),
-    "told": _meanings("within", "beyond", "undecided"),
+    "finding": _meanings("within", "beyond", "undecided"),
     "decision": _meanings("within", "beyond", "undecided"),
     "judged": _meanings("reported", "judged"),
     "recommended": _meanings("not_recommended", "recommended"),
@@ -78,6 +85,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "together": _meanings("independent", "correlated"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
+FURTHER |= {FORMER[name]: FURTHER[name] for name in FORMER if name in FURTHER}
 """CF attributes beyond units and long name: what the codes mean."""
 
 
@@ -90,10 +98,13 @@ def _kind(
     whole: bool = False,
 ) -> Kind:
     """A kind of file; of a `whole` one only what is made on request may be missing."""
+    for name in (name for name in FORMER if name in table):
+        row = table[name]._replace(long_name=f"deprecated: now {name}", required=False)
+        table = {**table, FORMER[name]: row}
     coords = {name: row for name, row in table.items() if row.dims == (name,)}
     data = {name: row for name, row in table.items() if name not in coords}
     required = (
-        set(data) - {*ON_REQUEST, *JUDGED, "label"}
+        set(data) - {*ON_REQUEST, *JUDGED, *FORMER.values(), "label"}
         if whole
         else {n for n in data if data[n].required}
     )

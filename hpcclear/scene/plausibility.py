@@ -22,8 +22,6 @@ LONGEST = 5.0
 """Of a crank or rod, m."""
 THINNEST, THICKEST = 1e-5, 20.0
 """Viscosities of air and of the thickest gear oil when cold, Pa s."""
-LONGEST_SHORT, SHORTEST_LONG = 1.0, 2.0
-"""Length over diameter up to which a bearing may be called short, and from which long."""
 STEEL = 7850.0
 """kg/m3."""
 
@@ -130,10 +128,9 @@ def _films(scene: SceneTables) -> Iterator[str]:
                 f'and if mPa s are meant, write "{film.viscosity:g} mPa*s"'
             )
         ratio = 0.5 * film.length / scene.clearance_joint(name).bearing_radius
-        if (film.model == "short" and ratio > LONGEST_SHORT) or (
-            film.model == "long" and ratio < SHORTEST_LONG
-        ):
+        least, most = film.law.lengths
+        if not least <= ratio <= most:
             yield (
                 f'{key}.model = "{film.model}" overestimates the load capacity of a bearing {ratio:.2g} diameters long. '
-                f'Short films go up to {LONGEST_SHORT:g}, long ones begin at {SHORTEST_LONG:g}; model = "finite" covers both'
+                f'It is for {film.law.valid}; model = "finite" covers all lengths'
             )

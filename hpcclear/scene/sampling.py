@@ -115,7 +115,7 @@ def _chances(
     purpose: str,
     names: Sequence[str],
     span: tuple[int, int],
-    scrambling: int | None,
+    replicate: int | None,
     stratified: bool,
 ) -> list[Array]:
     """Independent probabilities of each name, `span`: from which index on and how many; as `monte_carlo` has them."""
@@ -125,18 +125,18 @@ def _chances(
             raise InputError("first", first, "a Latin hypercube cannot be divided", "Begin at 0")
         rng = generator(seed, f"stratified {purpose}")
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
-    if scrambling is None:
+    if replicate is None:
         label = f"monte-carlo {purpose}"
         return [_uniform(seed, label, name, first, count) for name in names]
-    return list(_scrambled(seed, purpose, scrambling, len(names), first, count).T)
+    return list(_scrambled(seed, purpose, replicate, len(names), first, count).T)
 
 
 @lru_cache(maxsize=64)
 def _scrambled(
-    seed: int, purpose: str, scrambling: int, dimensions: int, first: int, count: int
+    seed: int, purpose: str, replicate: int, dimensions: int, first: int, count: int
 ) -> Array:
     """Points of a randomised sequence, (count, dimensions), read only: all designs of a study meet the same."""
-    rng = generator(seed, f"sobol {purpose}", str(scrambling))
+    rng = generator(seed, f"sobol {purpose}", str(replicate))
     points = sobol(dimensions, rng, first, count)
     points.flags.writeable = False
     return points
@@ -150,7 +150,7 @@ def monte_carlo(
     design: Mapping[str, float] | None = None,
     purpose: str = "train",
     first: int = 0,
-    scrambling: int | None = None,
+    replicate: int | None = None,
     stratified: bool = False,
 ) -> Points:
     """Samples `first` to `first + samples` of the study's random inputs.
@@ -170,7 +170,7 @@ def monte_carlo(
         and inputs scatter about the scene.
     purpose, first
         Which stream, and where in it to begin.
-    scrambling : int, optional
+    replicate : int, optional
         Number of a randomised Sobol sequence whose samples replace independent ones; each sequence
         is one independent estimate. Begin and end at powers of two.
     stratified : bool
@@ -194,7 +194,7 @@ def monte_carlo(
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
     values = np.empty((count, len(names)))
     moving = [name for name in names if name in chosen or fixed is None]
-    uniform = _chances(study.seed, purpose, moving, (first, count), scrambling, stratified)
+    uniform = _chances(study.seed, purpose, moving, (first, count), replicate, stratified)
     if study.correlation is not None:
         uniform = _together(study.correlation, moving, chosen, uniform)
     for column, name in enumerate(names):
@@ -301,7 +301,7 @@ def sampled(scene: Scene) -> Points:
         case "random-lhs":
             points = monte_carlo(scene, stratified=True)
         case "qmc":
-            points = monte_carlo(scene, scrambling=0)
+            points = monte_carlo(scene, replicate=0)
         case _:
             points = monte_carlo(scene)
     return replace(points, sampling=method)

@@ -179,7 +179,7 @@ class Scene(SceneTables):
         return result
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and self.resolved() == other.resolved()
+        return self is other or (isinstance(other, Scene) and self.hash == other.hash)
 
     def __hash__(self) -> int:
         return hash(self.hash)

@@ -198,7 +198,7 @@ def of_both(entry: Any) -> Any:
     return dict.fromkeys(MOMENTS, given[0]) | dict(entry) if len(given) == 1 else entry
 
 
-SCRAMBLINGS = 16
+REPLICATES = 16
 """Independently randomised Sobol sequences of equal length: enough to estimate their scatter, few enough to be long."""
 
 
@@ -208,10 +208,10 @@ class Verification(Table):
     method: Literal["qmc", "monte-carlo"] | None = None
     """Sampling of the random inputs: "qmc", 16 randomised Sobol sequences, as long as `study.accuracy` requires; or
     "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
-    least_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] | None = None
+    least_samples: Annotated[int, Count(REPLICATES * 4, 2**30)] | None = None
     """First number of simulations of a design, from which its accuracy is estimated, for "qmc"; default 512, at most
     `most_samples`."""
-    most_samples: Annotated[int, Count(SCRAMBLINGS * 4, 2**30)] = 2**14
+    most_samples: Annotated[int, Count(REPLICATES * 4, 2**30)] = 2**14
     """Largest number of simulations of a design, for "qmc"."""
     contest: Annotated[int, Count(1, 2**10)] = 4
     """Factor on the simulations that the accuracy requires, for "qmc". Designs of the search may use
@@ -232,7 +232,7 @@ class Verification(Table):
     0: only designs of the search are verified."""
     infill_designs: Annotated[int, Count(1, 10**4)] = 12
     """Designs of a case in each round."""
-    infill_samples: Annotated[int, Count(SCRAMBLINGS * 2, 10**9)] = 256
+    infill_samples: Annotated[int, Count(REPLICATES * 2, 10**9)] = 256
     """Largest number of simulations of each of these, by randomised Sobol sequences; at most `samples`, where that is given."""
     response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
     """Clearance of all joints in the compared responses, m; default the clearances of scene and design."""

@@ -22,9 +22,6 @@ from hpcclear.scene.validation import validated
 GENTLE_RAMP = 50.0
 """Friction coefficient over ramp speed, s/m, that a steeper ramp is widened to: half of what calls for implicit steps."""
 
-SHORT_TO = 1.5
-"""Length over diameter up to which a short film is nearer to the finite one, and from which a long one."""
-
 FEW_MODES = (2, 1)
 """Modes that a bar which bends in more of them is tried with."""
 
@@ -71,12 +68,12 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
     Clearance in a joint of ``numerics.objective_joints`` is left out, since it makes up the objective.
     """
     return (
-        *_plays(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
+        *_clearances(scene), *_films(scene), *_surfaces(scene), *_frictions(scene), *_contacts(scene),
         *_bendings(scene), *_outside(scene), *_drives(scene),
     )  # fmt: skip
 
 
-def _plays(scene: Scene) -> Iterator[Switch]:
+def _clearances(scene: Scene) -> Iterator[Switch]:
     for label in scene.clearance_joints():
         if label in scene.numerics.objective_joints:
             continue
@@ -92,10 +89,9 @@ def _films(scene: Scene) -> Iterator[Switch]:
     for label, film in scene.films().items():
         key = f"{scene.joint_key(label)}.film"
         yield Switch(f"oil film in {label}", {key: None})
-        if film.model == "finite":
-            slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
-            closed = "short" if slender < SHORT_TO else "long"
-            yield Switch(f"finite length of the film in {label}", {f"{key}.model": closed})
+        slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
+        for words, model in () if film.law.simpler is None else film.law.simpler(slender):
+            yield Switch(f"{words} in {label}", {f"{key}.model": model})
 
 
 def _surfaces(scene: Scene) -> Iterator[Switch]:
@@ -231,9 +227,11 @@ class Off:
 
     def __init__(self, scene: Scene, off: Sequence[Switch]) -> None:
         self._off = list(off)
-        plays = {one.joint for one in off if one.joint is not None}
-        if plays and plays == set(scene.clearance_joints()):
-            self._off.append(Switch("", {"effects.friction": {"law": "none"}}))  # acts in play only
+        joints = {one.joint for one in off if one.joint is not None}
+        if joints and joints == set(scene.clearance_joints()):
+            self._off.append(
+                Switch("", {"effects.friction": {"law": "none"}})
+            )  # acts in clearances only
         self.scene = self._made(scene)
 
     def paths(self, paths: Sequence[str]) -> tuple[str, ...]:

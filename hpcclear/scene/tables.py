@@ -52,6 +52,7 @@ class SceneTables(Table):
     }
 
     _known_numbers: dict[str, float] | None = PrivateAttr(None)
+    _known_hash: str | None = PrivateAttr(None)
     _linkage: Planar | None = PrivateAttr(None)
 
     @field_validator("format_version", mode="before")
@@ -379,10 +380,12 @@ class SceneTables(Table):
     def hash(self) -> str:
         """SHA-256 of the resolved content: spelling, comments and units of the file do not
         matter."""
-        # The order of keys stays as it is: tables have the model's order, and the order of study
-        # variables is the order of the columns of their design, so it has to count.
-        content = json.dumps(self.resolved(), ensure_ascii=True, allow_nan=False)
-        return hashlib.sha256(content.encode()).hexdigest()
+        if self._known_hash is None:  # a scene never changes, and every cache asks
+            # The order of keys stays as it is: tables have the model's order, and the order of
+            # study variables is the order of the columns of their design, so it has to count.
+            content = json.dumps(self.resolved(), ensure_ascii=True, allow_nan=False)
+            self._known_hash = hashlib.sha256(content.encode()).hexdigest()
+        return self._known_hash
 
     def resolved(self) -> dict[str, Any]:
         """The whole content as plain nested dicts, lists, numbers (SI) and strings, defaults filled

@@ -1,26 +1,23 @@
 """The study, from a scene to verified designs: read this after the README.
 
-0. Lives, where a clearance is random as wear leaves it: they are followed, and what their joints come to is the distribution.
-0. On request the certificate of effects: what the scene could do without.
-1. Sensitivity: response surfaces at several clearances, first-order sensitivities and the interval
-   in which they can be trusted, the influential variables, global indices.
-2. Kriging: models of the objective; the swarm searches one of them.
-3. Optimisation: fronts of mean and deviation, or of what else a case makes small, by the model, several runs each.
-4. Refinement: designs of these fronts and others through the true dynamics, more where the front is
-   decided, until it stands.
-5. Verification: the best of them, on scatter of their own. Alpha has the least mean, beta the least
-   deviation (gamma, delta, epsilon the least of what a case makes small besides), and each design of the front is surely
-   better than each other in one of them.
-6. Chaos: samples of these designs twice, with a relative perturbation of 1e-9, for the share of their scatter that is chaos.
-7. Findings: responses of the optimised designs; for the scene of a publication also what it prints
-   and claims, beside ours (`hpcclear.study.paper`).
+0. Wear: if a clearance is distributed as wear leaves it, service lives give the distribution.
+0. On request, effect screening: effects that can be neglected.
+1. Sensitivity: response surfaces at several clearances, first-order sensitivities with their range of validity, influential
+   variables, Sobol indices.
+2. Kriging: surrogates of the objective; the swarm searches one of them.
+3. Optimisation: Pareto fronts of the objectives of each case on the surrogate, several runs each.
+4. Refinement: these and further designs by simulation, more where the front is undecided.
+5. Verification: the best designs on independent samples. Alpha minimises the first objective (mean), beta the second (standard
+   deviation), gamma, delta and epsilon further ones. Each design of the front is significantly better than each other in one.
+6. Chaos: pairs of samples with a relative perturbation of 1e-9 give the fraction of the variance that is due to chaos.
+7. Responses of the optimised designs; for the scene of the paper also its printed values and claims (`hpcclear.study.paper`).
 
-Root tells this story; every simulation in it goes to all ranks. Each stage is kept on disk when it
-is done, and each finished sample within seconds, so that the same command goes on where it stopped
-and ends with the same bytes.
+Root runs the stages, and all ranks simulate. Finished stages and, within seconds, finished samples are on disk. The same
+command resumes from them and ends with the same bytes.
 """
 
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -55,7 +52,8 @@ def run_study(
     *,
     fresh: bool = False,
     progress_style: Style = "auto",
-    tell: Callable[[str], object] = lambda text: None,
+    notify: Callable[[str], object] = lambda text: None,
+    tell: Callable[[str], object] | None = None,
 ) -> Path:
     """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 
@@ -72,8 +70,10 @@ def run_study(
     fresh : bool
         Start anew in a directory beside it, if there is one already.
     progress_style : {"auto", "bar", "log", "quiet"}
-    tell : callable
-        Gets what the user should know, a sentence at a time.
+    notify : callable
+        Gets messages to the user, a sentence at a time.
+    tell : callable, optional
+        Former name of `notify`; deprecated, removed in the next minor version.
 
     Returns
     -------
@@ -88,6 +88,9 @@ def run_study(
     Stopped
         If asked to end early; everything finished is on disk.
     """
+    if tell is not None:
+        warnings.warn("use notify instead of tell", DeprecationWarning, stacklevel=2)
+        notify = tell
     if isinstance(ranks, int) and ranks > 1:
         return launched.launch(
             scene, Path(directory), ranks, fresh=fresh, progress_style=progress_style
@@ -100,17 +103,17 @@ def run_study(
     lives.check(scene)
     optimisation.check(scene)
     for text in unused(scene):
-        tell(f"Warning: {text}")
+        notify(f"Warning: {text}")
     worn = [lives.NAME] if study.worn else []
     place = Place.of_directory(Path(directory), fresh, ("responses",), worn)
     if place.output != Path(directory):
-        tell(f"Results go to {place.output}.")
+        notify(f"Results go to {place.output}.")
     options = Options(fresh, style=progress_style)
-    with Session(place, run_key(scene, "run"), ranks, options, tell) as session:
+    with Session(place, run_key(scene, "run"), ranks, options, notify) as session:
         times: dict[str, str] = {}
         followed = all((place.output / name).exists() for name in worn)
         if session.has_all(files_of(scene)) and followed and not unfinished(place.parts):
-            tell(f"{place.output} holds the finished study.")
+            notify(f"{place.output} holds the finished study.")
         else:
             times = _carry_out(scene, session)
         session.close(session.attributes | times)
@@ -129,7 +132,9 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     announce = Announcer(scene).announced if style != "quiet" else Announcer.silent
     simulations = Simulations(scene, session.ranks, checkpoint, style)
     directory = session.place.output
-    run = StudyRun(scene, directory, session.ranks, checkpoint, simulations, session.tell, announce)
+    run = StudyRun(
+        scene, directory, session.ranks, checkpoint, simulations, session.notify, announce
+    )
     with saving(checkpoint.flush):  # samples of small stages wait for the next save
         carry_out(run, certificate_extent)
     return run.times

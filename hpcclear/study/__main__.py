@@ -21,7 +21,7 @@ def main(job: str) -> int:
         scene._text = content["text"]
         place = run_study(
             scene, content["directory"], ranks, fresh=content["fresh"],
-            progress_style=content["style"], tell=lambda text: sys.stderr.write(f"{text}\n"),
+            progress_style=content["style"], notify=lambda text: sys.stderr.write(f"{text}\n"),
         )  # fmt: skip
         sys.stdout.write(f"{DONE}{place}\n")
         sys.stdout.flush()

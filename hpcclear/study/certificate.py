@@ -31,7 +31,7 @@ def certify(run: StudyRun, extent: Extent) -> None:
     Raises
     ------
     InputError
-        No effect of the scene can be off, or its objective is nought.
+        No effect of the scene can be off, or its objective is zero.
     """
     asked = run.study.certificate
     assert asked is not None
@@ -54,7 +54,7 @@ def certify(run: StudyRun, extent: Extent) -> None:
         seconds = trial.seconds(found.variants)
     run.times[SECONDS_PER_SAMPLE] = json.dumps(seconds)
     for text in statements(content, seconds):
-        run.tell(text)
+        run.notify(text)
 
 
 _KEPT = ("objective", "peak_contact_force", "rhs_evaluations", "steady_revolutions", "flags")

@@ -1,7 +1,7 @@
 """How much of a verified design's scatter is chaos: the same samples once more, with a relative perturbation of 1e-9.
 
 Where motion is chaotic, or settles on an orbit that the smallest perturbation decides, a finite average of it is a random
-number whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `KICK` tell how much."""
+number whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `PERTURBATION` tell how much."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from hpcclear.study.run import Result, StudyRun
 PAIRS = 64
 """Samples of a design that are simulated twice: the variance of pairs is known to a fifth of itself."""
 
-KICK = 1e-9
+PERTURBATION = 1e-9
 """Relative change of all variables of a sample."""
 
 SAME = 1e-4
@@ -40,7 +40,8 @@ def simulate(run: StudyRun, choices: Sequence[Choice]) -> Result:
         )  # fmt: skip
         batches.append(run.simulations.filled(points.names, points.values))
     values = np.stack([batch.values for batch in batches])
-    pairs = np.stack([values, values * (1.0 + KICK)], axis=2)  # (designs, PAIRS, 2, variables)
+    perturbed = values * (1.0 + PERTURBATION)
+    pairs = np.stack([values, perturbed], axis=2)  # (designs, PAIRS, 2, variables)
     names, paths = batches[0].names, batches[0].paths
     points = Points(names, pairs.reshape(-1, len(names)), paths)
     f = run.simulations.objective(run.simulations.records(points, "chaos"))

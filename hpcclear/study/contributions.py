@@ -10,7 +10,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
 from hpcclear.scene.points import Points
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.sensitivity.contributions import contributions
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
@@ -54,9 +54,9 @@ def of_designs(
         random = run.study.case(choice.case).random
         points = drawn(choice, f)
         own = [points.names.index(name) for name in random]
-        count = f.size // SCRAMBLINGS  # plain draws in as many parts
-        values = points.values[: SCRAMBLINGS * count, own].reshape(SCRAMBLINGS, count, len(own))
-        its = f.ravel()[: SCRAMBLINGS * count].reshape(SCRAMBLINGS, count)
+        count = f.size // REPLICATES  # plain draws in as many parts
+        values = points.values[: REPLICATES * count, own].reshape(REPLICATES, count, len(own))
+        its = f.ravel()[: REPLICATES * count].reshape(REPLICATES, count)
         found = contributions(values, its, _groups(run, random))
         columns = [names.index(name) for name in random]
         parts = (found.share, found.share_error, found.halved, found.halved_error)

@@ -100,7 +100,9 @@ def _of_case(
             model = TwoScales(coordinates, excess, bounds, rng)
             objectives = [
                 exact or TwoScales(coordinates, column, bounds, rng).predict
-                for exact, column in zip(goals.exact_in(run.scene, case)[:2], values.T, strict=False)
+                for exact, column in zip(
+                    goals.exact_in(run.scene, case)[:2], values.T, strict=False
+                )
             ]
     except InputError:  # too few designs that did not fail for a model
         return kept

@@ -50,7 +50,7 @@ CERTIFICATE_SHARE = 0.05
 def certificate_extent(scene: Scene, samples: int | None = None) -> tuple[int, float]:
     """Samples of each variant at most, and of the whole scene that all come to by their work (infinite for none at most).
 
-    Where `samples` names no number, effects that are told soon leave what they do not need to those that are not.
+    Where `samples` names no number, effects that are decided early leave their budget to the others.
     """
     if samples is not None or scene.study is None:
         return effects.SAMPLES if samples is None else samples, math.inf

@@ -1,4 +1,4 @@
-"""What a case asks of its designs: told from simulations, with limits, and guessed by the surrogate."""
+"""Objectives and constraints of a case: values with confidence intervals from simulations, or surrogate predictions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ SHARE_OF_MOST = 0.02
 
 
 @dataclass(frozen=True)
-class Told:
+class GoalValue:
     """A goal of a design by direct simulation: value, limits, and what each replicate shifts (r,)."""
 
     value: float
@@ -34,11 +34,13 @@ class Told:
     shifts: Array
 
 
-def told(goal: Goal, values: Array, design: Mapping[str, float], confidence: float) -> Told:
+def goal_value(
+    goal: Goal, values: Array, design: Mapping[str, float], confidence: float
+) -> GoalValue:
     """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
     if goal.formula is not None:
         value = float(value_of(goal.formula, design))
-        return Told(value, value, value, np.zeros(len(values)))
+        return GoalValue(value, value, value, np.zeros(len(values)))
     if goal.statistic == "quantile":
         found = replicates.quantile(values, goal.order, confidence)
     elif goal.statistic == "exceedance":
@@ -47,8 +49,8 @@ def told(goal: Goal, values: Array, design: Mapping[str, float], confidence: flo
     else:
         mean, deviation = replicates.moments(values)
         one = mean if goal.statistic == "mean" else deviation
-        return Told(one.value, *replicates.limits(one, confidence), one.shifts)
-    return Told(found.value, found.lower, found.upper, found.shifts)
+        return GoalValue(one.value, *replicates.limits(one, confidence), one.shifts)
+    return GoalValue(found.value, found.lower, found.upper, found.shifts)
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
@@ -65,7 +67,7 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: Told, accuracy: MomentAccuracy) -> bool:
+def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
     """Whether its limits are as narrow as asked for."""
     share, relative = wanted(goal, accuracy)
     half = (one.upper - one.lower) / 2.0
@@ -98,7 +100,7 @@ def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, floa
     found = [
         float(shortfall(one, one.most, known[None])[0])
         if one.statistic == "exceedance"
-        else float(excess([one], np.array([[told(one, values, design, 0.95).value]]))[0])
+        else float(excess([one], np.array([[goal_value(one, values, design, 0.95).value]]))[0])
         for one in kept
     ]
     return max(found, default=-np.inf)

@@ -101,14 +101,14 @@ def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]
     ):
         if found["end_reason"][k] != "failed":
             values[k] = np.interp(parts * min(oldest, end), at[at <= end], f[at <= end])
-    told: list[float] = []
+    estimates: list[float] = []
     for one in moments(values):
         sure = one.freedom > 0
         reach = (
             one.error * student(run.study.verification.confidence, one.freedom) if sure else np.nan
         )
-        told += [one.value, reach]
-    return tuple(told)
+        estimates += [one.value, reach]
+    return tuple(estimates)
 
 
 def known(run: StudyRun) -> Scene:
@@ -125,7 +125,7 @@ def known(run: StudyRun) -> Scene:
     timing = run.directory / "timing.nc"  # the study's, which replaces it at the end
     lives = run_wear(scene, run.directory / NAME, run.ranks, options, timing).content
     for text in doubts(lives):
-        run.tell(f"Lives: {text}.")
+        run.notify(f"Lives: {text}.")
     changes = {}
     for row in run.study.worn:
         joints = [path.split(".")[-2] for path in row.paths]
@@ -133,7 +133,7 @@ def known(run: StudyRun) -> Scene:
         values = _values(scene, row, clearance, lives["ending"].to_numpy())
         left = int(np.isnan(clearance).any(axis=1).sum())
         if left:
-            run.tell(
+            run.notify(
                 f"{row.name}: {left} of {len(clearance)} lives failed or were over before {row.cycles:g} revolutions and "
                 "are left out of its distribution; the others are the better ones."
             )  # fmt: skip

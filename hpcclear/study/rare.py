@@ -20,7 +20,7 @@ from hpcclear.scene.sampling import offsets
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, tolerance, verdicts
-from hpcclear.study.goals import Told
+from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
-    """What is known of verified designs (`hpcclear.study.tolerance.verified`), rare failures that are open in it decided as far as
+    """What is known of verified designs (`hpcclear.study.tolerance.verified`), rare failures that are open decided as far as
     they can be; besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     where = [
@@ -114,8 +114,8 @@ def probabilities(
     _pair(run, asked, rates)
     return [
         Found(
-            one.told(run.study.verification.confidence),
-            one.told(verdicts.level(run.study.verification, number, one.f.size)),
+            one.interval(run.study.verification.confidence),
+            one.interval(verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
             one.f.size,
         )
@@ -147,15 +147,17 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
-        verdicts.of_limits(one.goal, _told(rate.told(sure)), rate.f.size, sure).standing
+        verdicts.of_interval(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
         is not Standing.UNDECIDED
     ):
         return True
-    return goals.accurate(one.goal, _told(rate.told(settings.confidence)), run.study.wanted)
+    return goals.accurate(
+        one.goal, _goal_value(rate.interval(settings.confidence)), run.study.wanted
+    )
 
 
-def _told(one: Limited) -> Told:
-    return Told(one.value, one.lower, one.upper, one.shifts)
+def _goal_value(one: Limited) -> GoalValue:
+    return GoalValue(one.value, one.lower, one.upper, one.shifts)
 
 
 def _together(

@@ -17,7 +17,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.search import improvement
@@ -82,14 +82,14 @@ def simulations(study: Study) -> tuple[int, int]:
     extremes, spread = chosen_in_all(study)
     rays = sum(RAYS * len(study.design_variables(case.name)) for case in study.cases)
     rounds = study.verification.infill_rounds * study.verification.infill_designs
-    each = length(study) * SCRAMBLINGS
+    each = length(study) * REPLICATES
     return (extremes + spread + rays) * each, rounds * len(study.cases) * each
 
 
 def length(study: Study) -> int:
-    """Points of each scrambling that a design of the search gets: fewer than verified ones, a power of two."""
+    """Points of each replicate that a design of the search gets: fewer than verified ones, a power of two."""
     wanted = min(study.verification.infill_samples, study.verification.draws or truth.FIRST)
-    return 2 ** max(int(np.log2(max(wanted, SCRAMBLINGS) // SCRAMBLINGS)), 1)
+    return 2 ** max(int(np.log2(max(wanted, REPLICATES) // REPLICATES)), 1)
 
 
 def by_statistics(study: Study, r2: float) -> bool:
@@ -152,12 +152,12 @@ def search(
 
 
 def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
-    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included: those
-    that the swarm spreads over its front are left out."""
+    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included:
+    those of the swarm between its ends are left out."""
     settings = run.study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
-    each = length(run.study) * SCRAMBLINGS
+    each = length(run.study) * REPLICATES
     cases = len(run.study.cases)
     most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
     left = (most - len(begun["case"])) // cases
@@ -228,7 +228,7 @@ def _go_on(
 
 
 def _problem(run: StudyRun, name: str, one: Tried) -> tuple[Known, Space]:
-    """What is known of a case, and where to look: at least each objective, and mean + 2 standard deviations, the usual merit."""
+    """What is known of a case, and where to look: each objective, and mean + 2 standard deviations, the usual merit."""
     case = run.study.case(name)
     directions = np.eye(len(case.goals))
     if case.plain:
@@ -259,7 +259,7 @@ def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
         none = {"values": np.empty((0, most)), "errors": np.empty((0, most)), "excess": np.empty(0)}
         return {"case": np.array([], "U1"), "design": nothing, **none}
     count = length(run.study)
-    found = truth.sequences(run, choices, stage, "search", count, count * SCRAMBLINGS)
+    found = truth.sequences(run, choices, stage, "search", count, count * REPLICATES)
     return {
         "case": np.array([choice.case for choice in choices]),
         "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),

@@ -61,7 +61,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Statistics of each design's steady response and of copies kicked at their start, stretch by stretch.
+    """Statistics of each design's steady response and of copies perturbed at their start, stretch by stretch.
 
     Where motion is chaotic one response says little of a design: copies see other stretches of the
     same motion.
@@ -88,7 +88,7 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
 
 
 def write(run: StudyRun, designs: Sequence[Choice]) -> None:
-    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10. One that failed is told instead."""
+    """Write each response to responses/NAME.nc: the first steady revolutions, as Fig. 10. Failures are reported."""
     folder = run.directory / "responses"
     folder.mkdir(exist_ok=True)
     for name, choice in compared(run, designs):
@@ -97,7 +97,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
             response = simulate(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
-            run.tell(
+            run.notify(
                 f"The response of {name} has no file: its simulation ended as {status.name.lower()}: {status.message}. "
                 f"{status.remedy}"
             )

@@ -30,7 +30,7 @@ class StudyRun:
     ranks: Ranks
     checkpoint: Checkpoint
     simulations: Simulations
-    tell: Callable[[str], object]
+    notify: Callable[[str], object]
     """Gets what the user should know, a sentence at a time."""
     announce: Callable[[str], object] = lambda name: None
     """Gets the name of each stage when it begins."""

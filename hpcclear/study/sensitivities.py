@@ -350,11 +350,11 @@ def _global(run: StudyRun, values: Array | None) -> Result:
     values, near = values[:-beside], values[-beside:]
     found = sensitivity.analyse_sobol(values, count, run.rng("sobol bootstrap"))
     noise, error = sensitivity.noise_share(values[:beside], near, found.variance)
-    total_error = np.ptp(found.total_limits, axis=1) / (2 * _NORMAL_95)
+    total_error = np.ptp(found.total_interval, axis=1) / (2 * _NORMAL_95)
     return {
         "sobol_first": found.first,
         "sobol_total": found.total - np.nan_to_num(noise),
-        "sobol_first_error": np.ptp(found.first_limits, axis=1) / (2 * _NORMAL_95),
+        "sobol_first_error": np.ptp(found.first_interval, axis=1) / (2 * _NORMAL_95),
         "sobol_total_error": np.hypot(total_error, np.nan_to_num(error)),
         "sobol_noise": np.array(noise),
         "sobol_noise_error": np.array(error),

@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene import Scene
-from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy
+from hpcclear.scene.stages import REPLICATES, MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.study import goals, truth, verdicts, verification
@@ -30,7 +30,7 @@ FALL = 0.5
 stability keep steps short, then 0.7, 0.55 and 0.35 to 1e-7. What the stricter one leaves counts too."""
 
 FIRST, LEAST = 4, 4
-"""Pairs are made of one in so many of a design's points at first, and of so many of each scrambling at least: where few motions
+"""Pairs are made of one in so many of a design's points at first, and of so many of each replicate at least: where few motions
 go another way, fewer may miss them all."""
 
 HIDDEN = 0.25
@@ -49,7 +49,7 @@ NOTHING = 1e-9
 """Share of the mean below which a deviation is round-off."""
 
 Taken = tuple[Array, Array]
-"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.told_each`, without what chance made; and
+"""Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
 the standard error."""
 
 
@@ -58,7 +58,7 @@ def simulations(study: Study) -> int:
     draws = study.verification.draws
     if draws is not None:
         return goals.ends_in_all(study) * _of_draws(draws)
-    return goals.ends_in_all(study) * SCRAMBLINGS * _first(truth.first_length(study.verification))
+    return goals.ends_in_all(study) * REPLICATES * _first(truth.first_length(study.verification))
 
 
 def _of_draws(draws: int) -> int:
@@ -78,7 +78,7 @@ def stricter(scene: Scene) -> tuple[Scene, float]:
 
 
 def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """What `truth.told_of` returns, with what the tolerance takes in all limits.
+    """What `truth.results_of` returns, with what the tolerance takes in all limits.
 
     Returns
     -------
@@ -92,13 +92,13 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
         taken |= _taken(run, designs, made, fresh)
         if run.study.paired:
             made = truth.made(run, designs, made, _left(run.study.wanted, list(taken.values())))
-    true = _widened(run, designs, truth.told_of(run, designs, made), taken)
+    true = _widened(run, designs, truth.results_of(run, designs, made), taken)
     return true | truth.explained(run, designs, made)
 
 
 def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> list[int]:
     """Rows of the designs that are the ends of their cases, by what is known."""
-    table = verification.named(run, designs, truth.told_of(run, designs, made))
+    table = verification.named(run, designs, truth.results_of(run, designs, made))
     named = zip(table.choices, table.rows, strict=True)
     return [row for one, row in named if one.name in run.study.case(one.case).ends]
 
@@ -113,7 +113,7 @@ def _left(wanted: MomentAccuracy, taken: Sequence[Taken]) -> MomentAccuracy:
 
 
 def _first(length: int) -> int:
-    """Points of each scrambling that pairs are made of at first, of so many."""
+    """Points of each replicate that pairs are made of at first, of so many."""
     return min(max(length // FIRST, LEAST), length)
 
 
@@ -129,7 +129,11 @@ def _taken(
     else:
         chosen = [designs[k] for k in rows]
         strict = dict(
-            zip(rows, truth.drawn(tight, chosen, "pairs", "verification", _of_draws(draws)), strict=True)
+            zip(
+                rows,
+                truth.drawn(tight, chosen, "pairs", "verification", _of_draws(draws)),
+                strict=True,
+            )
         )
     run.simulations.next = tight.simulations.next
     return {k: _known(run, designs[k], made[k], strict[k], left) for k in rows}
@@ -144,7 +148,7 @@ def _sequences(
 ) -> dict[int, Array]:
     """Points of each scrambling of some designs at the stricter tolerance, (2, replicates, values) each."""
     asked = HIDDEN * np.array([run.study.wanted.mean, run.study.wanted.deviation])
-    strict = [np.empty((2, SCRAMBLINGS, 0))] * len(designs)
+    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
     open_, length = list(rows), _first(min(made[k].shape[2] for k in rows))
     _, left = stricter(run.scene)
     most = np.inf if run.study.paired else COST * run.simulations.next
@@ -152,7 +156,7 @@ def _sequences(
     while open_:
         more = length - strict[open_[0]].shape[2]
         truth.lengthen(tight, designs, strict, open_, "pairs", "verification", more)
-        spent += len(open_) * SCRAMBLINGS * more
+        spent += len(open_) * REPLICATES * more
         known = {k: _known(run, designs[k], made[k], strict[k], left)[1] for k in open_}
         length *= 2
         open_ = [
@@ -172,17 +176,19 @@ def _known(run: StudyRun, choice: Choice, made: Array, strict: Array, left: floa
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much what is told of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
-    one, other = (truth.told_each(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs))
-    scale = _scales(run, choice, np.array([told.value for told in other]))
+    one, other = (
+        truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
+    )
+    scale = _scales(run, choice, np.array([one.value for one in other]))
     bias = np.array([a.value - b.value for a, b in zip(one, other, strict=True)]) / scale
     shifts = np.array([a.shifts - b.shifts for a, b in zip(one, other, strict=True)])
     return bias, spread(shifts) / scale
 
 
 def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
-    """What errors of all that is told of a design are relative to: (k,) as `truth.told_each` returns them."""
+    """What errors of the results of a design are relative to: (k,) as `truth.estimates_of` returns them."""
     case, scale = run.study.case(choice.case), np.abs(values)
     scale[1] = max(scale[1], NOTHING * scale[0])
     for k, goal in enumerate((*case.goals, *case.kept), 3):

@@ -8,7 +8,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import SCRAMBLINGS, MomentAccuracy, Verification
+from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
 from hpcclear.statistics.search.certainty import Compared
@@ -20,10 +20,10 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be told."""
+"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
 
 QUANTILE = 0.95
-"""Probability of staying below the percentile that is told."""
+"""Probability of staying below the percentile that is reported."""
 
 
 def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verification") -> Points:
@@ -39,13 +39,13 @@ def samples_of(run: StudyRun, choice: Choice, count: int, purpose: str = "verifi
 def scattered(
     run: StudyRun, choice: Choice, count: int, purpose: str = "verification", first: int = 0
 ) -> Points:
-    """The points from `first` on of all scramblings of a design, `count` of each, one scrambling after the other."""
-    made = [_of_design(run, choice, count, purpose, first, k) for k in range(SCRAMBLINGS)]
+    """The points from `first` on of all replicates of a design, `count` of each, one replicate after the other."""
+    made = [_of_design(run, choice, count, purpose, first, k) for k in range(REPLICATES)]
     return run.simulations.filled(made[0].names, np.concatenate([one.values for one in made]))
 
 
 def _of_design(
-    run: StudyRun, choice: Choice, count: int, purpose: str, first: int, scrambling: int | None
+    run: StudyRun, choice: Choice, count: int, purpose: str, first: int, replicate: int | None
 ) -> Points:
     return monte_carlo(
         run.scene,
@@ -54,13 +54,13 @@ def _of_design(
         design=dict(choice.design),
         purpose=purpose,
         first=first,
-        scrambling=scrambling,
+        replicate=replicate,
     )
 
 
 def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
     """The first points of each scrambling of designs, (2, replicates, values) each as `doubled` returns them."""
-    made = [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
+    made = [np.empty((2, REPLICATES, 0))] * len(choices)
     length = first_length(run.study.verification)
     lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
     return made
@@ -108,12 +108,12 @@ def explained(
 
 
 def scrambled_length(simulations: int) -> int:
-    """Points of each scrambling that so many simulations make at most: a power of two."""
-    return 2 ** int(np.log2(max(simulations // SCRAMBLINGS, 1)))
+    """Points of each replicate that so many simulations make at most: a power of two."""
+    return 2 ** int(np.log2(max(simulations // REPLICATES, 1)))
 
 
 def first_length(settings: Verification) -> int:
-    """Points of each scrambling from which accuracy is judged: a power of two."""
+    """Points of each replicate from which accuracy is judged: a power of two."""
     least = FIRST if settings.least_samples is None else settings.least_samples
     return scrambled_length(min(least, settings.most_samples))
 
@@ -127,14 +127,14 @@ def expected(study: Study) -> int:
     needed = FIRST * max(0.014 / study.wanted.deviation, 1.0) ** 1.7
     kept = [goal for case in study.cases for goal in case.kept if not verdicts.rare(goal, settings)]
     needed = max([needed, *(verdicts.usual(goal, settings) for goal in kept)])
-    return int(np.clip(needed, first_length(settings) * SCRAMBLINGS, settings.most_samples))
+    return int(np.clip(needed, first_length(settings) * REPLICATES, settings.most_samples))
 
 
 def sequences(
     run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, length: int, most: int
 ) -> Result:
     """The same by scrambled Sobol sequences, doubled from `length` until accurate or beyond `most` simulations."""
-    return told_of(run, choices, doubled(run, choices, stage, purpose, length, most))
+    return results_of(run, choices, doubled(run, choices, stage, purpose, length, most))
 
 
 def doubled(
@@ -147,11 +147,11 @@ def doubled(
     before: Sequence[Array] = (),
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
-    """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each scrambling,
+    """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
     doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
     from."""
     wanted = wanted or run.study.wanted
-    made = list(before) or [np.empty((2, SCRAMBLINGS, 0))] * len(choices)
+    made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
     many = verdicts.rivals(choices)
     while True:
         rows = [
@@ -174,7 +174,7 @@ def lengthen(
     purpose: str,
     length: int,
 ) -> None:
-    """So many points more of each scrambling of some designs that are equally long; `made` as `doubled` returns it, shape
+    """So many points more of each replicate of some designs that are equally long; `made` as `doubled` returns it, shape
     (2, replicates, values) each."""
     first = made[rows[0]].shape[2]
     fresh = _values(run, [choices[k] for k in rows], stage, purpose, length, first)
@@ -208,9 +208,9 @@ def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array])
         ]
         if not rows:
             continue
-        told = [_goals(run, choices[k], made[k][0])[: len(case.goals)] for k in rows]
-        values = np.array([[one.value for one in row] for row in told])
-        shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in told]), 1, 0)
+        estimates = [_goals(run, choices[k], made[k][0])[: len(case.goals)] for k in rows]
+        values = np.array([[one.value for one in row] for row in estimates])
+        shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in estimates]), 1, 0)
         less = Compared(values, shifts, settings.confidence).less
         for column, goal in enumerate(case.goals):
             share, relative = goals.wanted(goal, run.study.wanted)
@@ -235,13 +235,13 @@ def _values(
     first: int | None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) each: `count` draws, or points from
-    `first` on of each scrambling."""
+    `first` on of each replicate."""
     if first is None:
         batches = [samples_of(run, choice, count, purpose) for choice in choices]
         shape = (2, count, 1)
     else:
         batches = [scattered(run, choice, count, purpose, first) for choice in choices]
-        shape = (2, SCRAMBLINGS, count)
+        shape = (2, REPLICATES, count)
     values = np.concatenate([batch.values for batch in batches])
     records = run.simulations.records(Points(batches[0].names, values, batches[0].paths), stage)
     beyond = (records["flags"] & Flag.BEYOND_HERTZ) != 0
@@ -251,9 +251,7 @@ def _values(
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
     """Half-widths of the limits of mean and deviation, the larger one where they are not symmetric."""
-    mean, deviation = (
-        limits(one, settings.confidence)[1] - one.value for one in moments(values)
-    )
+    mean, deviation = (limits(one, settings.confidence)[1] - one.value for one in moments(values))
     return mean, deviation
 
 
@@ -280,20 +278,20 @@ def _accurate(
     return bool(good)
 
 
-def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.Told]:
+def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
     """What a design comes to in all that its case asks."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
-    return [goals.told(goal, values, choice.design, level) for goal in asked]
+    return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
-def told_each(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.Told]:
+def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
     """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
     percentile = quantile(values, QUANTILE, run.study.verification.confidence)
     return [*moments(values), percentile, *_goals(run, choice, values)]
 
 
-def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
+def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
     """All that is told of designs from what was made of them, shape (2, replicates, values) each.
 
     Returns
@@ -323,16 +321,16 @@ def told_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> 
         found = quantile(values, QUANTILE, settings.confidence)
         row |= {"percentile": found.value, "percentile_lower": found.lower}
         row["percentile_upper"] = found.upper
-        told = _goals(run, choice, values)
-        missing = [np.nan] * (most - len(told))
-        row["goal"] = [one.value for one in told] + missing
-        row["goal_lower"] = [one.lower for one in told] + missing
-        row["goal_upper"] = [one.upper for one in told] + missing
+        estimates = _goals(run, choice, values)
+        missing = [np.nan] * (most - len(estimates))
+        row["goal"] = [one.value for one in estimates] + missing
+        row["goal_lower"] = [one.lower for one in estimates] + missing
+        row["goal_upper"] = [one.upper for one in estimates] + missing
         nothing = np.full(len(values), np.nan)
-        row["goal_shifts"] = [one.shifts for one in told] + [nothing] * len(missing)
+        row["goal_shifts"] = [one.shifts for one in estimates] + [nothing] * len(missing)
         sure = verdicts.level(settings, many, values.size)
         kept = run.study.case(choice.case).kept
-        certain = [goals.told(goal, values, choice.design, sure) for goal in kept]
+        certain = [goals.goal_value(goal, values, choice.design, sure) for goal in kept]
         missing = [np.nan] * (held - len(kept))
         row["counted"] = [float(values.size)] * len(certain) + missing
         row["excess"] = goals.steered(kept, values, choice.design)

@@ -22,7 +22,7 @@ from hpcclear.scene.goals import Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.scene.study import Study
 from hpcclear.study import goals
-from hpcclear.study.goals import Told
+from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
@@ -81,8 +81,8 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
             simulations = int(true["counted"][row, k])
             sure = level(run.study.verification, many[row], simulations)
             value = true["goal"][row, len(case.goals) + k]
-            limits = true["sure_lower"][row, k], true["sure_upper"][row, k]
-            found = of_limits(goal, Told(value, *limits, _NOTHING), simulations, sure)
+            interval = true["sure_lower"][row, k], true["sure_upper"][row, k]
+            found = of_interval(goal, GoalValue(value, *interval, _NOTHING), simulations, sure)
             true["standing"][row, k], true["price"][row, k] = found
     return true
 
@@ -90,7 +90,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
 _NOTHING = np.empty(0)
 
 
-def of_limits(goal: Constraint, one: Told, simulations: int, confidence: float) -> Verdict:
+def of_interval(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> Verdict:
     """How a design stands to a constraint, from limits at a two-sided confidence by so many simulations, and its price."""
     if one.upper <= goal.most:
         return Verdict(Standing.KEPT, np.nan)
@@ -99,7 +99,7 @@ def of_limits(goal: Constraint, one: Told, simulations: int, confidence: float) 
     return Verdict(Standing.UNDECIDED, _price(goal, one, simulations, confidence))
 
 
-def _price(goal: Constraint, one: Told, simulations: int, confidence: float) -> float:
+def _price(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> float:
     """Simulations after which limits are as near to a value as the threshold is: they approach by the root of the number."""
     gap = abs(goal.most - one.value)
     if goal.statistic == "exceedance" and one.value == 0.0:
@@ -127,7 +127,7 @@ def rare(goal: Constraint, settings: Verification) -> bool:
 
 
 HITS = 16
-"""Exceedances after which a probability of half or twice what is allowed is told from it."""
+"""Exceedances after which a probability of half or twice what is allowed is distinguished from it."""
 
 
 WEIGHTED = 12288
@@ -173,11 +173,11 @@ def settled(
 ) -> bool:
     """Whether a constraint of a design is decided, as one of `many`."""
     sure = level(settings, many, values.size)
-    one = goals.told(goal, values, choice.design, sure)
-    return of_limits(goal, one, values.size, sure).standing is not Standing.UNDECIDED
+    one = goals.goal_value(goal, values, choice.design, sure)
+    return of_interval(goal, one, values.size, sure).standing is not Standing.UNDECIDED
 
 
-def words(case: Case, unit: str, told: Sequence[Array], standings: Array, prices: Array) -> str:
+def words(case: Case, unit: str, values: Sequence[Array], standings: Array, prices: Array) -> str:
     """How a design stands to its constraints: "share with f above 0.3 mm 0.012 (95 % CI 0.01 to 0.014) at most 0.05: kept".
 
     Parameters
@@ -185,13 +185,13 @@ def words(case: Case, unit: str, told: Sequence[Array], standings: Array, prices
     case : Case
     unit : str
         Of f.
-    told : sequence of arrays, shape (goals,)
+    values : sequence of arrays, shape (goals,)
         Values, lower and upper limits of what its case makes small and, behind these, of its constraints.
     standings, prices : array, shape (constraints,)
     """
     texts = []
     rows = zip(
-        case.kept, *(one[len(case.goals) :] for one in told), standings, prices, strict=False
+        case.kept, *(one[len(case.goals) :] for one in values), standings, prices, strict=False
     )
     for goal, value, low, high, standing, price in rows:
         own = goal.unit(unit)

@@ -72,7 +72,7 @@ class Table:
     rows : list of int
         Number of each in what was simulated.
     same_as : list of str
-        The first design before it that it cannot be told apart from; empty if there is none.
+        The first design before it that it is statistically indistinguishable from; empty if there is none.
     dominated : list of bool
         Whether another design of its case is surely better in all that the case makes small.
     """
@@ -87,7 +87,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     """Verified designs under the names that they have earned.
 
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
-    nothing else is asked for; gamma, delta and epsilon of further ones. Of those that cannot be told from it at the
+    nothing else is asked for; gamma, delta and epsilon of further ones. Of designs that are indistinguishable from it at the
     study's confidence it is the best in the others. Each design of the front is surely better than each
     other in one of them. They are chosen among the designs that surely satisfy all constraints, if there are any.
     """
@@ -177,9 +177,9 @@ def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
         for end in ("", "_lower", "_upper"):  # behind what a case makes small stand its constraints
             values = true[f"goal{end}"][:, column]
             data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
-    table_of_limits = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
+    table_of_intervals = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
     rows = zip(
-        cases, zip(*table_of_limits, strict=True), true["standing"], true["price"], strict=True
+        cases, zip(*table_of_intervals, strict=True), true["standing"], true["price"], strict=True
     )
     data["constraints"] = np.array([verdicts.words(case, unit, *row) for case, *row in rows])
     if any(case.kept for case in cases):

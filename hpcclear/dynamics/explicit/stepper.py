@@ -13,7 +13,7 @@ from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit.switching import settle_methods
-from hpcclear.dynamics.implicit.abreast import ask_implicit
+from hpcclear.dynamics.implicit.batch import ask_implicit
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
@@ -98,7 +98,7 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
 
 
 class Codes(NamedTuple):
-    """Addresses of what a stepper calls: `special.special_code`, `steps.explicit_code`, `abreast.abreast_code` (0 without)."""
+    """Addresses of what a stepper calls: `special.special_code`, `steps.explicit_code`, `batch.batch_code` (0 without)."""
 
     special: int
     explicit: int

@@ -1,4 +1,4 @@
-"""What the implicit method remembers of eight samples that step abreast, and its scratch: rows of eight, a column a sample.
+"""What the implicit method remembers of batches of eight samples, and its scratch: rows of eight, a column a sample.
 
 It starts with a bank laid out like `work` with eight lanes and followed by their parameters, so that the functions that run on
 lanes run on it too. The numbers that implicit steps decide by stand behind it, then a row for each number of a coordinate, of a

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5 for eight samples abreast: stages by simplified Newton, error estimate, integrals over a step.
+"""Radau IIA of order 5 for a batch of eight samples: stages by simplified Newton, error estimate, integrals over a step.
 
 The columns of a row are samples, and each stage has rows of its own. m is the memory of such eight (`memory`), n the number of
 coordinates. What is done for some of the eight is chosen number by number, so that none depends on its neighbours.

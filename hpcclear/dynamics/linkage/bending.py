@@ -157,7 +157,7 @@ class Bend:
         return -(_TWO * spin * self._dotted("spun", self.v))
 
     def _beyond(self) -> Term:
-        """Nought as long as deflections are small, else what no step gets through."""
+        """Zero as long as deflections are small, else what no step gets through."""
         if self._bound is None:
             shorter, most = (self.writer.text(t) for t in (self.shortening(), self._number("most")))
             self._bound = named(self.writer.fresh(f"beyond_{self.name}"))

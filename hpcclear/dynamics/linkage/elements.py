@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.base.jit import lane_function
 
-_TINY = 1e-300  # keeps the direction of a spring without length defined (and nought)
+_TINY = 1e-300  # keeps the direction of a spring without length defined (and zero)
 _FLAT = 1e-8  # pivots of loops over those of an open one, from which on inertia alone goes on: 1e-4 rad from flat
 
 
@@ -39,7 +39,7 @@ def harmonic(mean, amplitude, rate, sine, cosine):
 def held_inverse(pivot, scale):
     """1 / pivot of a multiplier, both negative; where a loop folds flat no more than 1e8 / scale.
 
-    There one direction of the loop is not held, neither by geometry nor by its forces, which would be nought by nought: a
+    There one direction of the loop is not held, neither by geometry nor by its forces, which would be zero by zero: a
     free linkage goes on as its inertia has it until the loop holds again, some 1e-4 rad further on.
     """
     least = _FLAT * scale

@@ -40,7 +40,7 @@ class Elimination:
     ----------
     writer : Writer
     matrix : dict
-        Entries (i, j), both halves; nought where there is none.
+        Entries (i, j), both halves; zero where there is none.
     block : list of int
         Unknowns, the coordinates first; the last `held` of them are multipliers.
     inverse : callable

@@ -1,6 +1,6 @@
 """Arithmetic that writes itself down: terms of names and numbers, and the text that computes them, statement by statement.
 
-What is nought disappears, signs move outwards, and nothing else is rearranged: the text adds and multiplies in the order
+Zeros disappear, signs move outwards, and nothing else is rearranged: the text adds and multiplies in the order
 in which the generator did, which decides the last bits. Names are read where they are first needed.
 """
 
@@ -12,7 +12,7 @@ _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
 
 @dataclass(frozen=True)
 class Term:
-    """A sum, a product, a quotient, a name, nought or one; `fixed` if it holds parameters alone."""
+    """A sum, a product, a quotient, a name, zero or one; `fixed` if it holds parameters alone."""
 
     op: str
     args: tuple["Term", ...] = ()
@@ -152,7 +152,7 @@ class Writer:
             self._taken.add(name)
 
     def let(self, name: str, term: Term, *, whole: bool = False) -> Term:
-        """Give a term a name, unless it has one (or is nought, or one) or its text is known already.
+        """Give a term a name, unless it has one (or is zero, or one) or its text is known already.
 
         `whole`: whatever it is, with its sign; else the sign stays outside, where it may cancel another.
         """

@@ -37,7 +37,7 @@ class On(NamedTuple):
 
     friction: bool = False  # in the joints with clearance: of contact or of a film
     gravity: bool = False
-    ledger: bool = False  # energies
+    energies: bool = False  # energy balance
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
     follow: str = ""  # a guided body, or body.point
@@ -98,7 +98,7 @@ def generate(
     Parameters
     ----------
     mechanism : Mechanism
-        What is nought in it is taken for nought for good.
+        A number that is zero in it is zero in every sample.
     on : On
     rows : Rows
     cartesian : bool
@@ -366,11 +366,11 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
-        if on.ledger or on.series or on.responses or on.objective:
+        if on.energies or on.series or on.responses or on.objective:
             moments = [self._moment(drive, found, torques) for drive in self._drives()]
             if on.series or on.responses or on.objective:
                 self._rate(at.DRIVE_MOMENT, moments[0])
-        if on.ledger:
+        if on.energies:
             power = ZERO
             for drive, moment in zip(self._drives(), moments, strict=True):
                 power = power + moment * self.kinematics.spin(self.forest.frames[drive.body])

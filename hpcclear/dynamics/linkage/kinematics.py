@@ -178,7 +178,7 @@ class Kinematics:
 
     # ---- points ---------------------------------------------------------------------------------
     def _number(self, name: str, value: float) -> Term:
-        """A parameter, or nought where the mechanism has nought."""
+        """A parameter, or zero where the mechanism has zero."""
         return ZERO if value == 0.0 else self.writer.parameter(name)
 
     def arm(self, body: str, start: str, end: str) -> Vector:

@@ -23,7 +23,7 @@ from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
 class Linkage:
-    """A mechanism's structure: what its texts hold and where. Numbers that are nought in it are nought in every sample.
+    """A mechanism's structure: what its texts hold and where. Numbers that are zero in it are zero in every sample.
 
     Parameters
     ----------
@@ -64,10 +64,12 @@ class Linkage:
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        for ledger in (False, True):
+        for energies in (False, True):
             for series in (False, True):
                 for responses in (False, True):
-                    self._text(self._on._replace(ledger=ledger, series=series, responses=responses))
+                    self._text(
+                        self._on._replace(energies=energies, series=series, responses=responses)
+                    )
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -146,7 +148,7 @@ class Linkage:
     def module(self, effects: at.Effects) -> ModuleType:
         """The module of its motion with these effects."""
         on = self._on._replace(
-            ledger=bool(effects.ledger), series=bool(effects.series), responses=bool(effects.responses)
+            energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses)
         )  # fmt: skip
         return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
 

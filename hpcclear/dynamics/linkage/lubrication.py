@@ -4,63 +4,10 @@ import math
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.physics.film import (
-    along_and_across,
-    film_thickness,
-    finite_scales,
-    long_force,
-    short_force,
-    short_impedance,
-)
+from hpcclear.dynamics.laws import laws
+from hpcclear.dynamics.physics.film import film_thickness
 
-
-@lane_function
-def polynomial(par, row, y, i, W):
-    """Of degree 14, from coefficients in the rows from `row` on."""
-    p = par[(row + 14) * W + i]
-    p = p * y + par[(row + 13) * W + i]
-    p = p * y + par[(row + 12) * W + i]
-    p = p * y + par[(row + 11) * W + i]
-    p = p * y + par[(row + 10) * W + i]
-    p = p * y + par[(row + 9) * W + i]
-    p = p * y + par[(row + 8) * W + i]
-    p = p * y + par[(row + 7) * W + i]
-    p = p * y + par[(row + 6) * W + i]
-    p = p * y + par[(row + 5) * W + i]
-    p = p * y + par[(row + 4) * W + i]
-    p = p * y + par[(row + 3) * W + i]
-    p = p * y + par[(row + 2) * W + i]
-    p = p * y + par[(row + 1) * W + i]
-    p = p * y + par[(row + 0) * W + i]
-    return p
-
-
-@lane_function
-def corrected(par, row, s2, x, y, i, W):
-    """Force of a finite film over that of a short one, by 6 times 15 coefficients from `row` on (`dynamics.bearing`)."""
-    p = polynomial(par, row + 75, y, i, W)
-    p = p * x + polynomial(par, row + 60, y, i, W)
-    p = p * x + polynomial(par, row + 45, y, i, W)
-    p = p * x + polynomial(par, row + 30, y, i, W)
-    p = p * x + polynomial(par, row + 15, y, i, W)
-    p = p * x + polynomial(par, row, y, i, W)
-    return s2 / p
-
-
-@lane_function
-def finite_force(flag, par, joint, eccentricity, w, s2, i, W):
-    """Force on the journal, N, of a film in a bearing of finite length; arguments as of `short_force`, 0 with it off."""
-    if flag is not None:
-        wx, wy = w
-        a, b = along_and_across(eccentricity, w)
-        along, across = short_impedance(a, b, s2)
-        x, y = finite_scales(a, s2)
-        along = along * corrected(par, joint.finite, s2, x, y, i, W)
-        across = across * corrected(par, joint.finite + 90, s2, x, y, i, W)
-        scale = par[(joint.block + at.FILM_FINITE) * W + i]
-        return -scale * (along * wx - across * wy), -scale * (along * wy + across * wx)
-    else:
-        return 0.0, 0.0
+FORCES = {name: law.force for name, law in laws("film").items()}
 
 
 @lane_function
@@ -74,12 +21,7 @@ def film_of(effects, par, joint, relative, contact, i, W):
     that thin, and goes on damping. Its losses F.w of the squeezed film and of shear are never negative: the moments are
     those that make the power of all that it does to both bodies just that.
     """
-    film, short, long, finite = (
-        effects.film,
-        effects.short_film,
-        effects.long_film,
-        effects.finite_film,
-    )
+    film = effects.films[joint.place]
     if film is not None:
         block = joint.block
         ex, ey, vx, vy, spin_journal, spin_bearing = relative
@@ -91,10 +33,8 @@ def film_of(effects, par, joint, relative, contact, i, W):
         mean = 0.5 * (spin_journal + spin_bearing)
         w = (vx + mean * ey, vy - mean * ex)
         place = (eccentricity * nx, eccentricity * ny)
-        sx, sy = short_force(short, par[(block + at.FILM_SHORT) * W + i], place, w, s2)
-        lx, ly = long_force(long, par[(block + at.FILM_LONG) * W + i], place, w, s2)
-        ux, uy = finite_force(finite, par, joint, place, w, s2, i, W)
-        fx, fy = sx + lx + ux, sy + ly + uy  # on the journal
+        scale = par[(block + at.FILM_SCALE) * W + i]
+        fx, fy = FORCES[film](par, joint.further, scale, place, w, s2, i, W)  # on the journal
         turning = spin_journal - spin_bearing
         # one reciprocal, as the film's: of quotients by the same number the compiler makes products in lanes, and not alone
         shear = par[(block + at.FILM_SHEAR) * W + i] * math.sqrt(s2) * (1.0 / s2) * turning

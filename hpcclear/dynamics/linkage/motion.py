@@ -100,9 +100,8 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     loss = (normal - elastic) * rate + product(rubs, tangential, sliding)
     oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
     work[(at.RATE_NOW + joint.gap) * W + i] = gap
-    work[(at.RATE_NOW + joint.force) * W + i] = pressed(
-        effects.film, normal, nx, ny, oil[0], oil[1]
-    )
+    whole = pressed(effects.films[joint.place], normal, nx, ny, oil[0], oil[1])
+    work[(at.RATE_NOW + joint.force) * W + i] = whole
     work[(at.RATE_NOW + joint.rate) * W + i] = rate
     store_rate(effects.series, work, joint.friction, tangential, i, W)
     store_rate(effects.objective, work, joint.friction, tangential, i, W)

@@ -41,7 +41,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Revolute:
-    """A pin without play between two places."""
+    """A pin without clearance between two places."""
 
     name: str
     journal: str

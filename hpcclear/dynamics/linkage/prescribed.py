@@ -262,7 +262,7 @@ def _reactions(
     tabled = [load.name for load in mechanism.loads if getattr(load, "table", False)]
     curves = {name: rates + at.RATES + k for k, name in enumerate(tabled)}
     rows = Rows(0, n, 2 * n, rates, 3 * n, holds, curves=curves)
-    on = On(gravity=gravity != 0.0, ledger=True)
+    on = On(gravity=gravity != 0.0, energies=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
     names: dict[str, Any] = WORDS | words_of(mechanism)
     exec(text.source, names)

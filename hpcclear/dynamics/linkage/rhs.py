@@ -55,7 +55,7 @@ def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
 
 @cache
 def compiled_text(name: str) -> Any:
-    """The compiled motion of a text by its name, which another process can be told; its second word is the number of lanes."""
+    """The compiled motion of a text by its name, which another process can import; its second word is the number of lanes."""
     text = getattr(text_named(name), name)
     lanes = int(name.split("_")[1])
     long = inspect.getsource(text).count("\n") > LONG

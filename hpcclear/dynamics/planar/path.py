@@ -1,4 +1,4 @@
-"""The followed point of a linkage: where it is, its acceleration, and how far play takes it off its path."""
+"""The followed point of a linkage: where it is, its acceleration, and how far clearance takes it off its path."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -15,18 +15,22 @@ from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.linkage.poses import placed
 from hpcclear.dynamics.linkage.prescribed import passed_through
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.planar.turning import without_play
+from hpcclear.dynamics.planar.turning import without_clearance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
 Path = Callable[[Array], Array]
 
 INSTANTS = 720
-"""Of a turn at which the linkage without play is put together; cubic between them, which is off by 1e-11 of its size."""
+"""Of a turn at which the linkage without clearance is put together; cubic between them, which is off by 1e-11 of its size."""
 
 
 def followed(
-    scene: Scene, phase: Array, points: Mapping[str, Array], acceleration: Array, play: bool = True
+    scene: Scene,
+    phase: Array,
+    points: Mapping[str, Array],
+    acceleration: Array,
+    clearance: bool = True,
 ) -> dict[str, Array]:
     """Series of the followed point, none where none is followed: place, acceleration (t,) and `path_error`.
 
@@ -39,7 +43,7 @@ def followed(
         ``point_x`` and ``point_y`` (t, points), as `response.bodies_and_points` has them.
     acceleration : ndarray of complex, shape (t,)
         Of the point, x + iy.
-    play : bool
+    clearance : bool
         Whether there is any, or no path is off.
     """
     place, mechanism = scene.linkage.followed, linkage_of(scene).mechanism
@@ -53,7 +57,7 @@ def followed(
         "followed_acceleration_x": acceleration.real,
         "followed_acceleration_y": acceleration.imag,
     }
-    path = _path_of(scene) if play else None
+    path = _path_of(scene) if clearance else None
     if path is not None:
         cycle = at.TURN * turns_of(scene.linkage)
         ideal = path(np.mod(phase, cycle) / cycle)
@@ -103,10 +107,10 @@ def rigid_acceleration(
 
 
 def ideal_path(mechanism: Mechanism, place: str) -> Path | None:
-    """Where a place of the linkage is without any play: complex m of the share of a revolution (t,); None where its drives
+    """Where a place of the linkage is without clearance: complex m of the share of a revolution (t,); None where its drives
     leave something free then or do not repeat, or it cannot pass a dead centre."""
     try:
-        ideal = without_play(mechanism)
+        ideal = without_clearance(mechanism)
         return None if freedom(ideal) else _path(ideal, place)
     except InputError:
         return None

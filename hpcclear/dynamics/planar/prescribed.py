@@ -128,7 +128,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     places = bodies_and_points(mechanism, pose)
     acceleration = np.nan_to_num(_followed_acceleration(linkage_of(scene), found))
     return times, {
-        **moved(scene, mechanism, places, phase, acceleration, play=False),
+        **moved(scene, mechanism, places, phase, acceleration, clearance=False),
         **_reactions(scene, found),
         "crank_moment": found.holds[f"{mechanism.period.name}_angle"],
         "kinetic_energy": kinetic,
@@ -165,6 +165,6 @@ def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
 
 
 def pins_of(scene: Scene) -> tuple[str, ...]:
-    """Names of the pins without play."""
+    """Names of the pins without clearance."""
     joints = linkage_of(scene).mechanism.joints
     return tuple(joint.name for joint in joints if type(joint) is Revolute)

@@ -24,7 +24,7 @@ from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
 
 PLACEHOLDER = 1e-3
-"""Stands in the structure for a number that is nought in the scene and varied by its study: what is nought is not in a text."""
+"""Stands for a number that is zero in the scene and varied by its study: zeros are left out of the generated source."""
 
 NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
                 "torque", "no_load_speed", "flywheel_inertia", "stiffness", "damping", "size", "direction",
@@ -121,7 +121,7 @@ def _in_tables(scene: Scene, path: str) -> bool:
 
 
 def _may_vary(scene: Scene) -> set[str]:
-    """Entries that may be nought in the scene and not in a sample: what the study varies, and all that a template reads."""
+    """Entries that may be zero in the scene and not in a sample: what the study varies, and all that a template reads."""
     if scene.template is None:
         return _varied(scene)
     found = {path for path in scene.numeric_paths() if _in_tables(scene, path)}
@@ -135,14 +135,14 @@ def is_prescribed(scene: Scene) -> bool:
 
 
 def check_columns(scene: Scene, points: Points | None) -> None:
-    """InputError where a column drives a number that is nought in the scene and not of its study."""
+    """InputError where a column drives a number that is zero in the scene and not of its study."""
     if points is None:
         return
     known = _may_vary(scene)
     for name, paths in zip(points.names, points.paths, strict=True):
         for path in paths:
             if ".out_of_round." in path:
-                continue  # noughts of a round surface may be varied
+                continue  # zeros of a round surface may be varied
             if path not in known and _in_tables(scene, path) and scene.number(path) == 0.0:
                 raise InputError(
                     name, 0.0, f"drives {path}, which is zero in this scene and cannot be varied",

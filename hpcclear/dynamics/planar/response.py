@@ -80,7 +80,7 @@ def at_places(scene: Scene, columns: Array) -> Array:
 
 def moved(
     scene: Scene, mechanism: Mechanism, places: Mapping[str, Array], phase: Array, acceleration: Array,
-    play: bool = True,
+    clearance: bool = True,
 ) -> dict[str, Array]:  # fmt: skip
     """Series of the drive, the bodies and the followed point; of a template's parts by the names that it has for them.
 
@@ -92,12 +92,12 @@ def moved(
         As `bodies_and_points` has them.
     phase, acceleration : ndarray, shape (t,)
         rad and m/s2, as `path.followed` takes them; the acceleration of a guided body is that along its guide.
-    play : bool
+    clearance : bool
         As `path.followed` takes it.
     """
     drive = driven(mechanism, places, phase)
     if scene.template is None:
-        return {**drive, **places, **followed(scene, phase, places, acceleration, play)}
+        return {**drive, **places, **followed(scene, phase, places, acceleration, clearance)}
     names = [body.name for body in mechanism.bodies]
     return {
         **{name: drive[name] for name in ("crank_angle", "crank_speed")},

@@ -33,7 +33,7 @@ DEPENDENT = 1e-3
 point, which is known to a few digits less than other poses."""
 
 NARROW = 5e-3
-"""Smallest singular value over the largest, below which a linkage without play that passes is near singular: what it feels
+"""Smallest singular value over the largest, below which a linkage without clearance that passes is near singular: what it feels
 changes within so small a part of a turn that steps, or the nodes that works are summed over, pass over it. For a slider-crank
 it is the cosine of the rod's steepest angle: at 6e-3 works at a given speed close to 1e-5."""
 
@@ -44,7 +44,7 @@ NEAR_CHANGE = 0.1
 """Of a change point, rad of the drive: poses nearer to it are on its way."""
 
 
-def without_play(mechanism: Mechanism) -> Mechanism:
+def without_clearance(mechanism: Mechanism) -> Mechanism:
     """The mechanism with pins in place of clearances, and a drive of constant speed in place of a torque."""
 
     drives = tuple(
@@ -76,7 +76,7 @@ def twin_of(mechanism: Mechanism) -> Mechanism | None:
     if by_torque and mechanism.clearances:
         return None
     try:
-        twin = without_play(mechanism) if mechanism.clearances or by_torque else mechanism
+        twin = without_clearance(mechanism) if mechanism.clearances or by_torque else mechanism
     except InputError:  # a joint holds what others hold already, once it has no clearance
         return None
     return None if freedom(twin) else twin
@@ -202,10 +202,10 @@ def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) ->
         return found
     for row in np.flatnonzero(closed & ~_clear(loops, samples)).tolist():
         try:
-            told = refused(samples.mechanism(row), gravity, rounds)
+            refusal = refused(samples.mechanism(row), gravity, rounds)
         except InputError:
-            told = None
-        found[row] = int(Status.OK if told is None else told[0])
+            refusal = None
+        found[row] = int(Status.OK if refusal is None else refusal[0])
     return found
 
 

@@ -13,8 +13,8 @@ from hpcclear.dynamics.planar.problem import absolute_tolerances
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 
-KICK = 1e-5
-"""Size of the kicks, relative to `scales`: 10 nm, 10 um/s."""
+PERTURBATION = 1e-5
+"""Size of the perturbations, relative to `scales`: 10 nm, 10 um/s."""
 
 LENGTH = 1e-3
 """m; what the relative tolerance of lengths refers to."""
@@ -33,8 +33,8 @@ def direction(number: int, length: int) -> Array:
     return drawn / np.sqrt(np.mean(drawn**2))
 
 
-def kicked(start: Start, scale: Array, numbers: range, size: float = KICK) -> Start:
-    """Copies of one start, kicked in the directions of their numbers; number 0 stays as it is.
+def perturbed(start: Start, scale: Array, numbers: range, size: float = PERTURBATION) -> Start:
+    """Copies of one start, perturbed in the directions of their numbers; number 0 stays as it is.
 
     Parameters
     ----------
@@ -43,15 +43,15 @@ def kicked(start: Start, scale: Array, numbers: range, size: float = KICK) -> St
         Of `scales`.
     numbers : range
     size : float
-        Root mean square of a kick over scale.
+        Root mean square of a perturbation over scale.
     """
     n = len(scale) // 2
     copies = Start(np.repeat(start.rows, len(numbers), axis=0))
     for row, number in enumerate(numbers):
         if number:
-            kick = size * scale * direction(number, 2 * n)
-            copies.coordinates(n)[row] += kick[:n]
-            copies.velocities(n)[row] += kick[n:]
+            perturbation = size * scale * direction(number, 2 * n)
+            copies.coordinates(n)[row] += perturbation[:n]
+            copies.velocities(n)[row] += perturbation[n:]
     return copies
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime, Status
-from hpcclear.dynamics.steady.copies import kicked
+from hpcclear.dynamics.steady.copies import perturbed
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 STRICTER = 10.0
@@ -29,7 +29,7 @@ STEADY = 0.8
 
 @dataclass(frozen=True)
 class Sample:
-    """A design to simulate: parameters (1, PARAMETERS), one start, scale of kicks (2 n,), kinds of damping and drive."""
+    """A design: parameters (1, PARAMETERS), one start, scale of perturbations (2 n,), kinds of damping and drive."""
 
     par: Array
     start: Start
@@ -74,7 +74,7 @@ class Mean:
     met: bool
     period: int | None = None
     growth: float = np.nan
-    """Of a kick, per revolution: mean of the logarithm, as far as the look told."""
+    """Of a perturbation, per revolution: mean of the logarithm, as far as the look showed."""
     growth_limit: float = np.nan
     """Half-width of its limits, if it was measured on purpose."""
     attractors: int | None = None
@@ -104,13 +104,13 @@ class Effort:
     revolutions: int = 0
     evaluations: float = 0.0
     failed: Status | None = None
-    kicks: int = 0
+    perturbations: int = 0
 
     def more_starts(self, count: int) -> Start:
-        """Starts of so many copies, each with a kick that none had before."""
-        numbers = range(self.kicks, self.kicks + count)
-        self.kicks += count
-        return kicked(self.sample.start, self.sample.scale, numbers)
+        """Starts of so many copies, each with a perturbation that none had before."""
+        numbers = range(self.perturbations, self.perturbations + count)
+        self.perturbations += count
+        return perturbed(self.sample.start, self.sample.scale, numbers)
 
     def run(
         self, rtol: float, revolutions: int, start: Start, strictness: Array

@@ -1,4 +1,4 @@
-"""An irregular motion's mean: kicked copies at two tolerances, as many revolutions as its limits take."""
+"""An irregular motion's mean: perturbed copies at two tolerances, as many revolutions as its limits take."""
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import KICK
+from hpcclear.dynamics.steady.copies import PERTURBATION
 from hpcclear.dynamics.steady.effort import (
     SPEED,
     STEADY,
@@ -47,10 +47,10 @@ COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
 
 STRETCH = 4
-"""Revolutions between two looks at an ensemble, and those that its peaks are told for."""
+"""Revolutions between two looks at an ensemble, and those that its peaks are reported for."""
 
 PARTED = 12
-"""Revolutions before the first look at an ensemble, from when the kicks have grown to the size of the motion."""
+"""Revolutions before the first look at an ensemble, from when the perturbations have grown to the size of the motion."""
 
 FIRST = 4, 6
 """Stretches before it, at least and at most."""
@@ -86,13 +86,13 @@ class _Copies:
         """Shape (stretches, copies, 2)."""
         return np.stack([outcome.mean_gap for outcome in self.outcomes])
 
-    def kept(self, seen: "_Limits") -> Outcome:
+    def kept(self, seen: "_Interval") -> Outcome:
         rows = np.stack([outcome.rows for outcome in self.outcomes[seen.first :]])
         return Outcome(rows if seen.pooled else rows[:, 1::2])
 
 
 @dataclass
-class _Limits:
+class _Interval:
     """What an ensemble says at a look: mean of f, its limit and standard error, m; what to do about it."""
 
     first: int  # stretch that the average begins with
@@ -108,7 +108,7 @@ class _Limits:
     copies_count: bool  # more copies help, more revolutions do not
     short: bool  # too few stretches to see a drift
 
-    def told(self, most: float) -> float:
+    def half_width(self, most: float) -> float:
         """The limit that is stated, m: with what is unseen as far as that leaves it within `most`; NaN if there is none."""
         limit = self.limit + self.settling
         wide = float(np.hypot(self.limit, self.unseen)) + self.settling
@@ -122,14 +122,14 @@ class _Limits:
 def ensemble(
     effort: Effort, target: float, rtol: float, growth: float
 ) -> Generator[Stretch, Outcome, Mean]:
-    """Go on with copies from kicked starts until the limits of their mean are narrow enough, or the budget is spent."""
+    """Go on with copies from perturbed starts until the limits of their mean are narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
     stretches, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
         yield from _extend(effort, copies, rtol, stretches)
         if effort.failed is not None:
             return effort.failure(copies.outcomes[-1], rtol)
-        seen = _limits(copies, effort.sample)
+        seen = _interval(copies, effort.sample)
         level = target * seen.f
         spent = effort.revolutions >= effort.budget
         if seen.biased(0.25 * level) and rtol / STRICTER >= TIGHTEST and not spent:
@@ -146,7 +146,7 @@ def ensemble(
         if unsteady or spent or met:
             regime = Regime.UNSTEADY if unsteady else Regime.SETTLING if drifting else seen.regime
             return effort.mean(
-                regime=regime, limit=np.nan if unsteady else seen.told(level if met else np.inf),
+                regime=regime, limit=np.nan if unsteady else seen.half_width(level if met else np.inf),
                 outcomes=copies.kept(seen), stretch=STRETCH, rtol=rtol, met=bool(met and not unsteady),
                 growth=growth,
             )  # fmt: skip
@@ -159,10 +159,10 @@ def ensemble(
 
 
 def _first(sample: Sample, growth: float) -> int:
-    """Stretches before the first look: the faster kicks grow, the fewer, unless a speed or a latched damping lasts longer."""
+    """Stretches before the first look: fewer if perturbations grow fast, unless a speed or a latched damping lasts longer."""
     if sample.free or sample.latched or not growth > 0.0:
         return FIRST[1]
-    parting = -np.log(KICK) / growth
+    parting = -np.log(PERTURBATION) / growth
     return int(np.clip(np.ceil((parting + PARTED) / STRETCH), *FIRST))
 
 
@@ -206,7 +206,7 @@ def _extend(
 
 
 def _more(
-    effort: Effort, copies: _Copies, rtol: float, seen: _Limits, level: float
+    effort: Effort, copies: _Copies, rtol: float, seen: _Interval, level: float
 ) -> Generator[Stretch, Outcome, int]:
     """Add copies where their orbits differ for good; how many further stretches to ask for."""
     used, total = len(copies.outcomes) - seen.first, len(copies.outcomes)
@@ -238,7 +238,7 @@ def _join(copies: _Copies, new: _Copies) -> None:
     ]
 
 
-def _limits(copies: _Copies, sample: Sample) -> _Limits:
+def _interval(copies: _Copies, sample: Sample) -> _Interval:
     speeds = sample.speeds(copies.outcomes)
     gaps = copies.gaps()
     y = judging.projected(gaps)  # (stretches, copies)
@@ -285,7 +285,7 @@ def _limits(copies: _Copies, sample: Sample) -> _Limits:
         by_speed = SPEED * mean / abs(float(speeds[first:].mean()))
         faster, further = judging.approach(speeds[first:])
         moved, settling = max(moved, by_speed * faster), max(settling, by_speed * further)
-    return _Limits(
+    return _Interval(
         first,
         pooled,
         mean,

@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_told
+from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_reported
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
@@ -103,7 +103,7 @@ class SteadyEvaluator:
         self._latched = contact is not None and contact.latched
         problem = self._lanes_of(1e-4, 1).problem  # refuses what cannot be simulated
         self._free = problem.effects.torque is not None
-        self._told, self._worn = responses_told(problem), bool(problem.effects.wear)
+        self._responses, self._worn = responses_reported(problem), bool(problem.effects.wear)
 
     def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
         """The lanes for stretches of this kind."""
@@ -173,7 +173,9 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                yield record_of(sample, ask.par, mean, self._told, self._worn, self.scene.objective)
+                yield record_of(
+                    sample, ask.par, mean, self._responses, self._worn, self.scene.objective
+                )
             elif ask.asks_anew:
                 going.append(ask)
         self._queue(going)
@@ -187,7 +189,7 @@ def _labels(ask: _Ask) -> Integers:
 
 
 def record_of(
-    sample: int, par: Array, mean: Mean, told: Sequence[str] = (), worn: bool = False,
+    sample: int, par: Array, mean: Mean, responses: Sequence[str] = (), worn: bool = False,
     judged: Objective = MEAN_GAP,
 ) -> Records:  # fmt: skip
     """What was found as a record (1,): means over stretches and copies, of the peaks too unless the motion is regular.
@@ -197,8 +199,8 @@ def record_of(
     sample : int
     par : ndarray, shape (1, PARAMETERS)
     mean : Mean
-    told : sequence of str
-        Further responses, as of `responses_told`.
+    responses : sequence of str
+        Further responses, as of `responses_reported`.
     worn : bool
         Whether a joint wears.
     judged : Objective
@@ -211,7 +213,7 @@ def record_of(
         np.zeros(len(rows), np.int64),
         Outcome(rows),
         np.repeat(par, len(rows), axis=0),
-        told,
+        responses,
         worn,
         judged,
     )
@@ -242,8 +244,8 @@ def record_of(
     record["objective_limit"] = record["objective_uncertainty"] = mean.limit
     record["regime"] = mean.regime
     record["period"] = np.nan if mean.period is None else mean.period
-    record["kick_growth"] = mean.growth
-    record["kick_growth_limit"] = mean.growth_limit
+    record["lyapunov_exponent"] = mean.growth
+    record["lyapunov_exponent_limit"] = mean.growth_limit
     record["attractors"] = np.nan if mean.attractors is None else mean.attractors
     record["steady_rtol"] = mean.tightest
     record["steady_revolutions"] = mean.revolutions

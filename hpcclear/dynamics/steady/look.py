@@ -10,7 +10,7 @@ from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import effort as given
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import KICK, kicked, separation
+from hpcclear.dynamics.steady.copies import PERTURBATION, perturbed, separation
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
 from hpcclear.dynamics.views import Outcome, Start
 
@@ -70,7 +70,7 @@ def _is_checkpoint(revolutions: int) -> bool:
 
 
 def _growth(apart: list[float]) -> float:
-    """Mean logarithm of the growth of a kick per revolution, until copies are as far apart as they still are at the end."""
+    """Lyapunov exponent per revolution, until copies are as far apart as at the end."""
     distance = np.array(apart)
     lasting = np.median(distance[len(distance) // 2 :])
     far = int(np.argmax(distance >= 0.3 * lasting)) or len(distance) - 1
@@ -83,9 +83,9 @@ def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mea
     sample = effort.sample
     rtol = min((SHARE_LATCHED if sample.latched else SHARE) * target, LOOSEST)
     strictness = np.array([1.0, 1.0, given.STRICTER, given.STRICTER])
-    start = kicked(sample.start, sample.scale, range(2))
+    start = perturbed(sample.start, sample.scale, range(2))
     start = Start(np.concatenate([start.rows, start.rows]))
-    history = _History(apart=[KICK])
+    history = _History(apart=[PERTURBATION])
     growth = np.nan
     while True:
         outcome = yield from effort.run(rtol, 1, start, strictness)
@@ -136,25 +136,29 @@ def _judge(history: _History, sample: Sample, target: float, rtol: float) -> "_F
     history.moved[revolutions] = seen.moved
     f = objective(seen.gaps)
     loose = objective(gaps[-seen.length :, :2].mean(axis=0))
-    kick = float(abs(f[0] - f[1]))
+    perturbation = float(abs(f[0] - f[1]))
     tolerance = float(np.abs(loose - f.mean()).max())
     if seen.apart > 0.25 * level and revolutions >= PATIENCE and not seen.joining:
         return "irregular"
     settling = max(seen.settling, _of_speed(sample.speeds(history.outcomes), 0.5 * level, f.mean()))
-    settled = settling + kick <= 0.5 * level and (seen.period is not None or revolutions >= 32)
+    settled = settling + perturbation <= 0.5 * level and (
+        seen.period is not None or revolutions >= 32
+    )
     if settled and tolerance > level and rtol / given.STRICTER >= given.TIGHTEST:
         return "tighten"
     if not settled and revolutions >= 4 * CHECKPOINTS[-1] and _drifts(history, level):
         return _unsteady(history)
-    limit = settling + kick + 0.5 * tolerance  # of the stricter copies, an order better
+    limit = settling + perturbation + 0.5 * tolerance  # of the stricter copies, an order better
     outcomes = history.window(seen.length)
-    mean = float(objective(outcomes.mean_gap.mean(axis=(0, 1))))  # as it is told with the limits
+    mean = float(
+        objective(outcomes.mean_gap.mean(axis=(0, 1)))
+    )  # as it is reported with its half-width
     met = bool(settled and limit <= target * mean)
     orbits = ORBITS if sample.latched and target >= COARSE else 0.0
     unseen = _unseen(seen, mean, max(TOLERANCES * rtol / given.STRICTER, orbits))
-    told = max(limit, min(float(np.hypot(limit, unseen)), target * mean if met else np.inf))
+    half_width = max(limit, min(float(np.hypot(limit, unseen)), target * mean if met else np.inf))
     return _Found(
-        Regime.REGULAR if settled else Regime.SETTLING, told, outcomes,
+        Regime.REGULAR if settled else Regime.SETTLING, half_width, outcomes,
         met=met, final=settled, period=seen.period if settled else None,
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""One cell of a map: what the motion does there, how fast a kick grows, how many kinds of motion several starts end in."""
+"""One cell of a map: kind of motion, Lyapunov exponent, number of different motions that several starts reach."""
 
 from collections.abc import Generator
 
@@ -8,7 +8,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import LENGTH, kicked
+from hpcclear.dynamics.steady.copies import LENGTH, perturbed
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
@@ -23,7 +23,7 @@ OWN, OTHER = 4, 4
 """Copies of the scene's own start, each with a shadow; and other starts."""
 
 FAR = 0.2
-"""Kicks of the other starts over the least clearance (of velocities, over as many m/s as it has mm): journals stay inside."""
+"""Perturbation of the other starts over the smallest clearance (velocities: over as many m/s as mm); journals stay inside."""
 
 SPIN_UP = 20
 LOOKS = (20, 40, 80)
@@ -92,15 +92,15 @@ def mapped(sample: Sample, sure: float = SURE) -> Generator[Stretch, Outcome, Me
 def _starts(sample: Sample) -> Start:
     clearance = Parameters(sample.par).clearance
     far = FAR * float(clearance[clearance > 0.0].min()) / LENGTH
-    own = kicked(sample.start, sample.scale, range(OWN))
-    other = kicked(sample.start, sample.scale, range(OWN, OWN + OTHER), far)
+    own = perturbed(sample.start, sample.scale, range(OWN))
+    other = perturbed(sample.start, sample.scale, range(OWN, OWN + OTHER), far)
     return Start(np.concatenate([own.rows, other.rows]))
 
 
 def _shadows(start: Start, scale: Array) -> Start:
     """A copy beside each start, `DISTANCE` away."""
     beside = [
-        kicked(start[k : k + 1], scale, range(k + 1, k + 2), DISTANCE) for k in range(len(start))
+        perturbed(start[k : k + 1], scale, range(k + 1, k + 2), DISTANCE) for k in range(len(start))
     ]
     return Start(np.concatenate([one.rows for one in beside]))
 

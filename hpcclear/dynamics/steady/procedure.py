@@ -8,8 +8,8 @@ from hpcclear.dynamics.steady.look import look
 from hpcclear.dynamics.views import Outcome, Parameters
 
 USUAL = 1e-4
-"""Play, m, down to which the tolerances that chaotic means begin with were found good enough; with 0.02 mm those at 1e-6 were
-off by 1 %, more than they differed from those at 1e-5."""
+"""Clearance, m, down to which the initial tolerances of chaotic means were found good enough. At 0.02 mm means at 1e-6 were
+off by 1 %, more than their difference from 1e-5."""
 
 
 def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Stretch, Outcome, Mean]:
@@ -35,7 +35,7 @@ def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Stretch
 
 
 def loosest(sample: Sample) -> float:
-    """The looser tolerance of an ensemble at first, at most: positions are held to a share of themselves, not of the play."""
-    play = Parameters(sample.par).clearance
-    narrow = min(float(play[play > 0.0].min()) / USUAL, 1.0)
+    """Upper bound of an ensemble's first looser tolerance; tolerances are relative to positions, not to the clearance."""
+    gaps = Parameters(sample.par).clearance
+    narrow = min(float(gaps[gaps > 0.0].min()) / USUAL, 1.0)
     return narrow * (LOOSEST_LATCHED if sample.latched else LOOSEST)

@@ -1,8 +1,8 @@
 """Where around bearing and journal sliding work is done, summed up at the ends of steps.
 
-A step's sliding work is known to the order of its method. It is told as done at one angle, that between the directions of the
+A step's sliding work is known to the order of its method. It is booked at one angle, that between the directions of the
 contact at both ends, each weighted by the sliding power there: within a step the angle hardly changes, and what is made of it
-is off by the square of that change. Told at every stage, as all else is integrated, it would cost as much as the motion.
+is off by the square of that change. GoalValue at every stage, as all else is integrated, it would cost as much as the motion.
 
 It is compiled for the joints and waves there are, and steppers call it by its address after a step.
 """
@@ -25,7 +25,7 @@ _NO_POWER = 1e-30  # W, so that a step with power inside alone has a direction
 
 @lane_function
 def work_at(work, p, angle, i, W):
-    """Sliding work of joint p in the step, and cosine and sine of the angle that it is told at; 0 where it was refused."""
+    """Sliding work of joint p in the step, and cosine and sine of the angle that it is booked at; 0 where it was refused."""
     yes = work[at.ACCEPT * W + i] == 1.0
     power = at.SLIDING_POWERS + p
     before = work[(at.RATE_OLD + power) * W + i] + _NO_POWER

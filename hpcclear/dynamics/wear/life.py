@@ -10,7 +10,7 @@ Where profiles are followed (`relief`), the moments of the work go with it: of w
 found at its start, or half-way.
 
 Copies of odd number wait longer before they are measured. Where they differ from the others by more than both scatter, the
-transient is not over: their difference widens the limits, and is told.
+transient is not over: their difference widens the limits, and is reported.
 """
 
 import math
@@ -131,7 +131,7 @@ def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
                 found.halves.append(half)
                 found.nodes.append(end)
                 variance += joints.grown(here.work, length * half.rate_limit) ** 2
-                # rates that rise and fall again within a jump are told by its end as well
+                # rates that rise and fall again within a jump are seen at its end as well
                 apart = np.maximum(np.abs(half.rate - here.rate), np.abs(end.rate - half.rate))
                 found.error = found.error + joints.grown(here.work, 0.5 * length * apart)
                 found.error = found.error + _shifted(joints, relief, here, half, length)[0]

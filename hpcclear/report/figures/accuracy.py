@@ -198,10 +198,10 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
         for k, estimate in enumerate(found["estimate"].to_numpy()):
             one = here.sel(estimate=estimate)
             y = one["moment_error"].to_numpy()
-            limits = [y - one["moment_lower"].to_numpy(), one["moment_upper"].to_numpy() - y]
+            bars = [y - one["moment_lower"].to_numpy(), one["moment_upper"].to_numpy() - y]
             for column, x in enumerate((found["draws"], one["moment_seconds"])):
                 axes[row, column].errorbar(
-                    x.to_numpy(), y, limits, color=style.CYCLE[k], ls=style.DASHES[k],
+                    x.to_numpy(), y, bars, color=style.CYCLE[k], ls=style.DASHES[k],
                     marker=style.MARKERS[k], elinewidth=0.6, label=str(estimate),
                 )  # fmt: skip
         for column in (0, 1):

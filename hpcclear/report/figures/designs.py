@@ -148,7 +148,7 @@ def _verified(
             "mew": 0.7,
             "zorder": 4,
         }
-        bars = [_limits(one, goal.verified, goal.scale) for goal in (x, y)]
+        bars = [_bars(one, goal.verified, goal.scale) for goal in (x, y)]
         panel.errorbar(
             *at,
             xerr=bars[0],
@@ -199,7 +199,7 @@ def _mark(one: xr.Dataset) -> tuple[str, str]:
     return "optimised (simulated)", "o"
 
 
-def _limits(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
+def _bars(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
     """Distances to the confidence intervals as `errorbar` wants them, (2, 1); None if there are none."""
     if f"{name}_lower" not in one or f"{name}_upper" not in one:
         return None

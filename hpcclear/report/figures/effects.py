@@ -65,13 +65,13 @@ def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> s
 
 def _verdict(one: xr.Dataset, tolerance: float) -> str:
     """What a single variant's changes come to, as the end of its sentence."""
-    counted, told = one["judged"].to_numpy() == 1, one["told"].to_numpy()
+    counted, found = one["judged"].to_numpy() == 1, one["finding"].to_numpy()
     if int(one["decision"]) == 0:
         return ""
     if int(one["decision"]) == 1:
-        worst = one["response"].to_numpy()[counted & (told == 1)][0]
-        return "; needed" if told[0] == 1 else f"; needed for the {worst}"
-    open_ = counted & (told == 2)
+        worst = one["response"].to_numpy()[counted & (found == 1)][0]
+        return "; needed" if found[0] == 1 else f"; needed for the {worst}"
+    open_ = counted & (found == 2)
     room = tolerance - np.abs(one["change"].to_numpy()[open_])
     count = int(one["samples"])
     if np.isnan(room).any():
@@ -92,10 +92,10 @@ def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
         share = saving(content, chosen, seconds)
         names = ", ".join(named(content, chosen))
         last = f"Within {tolerance} these effects can be neglected: {names}. This saves {100 * share:.0f} %."
-    return [*(statement(content, k, seconds) for k in singles), *told_apart(content), last]
+    return [*(statement(content, k, seconds) for k in singles), *distinguished(content), last]
 
 
-def told_apart(content: xr.Dataset) -> list[str]:
+def distinguished(content: xr.Dataset) -> list[str]:
     """Pairs whose change of f is significantly not the sum of the two, a sentence each."""
     off = content["off"].to_numpy()
     single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}

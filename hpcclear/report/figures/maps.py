@@ -50,7 +50,7 @@ def entry(variable: xr.DataArray) -> tuple[Array, str]:
 def _plane(cells: xr.Dataset, names: list[str]) -> "Figure":
     figure, axes = style.grid(3, 1, 175.0, sharex=True)
     (x, across), (y, up) = (entry(cells[name]) for name in names)
-    exponent = cells["kick_growth"].to_numpy().T
+    exponent = cells["lyapunov_exponent"].to_numpy().T
     finite = np.abs(exponent[np.isfinite(exponent)])
     most = float(np.quantile(finite, 0.98)) if finite.size else 1.0
     colours, boundaries = style.matplotlib().colormaps, style.matplotlib().colors.BoundaryNorm
@@ -92,7 +92,7 @@ def _line(cells: xr.Dataset, name: str) -> "Figure":
     x, across = entry(cells[name])
     unit = labels.of(cells["objective"])
     for panel, key, reach, factor, words in (
-        (axes[0, 0], "kick_growth", "kick_growth_limit", 1.0, _EXPONENT),
+        (axes[0, 0], "lyapunov_exponent", "lyapunov_exponent_limit", 1.0, _EXPONENT),
         (axes[3, 0], "objective", "objective_limit", unit.factor, unit.label("$f$, 95 % CI")),
     ):
         values, width = (cells[one].to_numpy() * factor for one in (key, reach))

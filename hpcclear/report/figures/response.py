@@ -128,12 +128,12 @@ def energy_figure(response: xr.Dataset) -> "Figure":
     """
     figure, axes = style.grid(3, 1, 120.0, sharex=True, height_ratios=[1.2, 1.2, 0.8])
     turn = motion.turns(response)
-    ledgers = (
+    balances = (
         ("driving_work", "load_work", "dissipated_energy"),
         ("kinetic_energy", "elastic_energy", "potential_energy"),
     )
     kinds = ("exchanged", "stored")
-    for panel, names, kind in zip(axes[:2, 0], ledgers, kinds, strict=True):
+    for panel, names, kind in zip(axes[:2, 0], balances, kinds, strict=True):
         present = [n for n in names if n in response and bool((response[n] != 0.0).any())]
         unit = labels.scale("J", [float(abs(response[n]).max()) for n in present])
         for row, name in enumerate(present):

@@ -184,7 +184,7 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
     fields = [_fields(model, model.names.index(name)) for model in shown.values()]
     unit = labels.scale("m", np.concatenate([np.ravel(z) for _, _, z, _ in fields]))
     finite = [z[np.isfinite(z)] * unit.factor for _, _, z, _ in fields]
-    limits = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
+    edges = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
     by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(kriging)}
     across = labels.of(by_path[name])
     known = fits.of_models(kriging)
@@ -195,7 +195,7 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
         scales = [labels.scale(str(v.attrs["units"]), e) for v, e in ((first, x), (second, y))]
         for k, panel in enumerate(line):
             grid = (x * scales[0].factor, y * scales[1].factor, z[k].T * unit.factor)
-            drawn = panel.contourf(*grid, levels=limits, cmap=style.COLOURS)
+            drawn = panel.contourf(*grid, levels=edges, cmap=style.COLOURS)
             lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
             panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
             panel.set_xlabel(scales[0].label(symbol(str(first.attrs["scene_path"]))))
@@ -249,12 +249,12 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
             marker = style.MARKERS[k % 7]
             panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
         fits.mark(panel, known[name], 0.12)
-        told = "".join(
+        note = "".join(
             f", {label}" for label in sorted({leaf.label for leaf in model.leaves} - {""})
         )
-        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{told}")
-    limits = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
-    ends = (min(limits)[0], max(high for _, high in limits))
+        panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{note}")
+    ranges = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
+    ends = (min(ranges)[0], max(high for _, high in ranges))
     for panel in axes.flat:
         panel.plot(ends, ends, "k-", lw=0.5, zorder=0)
         panel.set(xlim=ends, ylim=ends, aspect="equal")

@@ -67,11 +67,16 @@ def _cheapest(found: xr.Dataset) -> list[list[object]]:
         if not np.isfinite(price).any():
             rows.append([f"{target:.0e}", "not reached", Number("–"), Number("–")])
             continue
-        k, rung = np.unravel_index(int(price.argmin()), price.shape)
+        k, level = np.unravel_index(int(price.argmin()), price.shape)
         name = here["integrator"].to_numpy()[k]
-        setting = float(here["setting"].to_numpy()[k, rung])
+        setting = float(here["setting"].to_numpy()[k, level])
         rows.append(
-            [f"{target:.0e}", name, Number(f"{setting:.0e}"), Number(f"{1e3 * price[k, rung]:.3g}")]
+            [
+                f"{target:.0e}",
+                name,
+                Number(f"{setting:.0e}"),
+                Number(f"{1e3 * price[k, level]:.3g}"),
+            ]
         )
     return rows
 

@@ -58,8 +58,8 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
         yield from _of_file(one.draw, content.get(one.kind), one.caption + fit)
     certificate, times = content.get("effects"), content.get("timing")
     if certificate is not None:
-        told = "Change of f with each effect off, with confidence interval and tolerance, and the run time saved."
-        yield told, lambda: _shown(effects.effects_figure(certificate, times), told)
+        about = "Change of f with each effect off, with confidence interval and tolerance, and the run time saved."
+        yield about, lambda: _shown(effects.effects_figure(certificate, times), about)
     front = content.get("front")
     if front is not None:
         verified = content.get("verification")
@@ -83,12 +83,12 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
 
 
 def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    caption = f"Responses of the designs, two revolutions{_plays(*found.values())}."
+    caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
     return _shown(designs.comparison_figure(found), caption)
 
 
 def _response_alone(name: str, found: xr.Dataset) -> dict[str, str]:
-    caption = f"{name}: response, two revolutions{_plays(found)}."
+    caption = f"{name}: response, two revolutions{_clearances(found)}."
     return _shown(response.response_figure(found), caption)
 
 
@@ -112,15 +112,15 @@ def _warnings(kind: str, content: xr.Dataset | None) -> str:
     return f" Warning: {'; '.join(found)}." if found else ""
 
 
-def _plays(*responses: xr.Dataset) -> str:
+def _clearances(*responses: xr.Dataset) -> str:
     """At which clearances these were simulated, where that is the same for all."""
-    told = []
+    parts = []
     for joint, name in enumerate(motion.joints(responses[0]).values()):
         known = [motion.clearances(one)[joint] for one in responses]
         shown = {labels.quantity(float(c), "m") for c in known if np.isfinite(c)}
         if len(shown) == 1:
-            told.append(f"{shown.pop()} in {name}")
-    return f", at radial clearances of {' and '.join(told)}" if told else ""
+            parts.append(f"{shown.pop()} in {name}")
+    return f", at radial clearances of {' and '.join(parts)}" if parts else ""
 
 
 def picture(

@@ -10,7 +10,7 @@ from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.statistics.random.survival import order_limits, quantiles
+from hpcclear.statistics.random.survival import order_interval, quantiles
 
 _MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
 LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
@@ -49,14 +49,14 @@ def _lives_words(content: Content) -> list[str]:
         if np.isfinite(turns):
             every = lives["lifetime"].to_numpy()
             known = every[~np.isnan(every)]
-            least, most = order_limits(known, 0.5, len(every) - len(known))
+            least, most = order_interval(known, 0.5, len(every) - len(known))
             reach = f"{most:.4g}" if np.isfinite(most) else f"beyond {cycles:.4g}"
             words.append(
                 f"Median service life: {turns:.4g} revolutions (95 % CI {np.nan_to_num(least):.4g} to {reach}), {hours:.4g} h."
             )
     if any(name.startswith("limit_") for name in lives.attrs):
-        limits = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
-        words.append(f"Survival: {float(last['survival']):.0%} (95 % CI {limits}).")
+        interval = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
+        words.append(f"Survival: {float(last['survival']):.0%} (95 % CI {interval}).")
     return words
 
 

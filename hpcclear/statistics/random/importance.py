@@ -249,7 +249,7 @@ class Rare:
         """Whether those beyond the limit are worth enough draws."""
         return _worth(self.f, self.weights, self.limit) >= ENOUGH
 
-    def told(self, confidence: float) -> Limited:
+    def interval(self, confidence: float) -> Limited:
         """The probability with limits, at a two-sided confidence."""
         one = weighted(self.f, self.weights, self.limit, confidence)
         if self.known:

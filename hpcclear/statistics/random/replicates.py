@@ -52,14 +52,14 @@ class Deviation(Estimate):
     """A standard deviation."""
 
     carriers: float
-    """How many equal squares its values are worth: the square of the sum of their squares over the sum of their fourth powers."""
+    """How many equal squares its values are worth: the square of the sum of squares over the sum of fourth powers."""
 
 
 def limits(one: Estimate, confidence: float) -> tuple[float, float]:
     """Confidence interval of an estimate, by Student's t; NaN where it has no error.
 
-    That of a standard deviation is symmetric in its logarithm, and wider where a few values carry it: of 512 lognormal values of
-    shape 1, say 20 carriers, intervals without that held 82 % of the time instead of 95 %.
+    That of a standard deviation is symmetric in its logarithm, and wider where a few values carry it: of 512 lognormal values
+    of shape 1, say 20 carriers, intervals without that held 82 % of the time instead of 95 %.
     """
     if one.freedom < 1:
         return np.nan, np.nan
@@ -164,7 +164,7 @@ def quantile(values: Array, order: float, confidence: float) -> Limited:
     below = (known & (values <= value)).sum(axis=1)
     shifts = _shifts(below - counts * (below.sum() / total), counts)
     places = np.arange(total) + 0.5
-    ends = np.array(_limits_of_share(order, shifts, counts, confidence)) * total
+    ends = np.array(_interval_of_share(order, shifts, counts, confidence)) * total
     lower, upper = np.interp(ends, places, ranked, left=np.nan, right=np.nan)
     low, high = np.clip(ends, places[0], places[-1])
     slope = float(np.diff(np.interp([low, high], places, ranked))[0] / (high - low)) * total
@@ -195,11 +195,11 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     total = int(counts.sum())
     share = float(above.sum() / total)
     shifts = _shifts(above - counts * share, counts)
-    lower, upper = _limits_of_share(share, shifts, counts, confidence)
+    lower, upper = _interval_of_share(share, shifts, counts, confidence)
     return Limited(share, shifts, lower, upper)
 
 
-def _limits_of_share(
+def _interval_of_share(
     share: float, shifts: Array, counts: Array, confidence: float
 ) -> tuple[float, float]:
     """Limits of a probability: those of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""

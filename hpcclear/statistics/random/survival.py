@@ -11,7 +11,7 @@ from hpcclear.base.arrays import Array, Integers
 CONFIDENCE = 0.95
 
 
-def share_limits(count: Integers, total: int) -> tuple[Array, Array]:
+def share_interval(count: Integers, total: int) -> tuple[Array, Array]:
     """Clopper and Pearson's 95 % confidence interval of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
     from scipy.special import betaincinv  # a fifth of a second, and pages need the quantiles alone
 
@@ -51,7 +51,7 @@ def rank_correlation(first: Array, second: Array) -> float:
     return float(np.corrcoef(rankdata(first[both]), rankdata(second[both]))[0, 1])
 
 
-def order_limits(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
+def order_interval(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
     """95 % confidence limits of a quantile of independent values, by their order alone; NaN where too few values are known.
 
     Parameters
@@ -83,6 +83,6 @@ def order_limits(values: Array, level: float, unknown: int = 0) -> tuple[float, 
 
 
 def fewest(level: float) -> int:
-    """Number of independent values from which on `order_limits` has both limits of a quantile."""
+    """Number of independent values from which on `order_interval` has both ends of the interval of a quantile."""
     tail = 0.5 * (1.0 - CONFIDENCE)
     return int(np.ceil(np.log(tail) / np.log(max(level, 1.0 - level)) - 1e-12))

@@ -18,7 +18,7 @@ WINDOW, FEWEST = 0.15, 12
 """Share of the values that a line goes through, and how many at least."""
 
 MOST = 12.0
-"""Largest index that is told: normal numbers of double precision reach no further."""
+"""Largest index that is reported: normal numbers of double precision reach no further."""
 
 
 def index(values: Array, limit: float) -> Array:

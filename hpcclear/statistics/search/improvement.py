@@ -1,15 +1,15 @@
 """Where to evaluate next, by expected improvement: for objectives that are costly and known with errors.
 
-Where f is rough, no model of f over designs and random inputs together holds, but the roughness averages out in a statistic of f.
+Where f is rough, no model of f over designs and random inputs together holds, but the roughness averages out in a statistic.
 So each objective gets one Kriging model over designs, with the kernel of Matern and a noise variance near that of the known
 errors: a model that is free to fit noise as ripples finds what flatters it. The next designs are those that are expected
-to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs at a
-time each takes those before it for evaluated, at the value that is expected (Kriging believer).
+to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs
+at a time each takes those before it for evaluated, at the value that is expected (Kriging believer).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
-kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; the sum
-over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
+kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; the
+sum over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
 optimization" (2016), doi:10.1007/978-3-319-29975-4_12; random scalarisations J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10
 (2006), doi:10.1109/TEVC.2005.851274.
 """
@@ -151,7 +151,9 @@ def _fitted(
     designs: Array, values: Array, errors: Array, bounds: Array, rng: np.random.Generator
 ) -> Kriging:
     scale = float(np.nanstd(values))
-    share = float(np.nanmedian(errors)) / scale if scale > 0.0 and np.isfinite(errors).any() else 0.0
+    share = (
+        float(np.nanmedian(errors)) / scale if scale > 0.0 and np.isfinite(errors).any() else 0.0
+    )
     low, high = (max(factor * share**2, 1e-8) for factor in NOISE)
     noise = (low, max(high, 10.0 * low)) if share else None
     return fit_kriging(
@@ -261,8 +263,8 @@ def gain(least: float, mean: Array, deviation: Array) -> Array:
 
 
 def volume(front: Array, mean: Array, deviation: Array) -> Array:
-    """Expected area that independent normal numbers, (n, 2), add to that of points, (k, 2); scaled to the extent of these, up to
-    1.1 times that."""
+    """Expected area that independent normal numbers, (n, 2), add to that of points, (k, 2), scaled to the extent of these, up
+    to 1.1 times that."""
     points = front[moocore.is_nondominated(front)]
     points = points[np.argsort(points[:, 0])]
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
@@ -270,7 +272,10 @@ def volume(front: Array, mean: Array, deviation: Array) -> Array:
     extent = np.where(extent > 0.0, extent, 1.0)
     first, second = ((points - low) / extent).T
     mean, deviation = (mean - low) / extent, deviation / extent
-    left, right = gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0]), np.append(1.1, second)
+    left, right = (
+        gain_to(np.append(first, 1.1), mean[:, 0], deviation[:, 0]),
+        np.append(1.1, second),
+    )
     strips = np.diff(left, axis=0, prepend=0.0)  # between one point and the next
     return np.asarray((strips * gain_to(right, mean[:, 1], deviation[:, 1])).sum(axis=0))
 

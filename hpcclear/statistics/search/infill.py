@@ -127,8 +127,8 @@ def proposals(
         assert excess is not None  # only constraints leave a front without designs
         about = _nearer(designs, excess, bounds, rng)
         return _chosen(designs[:0], about, designs, bounds, count, count)
-    told = [front.points[front.values.argmin(axis=0)] for front in fronts]
-    ends = np.concatenate([told[0], near, told[-1]])
+    known = [front.points[front.values.argmin(axis=0)] for front in fronts]
+    ends = np.concatenate([known[0], near, known[-1]])
     others = np.concatenate([front.points for front in fronts])
     most = (
         count if values.shape[1] == 2 else count // 2
@@ -177,8 +177,10 @@ def _about(
         for column, row in enumerate(ends):
             steps = LOCAL * width * rng.uniform(-1.0, 1.0, (CANDIDATES, len(width)))
             points = np.clip(designs[row] + steps, bounds[:, 0], bounds[:, 1])
-            told = _believed(models, boldness, len(ends))(points)
-            least, broken = told if isinstance(told, tuple) else (told, np.zeros(len(points)))
+            believed = _believed(models, boldness, len(ends))(points)
+            least, broken = (
+                believed if isinstance(believed, tuple) else (believed, np.zeros(len(points)))
+            )
             found.append(points[np.lexsort((least[:, column], broken))[0]])
     return np.array(found)
 

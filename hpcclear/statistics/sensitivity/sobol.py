@@ -27,9 +27,9 @@ class SobolIndices:
     first: Array
     total: Array
     """first and total: shape (d,)."""
-    first_limits: Array
-    total_limits: Array
-    """first_limits and total_limits, shape (d, 2): bootstrap percentiles. They treat the points as random, so for Sobol
+    first_interval: Array
+    total_interval: Array
+    """first_interval and total_interval, shape (d, 2): bootstrap percentiles. They treat the points as random, so for Sobol
     points, which cover the box more evenly, they are wider than the error."""
     mean: float
     variance: float
@@ -56,11 +56,11 @@ def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Ar
     -------
     numpy.ndarray, shape (n_rows * (d + 2), d)
     """
-    limits = np.asarray(bounds, float)
-    d = len(limits)
+    box = np.asarray(bounds, float)
+    d = len(box)
     unit = qmc.Sobol(2 * d, rng=rng).random_base2(int(n_rows).bit_length() - 1)
     unit = np.stack([unit[:, :d], unit[:, d:]])
-    a, b = limits[:, 0] + unit * (limits[:, 1] - limits[:, 0])
+    a, b = box[:, 0] + unit * (box[:, 1] - box[:, 0])
     mixed = np.repeat(a[np.newaxis], d, axis=0)
     for j in range(d):
         mixed[j, :, j] = b[:, j]
@@ -115,12 +115,12 @@ def analyse_sobol(
         [np.stack(_indices(y[:, rng.integers(n_rows, size=n_rows)])) for _ in range(n_resamples)]
     )
     tails = (0.5 - confidence / 2.0, 0.5 + confidence / 2.0)
-    limits = np.moveaxis(np.quantile(resampled, tails, axis=0), 0, -1)
+    intervals = np.moveaxis(np.quantile(resampled, tails, axis=0), 0, -1)
     return SobolIndices(
         first=first,
         total=total,
-        first_limits=limits[0],
-        total_limits=limits[1],
+        first_interval=intervals[0],
+        total_interval=intervals[1],
         mean=float(y[:2].mean()),
         variance=float(y[:2].var()),
         n_rows=n_rows,

@@ -132,13 +132,13 @@ def _path(z: Array, left: Array, known: Integers, order: int, steps: int) -> lis
     whole = np.linalg.norm(columns, axis=0)
     columns -= basis @ (basis.T @ columns)
     own = np.linalg.norm(columns, axis=0)
-    told = own > DEPENDENT * whole
+    distinct = own > DEPENDENT * whole
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # of terms that others make up: dropped
         _, active, _ = lars_path(
-            columns[:, told] / own[told], left, method="lar", max_iter=steps, Gram=None
+            columns[:, distinct] / own[distinct], left, method="lar", max_iter=steps, Gram=None
         )
-    return [tuple(row) for row in further[told][active].tolist()]
+    return [tuple(row) for row in further[distinct][active].tolist()]
 
 
 def _legendre(z: Array, degrees: Integers) -> Array:

@@ -21,7 +21,7 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import moments
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.paper.printed import printed_designs, printed_moments
@@ -76,7 +76,7 @@ def simulations(scene: Scene) -> tuple[int, int]:
         return 0, 0
     designs, made = len(printed_designs(scene)), readings(scene)
     over_steps = sum(reading.over_steps for reading in made)
-    each = SCRAMBLINGS * scrambled_length(scene.required_study.verification.audit_samples) + 1
+    each = REPLICATES * scrambled_length(scene.required_study.verification.audit_samples) + 1
     return designs * each * (len(made) - over_steps), designs * (STEP_SAMPLES + 1) * over_steps
 
 
@@ -148,7 +148,7 @@ def _over_time(
     )
     f = np.where(records["status"] == Status.OK, records["objective"], np.nan)
     return [
-        (*_moments(part[:-1].reshape(SCRAMBLINGS, length)), float(part[-1]))
+        (*_moments(part[:-1].reshape(REPLICATES, length)), float(part[-1]))
         for part in f.reshape(len(designs), -1)
     ]
 

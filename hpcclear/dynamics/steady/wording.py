@@ -38,18 +38,20 @@ def in_a_line(record: Any, seconds: float | None = None) -> str:
     f = float(objective(np.asarray(record["mean_gap"]))) * 1e6
     limit = float(record["objective_limit"]) * 1e6
     regime, period = Regime(int(record["regime"])), float(record["period"])
-    told = [regime.name.lower()]
+    parts = [regime.name.lower()]
     if np.isfinite(period):
-        told.append(f"period {period:.0f}")
+        parts.append(f"period {period:.0f}")
     if regime in (Regime.CHAOTIC, Regime.SEVERAL):
-        told.append(f"perturbations grow by e^{float(record['kick_growth']):.2g} per revolution")
-    told.append(f"{int(record['steady_revolutions'])} revolutions")
+        parts.append(
+            f"perturbations grow by e^{float(record['lyapunov_exponent']):.2g} per revolution"
+        )
+    parts.append(f"{int(record['steady_revolutions'])} revolutions")
     if seconds is not None:
-        told.append(f"{seconds:.1f} s")
+        parts.append(f"{seconds:.1f} s")
     if not np.isfinite(limit):
-        return f"{f:.4g} um, interval not known ({', '.join(told)})"
+        return f"{f:.4g} um, interval not known ({', '.join(parts)})"
     digits = max(1 - int(np.floor(np.log10(limit))), 0) if limit > 0.0 else 6
-    return f"{f:.{digits}f} +- {limit:.{digits}f} um ({', '.join(told)})"
+    return f"{f:.{digits}f} +- {limit:.{digits}f} um ({', '.join(parts)})"
 
 
 def reached(records: Records) -> tuple[str, list[str]]:

@@ -338,7 +338,7 @@ def unpacked(numbers, work, stages, par, measures):
 
 
 @scalar_function
-def steps_abreast(numbers, work, stages, par, settings, tables, measures, memory):
+def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
     """`eight_steps` of all stiff lanes, with arrays at addresses."""
     of, effects, block = unpacked(numbers, work, stages, par, measures)
     W = of[WIDTH]
@@ -357,9 +357,9 @@ SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
 
 
 @cache
-def abreast_code() -> Any:
+def batch_code() -> Any:
     """The compiled implicit steps of any lanes, joints and coordinates; steppers take their ``address``."""
-    text = one_text(steps_abreast, "abreast")
+    text = one_text(batch_steps, "batch")
     return c_function(SIGNATURE, text, fastmath=FASTMATH)
 
 
