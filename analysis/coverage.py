@@ -9,6 +9,7 @@ holds if it meets the truth's interval at one standard error.
 """
 
 import argparse
+import itertools
 
 import numpy as np
 from directly import run_of
@@ -33,14 +34,14 @@ def main() -> None:
     parser.add_argument("studies", nargs="*", default=list(STUDIES))
     parser.add_argument("--truth", type=int, default=TRUTH)
     parser.add_argument("--samples", type=int, default=1024)
+    parser.add_argument("--seeds", type=int, default=1, help="designs and scatter of so many kinds")
     words = parser.parse_args()
     total = np.zeros(3, int)
     print(f"{'study':16} {'rtol':>7}  hold, by samples alone, of")
-    for name in words.studies:
-        scene = scene_of(name)
+    for name, seed in itertools.product(words.studies, range(words.seeds)):
         changes = {"study.verification.most_samples": words.samples, "study.accuracy": None}
-        scene = scene.with_(changes)
-        designs = spread_out(scene)
+        scene = scene_of(name).with_(changes | {"study.seed": 31 + seed})
+        designs = spread_out(scene, seed)
         exact = truths(scene, designs, words.truth)
         for rtol in TOLERANCES:
             found = np.array(checked(scene.with_({"numerics.rtol": rtol}), designs, exact))
@@ -53,12 +54,12 @@ def main() -> None:
     print(f"{'all':16} {'':7}  {hold} ({hold / count:.1%}), {plain} ({plain / count:.1%}), {count}")  # fmt: skip
 
 
-def spread_out(scene: Scene) -> list[Choice]:
+def spread_out(scene: Scene, seed: int) -> list[Choice]:
     """Designs all over the box of the first case."""
     case = scene.required_study.cases[0].name
     names = scene.required_study.design_variables(case)
     region = box(scene, names)
-    unit = unit_lhs(DESIGNS, len(names), np.random.default_rng(4))
+    unit = unit_lhs(DESIGNS, len(names), np.random.default_rng([4, seed]))
     rows = to_physical(scene, names, region.lower + unit * (region.upper - region.lower))
     return [Choice("", case, dict(zip(names, row.tolist(), strict=True))) for row in rows]
 

@@ -148,8 +148,34 @@ STUDIES: dict[str, tuple[str, dict[str, Any]]] = {
             "cases": {"made": {"random": ["C12", "C23", "m3"], "objectives": [QUANTILE, {"formula": "0 - m2 - m3"}]}},
         },
     ),
+    "torque": (
+        "hunt_crossley.toml",
+        {
+            "objective": "slider-acceleration-deviation",
+            "variables": {
+                "m2": mass("mechanism.rod.mass", 0.12, 0.4),
+                "m3": mass("mechanism.slider.mass", 0.08, 0.28),
+                "C": {"range": ["0.1 mm", "0.6 mm"]},
+            },
+            "random": {
+                "C": uniform("0.15 mm", "0.5 mm"),
+                "m3": {"distribution": "normal", "deviation": "2 g"},
+            },
+            "cases": {"made": {"random": ["C", "m3"], "objectives": ["mean", "deviation"]}},
+        },
+    ),
 }  # fmt: skip
 """Studies of our own mechanisms, small enough to be judged."""
+
+DRIVES = {
+    "torque": {
+        "kind": "torque",
+        "torque": "2 N m",
+        "flywheel_inertia": 0.02,
+        "initial_speed": "3000 rpm",
+    }
+}
+"""Other drives than their scenes': speeds that drift with the tolerance."""
 
 
 def scene_of(name: str) -> Scene:
@@ -160,6 +186,8 @@ def scene_of(name: str) -> Scene:
     table = tomllib.loads((JOBS / job).read_text())
     table["study"] = SMALL | study
     table["numerics"] = table["numerics"] | QUICK
+    table["drive"] = DRIVES.get(name, table.get("drive"))
+    table = {key: its for key, its in table.items() if its is not None}
     return load_scene(table)
 
 
