@@ -14,7 +14,6 @@ from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail
-from hpcclear.statistics.random.replicates import Estimate, student
 
 SMOOTH = 0.1
 """Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
@@ -48,13 +47,9 @@ def goal_value(
         found = replicates.exceedance(values, goal.limit, confidence)
     else:
         mean, deviation = replicates.moments(values)
-        return _symmetric(mean if goal.statistic == "mean" else deviation, confidence)
+        one = mean if goal.statistic == "mean" else deviation
+        return GoalValue(one.value, *replicates.limits(one, confidence), one.shifts)
     return GoalValue(found.value, found.lower, found.upper, found.shifts)
-
-
-def _symmetric(one: Estimate, confidence: float) -> GoalValue:
-    reach = one.error * student(confidence, one.freedom) if one.freedom > 0 else np.nan
-    return GoalValue(one.value, one.value - reach, one.value + reach, one.shifts)
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:

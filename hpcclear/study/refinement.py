@@ -141,7 +141,7 @@ def search(
         for name, its in met.items()
         if not _stands(run, name, its, patience) and (won := _won(run, name, its[-2:]))
     ]
-    named = [choice for choice in start if choice.name]
+    named = [] if statistics else [choice for choice in start if choice.name]
     finalists = [
         one
         for name, its in met.items()
@@ -155,13 +155,15 @@ def search(
 
 
 def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
-    """Designs of a case in each round. A search by statistics has as many in all as the other one, first designs included."""
+    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included:
+    those of the swarm between its ends are left out."""
     settings = run.study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
     each = length(run.study) * REPLICATES
     cases = len(run.study.cases)
-    left = sum(simulations(run.study)) // each // cases - len(begun["case"]) // cases
+    most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
+    left = (most - len(begun["case"])) // cases
     count = max(settings.infill_designs // PARTS, 1)
     return [count] * (left // count)
 
@@ -231,7 +233,7 @@ def _go_on(
 
 
 def _problem(run: StudyRun, name: str, one: Tried) -> tuple[Known, Space]:
-    """What is known of a case, and where to look: at least each objective, and mean + 2 standard deviations, the usual merit."""
+    """What is known of a case, and where to look: each objective, and mean + 2 standard deviations, the usual merit."""
     case = run.study.case(name)
     directions = np.eye(len(case.goals))
     if case.plain:
@@ -343,6 +345,7 @@ def _finalists(
     where = tried.coordinates[best[cut(tried.values[best], most)]]
     with contextlib.suppress(InputError):  # too few designs that did not fail for a model
         if statistics:
+            most = run.study.verification.designs
             where = improvement.finalists(*_problem(run, case, tried), most, rng)
         else:
             believed = believed_ends(

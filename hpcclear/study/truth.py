@@ -11,7 +11,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
+from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
@@ -62,33 +62,40 @@ def _of_design(
     )
 
 
-def simulate(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str = "verification"
-) -> Result:
-    """Moments of designs, by as many simulations as the study asks for.
+def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
+    """The first points of each scrambling of designs, (2, replicates, values) each as `doubled` returns them."""
+    made = [np.empty((2, REPLICATES, 0))] * len(choices)
+    length = first_length(run.study.verification)
+    lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
+    return made
 
-    Returns
-    -------
-    dict of arrays over the designs
-        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
-        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
-        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
-        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+
+def made(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    before: Sequence[Array] = (),
+    wanted: MomentAccuracy | None = None,
+) -> list[Array]:
+    """f of designs, by as many simulations as the study asks for, (2, replicates, values) each as `doubled` returns them.
 
     Raises
     ------
     InputError
         If all simulations fail.
     """
-    settings = run.study.verification
+    settings, stage = run.study.verification, "verification"
     if settings.draws is not None:
-        made = _values(run, choices, stage, purpose, settings.draws, None)
-    else:
-        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-        made = contested(run, choices, made, stage, purpose)
-    return results_of(run, choices, made) | explained(run, choices, made, purpose)
+        return drawn(run, choices, stage, stage, settings.draws)
+    length, most = first_length(settings), settings.most_samples
+    found = doubled(run, choices, stage, stage, length, most, before, wanted)
+    return contested(run, choices, found, stage, stage)
+
+
+def drawn(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, count: int
+) -> list[Array]:
+    """f of so many independent draws of designs, (2, draws, 1) each."""
+    return _values(run, choices, stage, purpose, count, None)
 
 
 def explained(
@@ -247,11 +254,9 @@ def _values(
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation."""
-    return tuple(
-        one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
-        for one in moments(values)
-    )  # type: ignore[return-value]
+    """Half-widths of the limits of mean and deviation, the larger one where they are not symmetric."""
+    mean, deviation = (limits(one, settings.confidence)[1] - one.value for one in moments(values))
+    return mean, deviation
 
 
 def _accurate(
@@ -292,7 +297,18 @@ def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate 
 
 
 def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """Results of designs from their simulations, shape (2, replicates, values) each; as `simulate` returns it."""
+    """All that is told of designs from what was made of them, shape (2, replicates, values) each.
+
+    Returns
+    -------
+    dict of arrays over the designs
+        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
+        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
+        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
+        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+    """
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     held = max(len(case.kept) for case in run.study.cases)
