@@ -53,11 +53,12 @@ def missed(run: StudyRun, choices: Sequence[Choice], true: Result, model: Piecew
         errors = guess / [true["mean"][k], true["deviation"][k]] - 1.0
         good = abs(errors) <= (settings.tolerance, settings.deviation_tolerance)  # False for NaN
         if not good.all():
-            texts.append(
-                f"Surrogate error at {choices[k].name}: mean {100 * errors[0]:+.1f} %, standard deviation "
-                f"{100 * errors[1]:+.1f} %. Use the simulated values."
-            )
-    return texts
+            mean, deviation = 100.0 * errors
+            texts.append(f"{choices[k].name} {mean:+.1f} % and {deviation:+.1f} %")
+    if not texts:
+        return []
+    found = "; ".join(texts)
+    return [f"Surrogate errors of mean and standard deviation: {found}. Use the simulated values."]
 
 
 @dataclass(frozen=True)
