@@ -16,8 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hpcclear import load_scene, simulate
-from hpcclear.dynamics.bearing import forces
-from hpcclear.dynamics.physics.film import long_force, short_force
+from hpcclear.dynamics.laws.film import finite, long, short
 
 IMAGE = Path(__file__).parent.parent / "docs" / "images" / "oil_film.png"
 RATIO = 1.0  # length over diameter
@@ -30,11 +29,11 @@ def loads(eccentricity: float) -> dict[str, float]:
     """Load by each model, of a journal that turns at 1 rad/s: w across the eccentricity."""
     place, w = (eccentricity, 0.0), (0.0, -0.5 * eccentricity)
     s2 = 1.0 - eccentricity**2
-    finite = forces(eccentricity, RATIO, np.array([-0.5 * np.pi]))[0] * 0.5 * eccentricity
+    solved = finite.forces(eccentricity, RATIO, np.array([-0.5 * np.pi]))[0] * 0.5 * eccentricity
     return {
-        "short": float(np.hypot(*short_force(1, 1.0, place, w, s2))),
-        "long": float(np.hypot(*long_force(1, 3.0 / RATIO**2, place, w, s2))),
-        "finite": float(np.hypot(*finite)),
+        "short": float(np.hypot(*short.force((), 0, 1.0, place, w, s2, 0, 1))),
+        "long": float(np.hypot(*long.force((), 0, 3.0 / RATIO**2, place, w, s2, 0, 1))),
+        "finite": float(np.hypot(*solved)),
     }
 
 

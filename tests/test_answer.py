@@ -15,10 +15,11 @@ from hpcclear.base.objectives import OURS
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import beside
-from hpcclear.report.answer import answer, recommended
+from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
 from hpcclear.report.figures import style
 from hpcclear.report.html.page import write_report
+from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.study import run_study
 

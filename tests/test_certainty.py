@@ -320,7 +320,10 @@ def test_small_steps_that_a_search_wins_count_together():
     def met(steps):
         tables = [np.array([[1.0, (1.0 - step * share)]]) for step in steps]
         nothing = np.zeros((1, len(names)))
-        return [refinement.Tried(names, nothing, table, np.full(1, -1.0)) for table in tables]
+        return [
+            refinement.Tried(names, nothing, table, np.full(1, -1.0), 0.0 * table)
+            for table in tables
+        ]
 
     assert not refinement._stands(run, case, met([0.0, 0.0, 0.0]))  # too few rounds
     assert refinement._stands(run, case, met([0.0, 0.3, 0.6, 0.9]))

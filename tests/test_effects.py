@@ -114,7 +114,7 @@ ZEROS = {  # flags of the kernel and rows of parameters, or entries of the scene
     "load": ({}, {}, {"effects.slider_load": 0.0}),
     "load_table": ({}, {}, {"effects.slider_load": [[0.0, 0.0], [3.0, 0.0]]}),
     "guide": ({}, {}, {"effects.guide_friction": {"coefficient": 0.0}}),
-    "film": (dict.fromkeys(("film", "short_film", "long_film"), 1), {}, {}),  # of no viscosity
+    "film": ({"films": ("short", "long", *[None] * 6)}, {}, {}),  # of no viscosity
 }
 
 

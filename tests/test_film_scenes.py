@@ -135,9 +135,9 @@ def test_a_joint_without_play_has_no_film():
     """Or implicit steps of the other one would go by the exponent of smooth motions, friction's ramp or not."""
     first, second = at.JOINTS[0].block, at.JOINTS[1].block
     rows = parameters(scene_with({"joints.rod_slider": {"kind": "ideal"}}))
-    assert (rows[:, second + at.FILM_SHORT : second + at.JOINT_ROWS] == 0.0).all()
+    assert (rows[:, second + at.FILM_SCALE : second + at.JOINT_ROWS] == 0.0).all()
     rows = parameters(scene_with({"joints.crank_rod": {"kind": "ideal"}}))
-    assert (rows[:, first + at.FILM_SHORT : first + at.JOINT_ROWS] == 0.0).all()
+    assert (rows[:, first + at.FILM_SCALE : first + at.JOINT_ROWS] == 0.0).all()
 
 
 def test_a_finite_film_is_for_one_length_over_diameter():
@@ -190,5 +190,5 @@ def test_numbers_of_a_film_may_be_varied():
     )
     points = Points(("mu", "C", "L"), values, tuple((path,) for path in paths))
     p = Parameters(parameters(scene, points))
-    assert p.film_short[:, 0] == pytest.approx(p.film_short[0, 0] * np.array([1, 2, 1 / 8, 8]))
+    assert p.film_scale[:, 0] == pytest.approx(p.film_scale[0, 0] * np.array([1, 2, 1 / 8, 8]))
     assert p.film_shear[:, 0] == pytest.approx(p.film_shear[0, 0] * np.array([1, 2, 0.5, 2]))

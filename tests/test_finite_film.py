@@ -8,9 +8,8 @@ from scipy.sparse import diags, identity, kron
 from scipy.sparse.linalg import spsolve
 
 from hpcclear import simulate
-from hpcclear.dynamics import bearing
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.lubrication import finite_force
+from hpcclear.dynamics.laws.film import finite as bearing
 
 ANGLES = np.array([0.0, 0.4, 1.2, 1.7, 2.4, 3.0, 3.14])
 
@@ -57,10 +56,10 @@ def test_a_very_short_bearing_is_ocvirk_s():
 def evaluated(coefficients, eccentricity, angle):
     """What a lane makes of the coefficients, over mu R L^3/c^3: force against w and across it, of w along x."""
     par = np.zeros(at.PARAMETERS)
-    par[at.JOINTS[0].finite : at.JOINTS[0].finite + at.FINITE_ROWS] = coefficients
-    par[at.JOINTS[0].block + at.FILM_FINITE] = 1.0
+    row = at.JOINTS[0].further
+    par[row : row + at.FURTHER_ROWS] = coefficients
     e = (eccentricity * np.cos(angle), -eccentricity * np.sin(angle))
-    x, y = finite_force(1, par, at.JOINTS[0], e, (1.0, 0.0), 1.0 - eccentricity**2, 0, 1)
+    x, y = bearing.force(par, row, 1.0, e, (1.0, 0.0), 1.0 - eccentricity**2, 0, 1)
     return -np.array([x, y])
 
 

@@ -34,7 +34,7 @@ from hpcclear.dynamics.physics.angles import sincos
 FLAT = types.float64[::1]
 BARE = {"crank_rod", "rod_slider"}
 PER_TURN = f"0x{struct.unpack('>Q', struct.pack('>d', 0.5 / math.pi))[0]:016X}"
-FRICTIONS = {"coulomb", "ambrosio", "lugre", "film"}
+FRICTIONS = {"coulomb", "ambrosio", "lugre", "short_film", "long_film", "finite_film"}
 
 
 def linkage_with(on):
@@ -63,7 +63,9 @@ def flags_of(on, linkage):
     """What of them the kernel's own functions read."""
     places = linkage.places
     known = on & {*at.Effects._fields, *CONTACT, *FRICTION}
-    return effects_with(known, joints=len(places), first=next(iter(places), 0))
+    models = [name for name in laws("film") if f"{name}_film" in on]
+    films = tuple(models[0] if models and k in places else None for k in range(at.MAX_JOINTS))
+    return effects_with(known, joints=len(places), first=next(iter(places), 0), films=films)
 
 
 def compiled(function, *argument_types):
@@ -109,6 +111,7 @@ def numbers_of(law, kind="friction"):
 
 FIRST, SECOND = at.JOINTS[:2]
 DAMPED = numbers_of("hunt-crossley", "contact") - numbers_of("hertz", "contact")
+FILMS = of_joints(at.FILM_SCALE, at.FILM_FLOOR, at.FILM_SHEAR)
 
 # effect: what is on besides it and the bare scene, and the markers of its law
 MARKERS = {
@@ -148,30 +151,22 @@ MARKERS = {
         {"waves", "bearing_waves", "wear"},
         {work(at.RATE_NOW + at.ANGLES), work(at.RATE_NOW + at.ANGLES + 5)},
     ),
-    "film": ({"short_film"}, of_joints(at.FILM_FLOOR, at.FILM_SHEAR)),
-    "short_film": ({"film"}, of_joints(at.FILM_SHORT)),
-    "finite_film": (
-        {"film"},
-        {
-            par(FIRST.block + at.FILM_FINITE),
-            par(FIRST.finite),
-            par(SECOND.finite + at.FINITE_ROWS - 1),
-        },
-    ),
+    "short_film": (set(), FILMS),
+    "finite_film": (set(), FILMS | {par(FIRST.further), par(SECOND.further + at.FURTHER_ROWS - 1)}),
     "lugre": (set(), numbers_of("lugre") - numbers_of("ambrosio")),
     "bending": (set(), {par("rod_bend_stiffness_1"), par("rod_bend_lateral_1")}),
-    "long_film": ({"film"}, of_joints(at.FILM_LONG)),
+    "long_film": (set(), FILMS),
 }
 # rows that an effect shares with another: not its own marker
 SHARED = {
     "latched": DAMPED,
     "ambrosio": numbers_of("coulomb"),
     "lugre": numbers_of("ambrosio"),
-    "film": of_joints(at.FILM_SHORT),
+    **dict.fromkeys(("short_film", "long_film", "finite_film"), FILMS),
 }
 
 
-DROPPED = {"latched", "short_film", "long_film", "baumgarte"}
+DROPPED = {"latched", "baumgarte"}
 """Effects whose text has rows that nothing uses, or whose rows others have so: the compiler drops them."""
 
 

@@ -55,15 +55,15 @@ MOTIONS = [
     ("two", {"fixed", "coulomb"}),
     ("two", FULL | {"latched", "ambrosio"}),
     ("two", FULL | {"fixed", "coulomb", "torque"}),
-    ("two", FULL | {"latched", "coulomb", "film", "short_film", "long_film"}),
+    ("two", FULL | {"latched", "coulomb", "short_film", "long_film"}),
     ("two", FULL | {"fixed", "lugre", "torque"}),
     ("O12", {"latched", "coulomb"}),
     ("O12", FULL | {"fixed", "ambrosio"}),
     ("O12", FULL | {"latched", "coulomb", "torque"}),
-    ("O12", FULL | {"torque", "film", "short_film"}),
+    ("O12", FULL | {"torque", "short_film"}),
     ("O23", {"fixed", "coulomb"}),
     ("O23", {"fixed", "lugre"}),
-    ("O23", FULL | {"fixed", "film", "long_film"}),
+    ("O23", FULL | {"fixed", "long_film"}),
     ("O23", FULL | {"latched", "coulomb"}),
     ("O23", FULL | {"fixed", "ambrosio", "torque"}),
     ("none", {"torque", "energies", "series"}),
@@ -85,6 +85,12 @@ BASES = {name: at.JOINTS[k].block for k, name in enumerate(("crank_rod", "rod_sl
 
 def bar(numbers):
     return {**{k: v for k, v in numbers.items() if k != "u"}, "mass_center": numbers["u"]}
+
+
+def models_of(effects):
+    """Models of oil films by the joints that are open."""
+    models = [model for model in ("short", "long") if f"{model}_film" in effects]
+    return dict(zip((name for name in BASES if name in effects), models, strict=False))
 
 
 @lru_cache(maxsize=64)
@@ -127,15 +133,14 @@ def scene_of(effects):
         changes["effects"]["slider_load"] = -35.0
     if "guide" in effects:
         changes["effects"]["guide_friction"] = {"coefficient": GUIDE[0], "ramp_speed": GUIDE[1]}
-    models = [model for model in ("short", "long") if f"{model}_film" in effects]
     for name, clearance in (("crank_rod", 3e-4), ("rod_slider", 5e-4)):
         if name not in effects:
             changes[f"joints.{name}"] = {"kind": "ideal"}
             continue
         changes[f"joints.{name}.clearance"] = clearance
-        if models:
+        if name in models_of(effects):
             film = {"viscosity": 0.05, "length": 0.02, "roughness": 1e-5}
-            changes[f"joints.{name}.film"] = {**film, "model": models.pop(0)}
+            changes[f"joints.{name}.film"] = {**film, "model": models_of(effects)[name]}
     return scene_with(changes)
 
 
@@ -149,8 +154,7 @@ def row_of_parameters(effects, rng):
             continue
         values |= {
             base + row("contact", law, "stiffness"): 3e9 * (1 + clearance),
-            base + at.FILM_SHORT: FILM["short"],
-            base + at.FILM_LONG: FILM["long"],
+            base + at.FILM_SCALE: FILM.get(models_of(effects).get(name), 0.0),
             base + at.FILM_SHEAR: FILM["shear"],
             base + at.FILM_FLOOR: FILM["floor"],
         }
@@ -199,10 +203,11 @@ def joint_of(effects, par, base, active, impact_speed, deflection):
         par[base + at.CLEARANCE],
         par[base + row("contact", contact_law(effects), "stiffness")],
     )
-    factors = {name: FILM[name] * (f"{name}_film" in effects) for name in ("short", "long")}
+    model = {BASES[name]: model for name, model in models_of(effects).items()}.get(base)
+    factors = {name: FILM[name] * (name == model) for name in ("short", "long")}
     return Joint(
         clearance, stiffness, 0.02, factor, friction, active if "latched" in effects else 1.0,
-        {**FILM, **factors} if "film" in effects else None,
+        {**FILM, **factors} if model else None,
     )  # fmt: skip
 
 

@@ -24,9 +24,9 @@ from hpcclear.report.answer import answer
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
-from hpcclear.results.names import KINDS
+from hpcclear.results.names import KINDS, designs_in
 from hpcclear.scene import load_scene
-from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import (
     chaos,
@@ -240,9 +240,9 @@ def test_another_kernel_and_chosen_terms_go_through_to_the_files(results, tmp_pa
 def test_samples_are_numbered_through_and_tell_their_designs(results):
     found = dataset.read(results / "samples.nc", "samples")
     assert (np.diff(found["sample"]) == 1).all()
-    assert set(dataset.designs(found)) == {"m1", "u1", "I1", "m2", "u2", "I2", "m3", "C"}
+    assert set(designs_in(found)) == {"m1", "u1", "I1", "m2", "u2", "I2", "m3", "C"}
     column = {
-        path: dataset.designs(found)[variable.name]
+        path: designs_in(found)[variable.name]
         for variable in scene_of().study.variables
         for path in variable.paths
     }

@@ -108,10 +108,10 @@ class LimitError(RuntimeError):
 _PYARROW = 200 if importlib.util.find_spec("pyarrow") else 0
 """MB more where pyarrow is installed (the extra ``tables``): pandas, which xarray needs, then loads it."""
 
-LEAST_ADDRESS_SPACE = 700 + _PYARROW
-"""MB of it that one process takes to load the program and a compiled kernel."""
+LEAST_ADDRESS_SPACE = 800 + _PYARROW
+"""MB of it that one process takes to load the program and a compiled kernel, and some 100 more: libraries differ."""
 
-LEAST_BESIDE_OTHERS = 900 + _PYARROW
+LEAST_BESIDE_OTHERS = 1050 + _PYARROW
 """MB that each takes under an MPI launcher: the library maps buffers that it shares with the ranks of its node."""
 
 

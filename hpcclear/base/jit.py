@@ -145,7 +145,7 @@ def narrow_vectors(typingctx):
 config.CACHE_DIR = _chosen_folder()  # decided before the first decorator runs
 asked_width()  # refused if it is none, also where the user names the processor to Numba, and it says nothing
 if config.ENABLE_AVX and config.CPU_NAME is None and config.CPU_FEATURES is None:
-    config.CPU_FEATURES = features(Path(config.CACHE_DIR))
+    config.CPU_FEATURES = features()
 
 _written: dict[Any, str] = {}
 _apart: set[Any] = set()

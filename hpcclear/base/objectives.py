@@ -13,19 +13,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, RESPONSES
+from hpcclear.base.outcome import FIELDS, OUTCOME, RESPONSES
 
 Function = Callable[..., Any]
 
-RECORDED = {
-    "objective": "m",
-    "mean_gap": "m",
-    "peak_contact_force": "N",
-    "mean_contact_force": "N",
-    "peak_crank_moment": "N m",
-    "slider_acceleration_deviation": "m/s^2",
-    "point_acceleration_deviation": "m/s^2",
-    "peak_point_acceleration": "m/s^2",
+RECORDED = {"objective": "m"} | {
+    name: FIELDS[name].unit for name in ("mean_gap", "peak_contact_force", *RESPONSES)
 }
 """Fields of a sample's record that `Objective.value` may ask for, with units; ``objective`` is f of eq. 13."""
 

@@ -87,6 +87,9 @@ def one_text(function: Any, label: str, **known: Any) -> Callable[..., Any]:
 
 def module_of(name: str, write: Callable[[], str]) -> ModuleType:
     """The module of a text that is kept for the next process; `write` is called where there is none yet."""
+    loaded = sys.modules.get(f"{_TEXTS}.{name}")
+    if loaded is not None:
+        return loaded
     path = _folder() / f"{name}.py"
     if not path.exists():
         _keep(path, write())

@@ -21,9 +21,9 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import cite, ensembles, laws, results, scenes, studies
+from hpcclear.cli import cite, ensembles, identify, laws, results, scenes, studies
 from hpcclear.cli.options import is_root, say
-from hpcclear.ranks.launcher import is_launched, pin_threads
+from hpcclear.ranks.launcher import end_job, is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
 _ROOT_ALONE = (
@@ -48,6 +48,7 @@ _ON_RANKS = (
     ensembles.bifurcation,
     ensembles.wear,
     ensembles.effects,
+    identify.identify,
     studies.run,
     studies.accuracy,
     studies.plan,
@@ -60,7 +61,7 @@ def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
     Input files (scenes) are TOML; results are NetCDF files that open in xarray. To use more than one
-    core, start sample, run, wear, map, effects, accuracy or plan under mpiexec:
+    core, start sample, run, wear, map, effects, identify, accuracy or plan under mpiexec:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
@@ -112,10 +113,7 @@ def main(arguments: list[str] | None = None) -> None:
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
     with StopSwitch(ends_process=True) as stop, _numbers_in_silence():
         try:
-            if (
-                not is_launched()
-            ):  # ranks inform each other, so that none waits for one that cannot begin
-                check_address_space()
+            check_address_space()
             _check_words(sys.argv[1:] if arguments is None else arguments)
             code = cli.main(arguments, prog_name="hpcclear", standalone_mode=False, obj=stop)
         except click.ClickException as error:
@@ -125,8 +123,11 @@ def main(arguments: list[str] | None = None) -> None:
         except InputError as error:
             say(f"Error: {error}")
             code = Exit.BAD_INPUT
-        except (StorageError, LimitError) as error:
+        except StorageError as error:
             say(f"Error: {error}")
+            code = Exit.FAILED
+        except LimitError as error:
+            end_job(f"Error: {error}", Exit.FAILED)
             code = Exit.FAILED
         except BrokenPipeError:  # the reader of a pipe has seen enough
             sys.stderr.close()

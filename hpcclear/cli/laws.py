@@ -11,13 +11,14 @@ _TITLES = {
     "contact": "effects.contact.law (normal force)",
     "geometry": "effects.contact.geometry (shapes that touch; left out, spheres)",
     "friction": "effects.friction.law (friction)",
+    "film": "film.model of a joint with clearance (oil films)",
 }
 
 
 @click.command(short_help="List laws, objectives and other plug-ins, with their sources.")
 @of_one_process
 def laws() -> int:
-    """List what a scene may name: laws of contact and friction, geometries, objectives, distributions, surrogates and searches.
+    """List what a scene may name: laws, geometries of contact, objectives, distributions, surrogates and searches.
 
     Laws with formula, parameters, units, bounds, range and source. Those of installed packages are among them.
     One of your own: docs/extending.md.
@@ -31,7 +32,7 @@ def laws() -> int:
     registries = {"contact": plugins.CONTACT_LAWS, "friction": plugins.FRICTION_LAWS}
     for kind, title in _TITLES.items():
         show(title)
-        offered = () if kind == "geometry" else registries[kind].names()
+        offered = registries[kind].names() if kind in registries else ()
         for name, law in known_laws(kind).items():
             origin = registries[kind].origin(name) if name in offered else ""
             console().print(table(name, list(_rows(law, origin))))

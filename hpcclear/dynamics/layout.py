@@ -38,16 +38,18 @@ class Effects(NamedTuple):
     journal_waves: Any = None
     threshold: Any = None  # of the pressure, below which nothing wears
     profile: Any = None  # where around these the sliding work is done
-    film: Any = None  # oil in joints with clearance
-    short_film: Any = None
-    long_film: Any = None
-    finite_film: Any = None
+    films: Any = None  # names of laws of oil films, by places of joints
     objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
     def latched(self) -> Any:
         """Whether the normal force's law asks for the impact speed, which is latched."""
         return None if self.contact is None else self.contact.latched
+
+    @property
+    def film_at(self) -> tuple[Any, ...]:
+        """The same, of scenes without oil as well."""
+        return self.films or (None,) * MAX_JOINTS
 
     @property
     def bristled(self) -> Any:
@@ -143,9 +145,7 @@ INVERSE_RAMP = OF_JOINT("one over the sliding speed within which friction change
 STEEPNESS = OF_JOINT("largest slope of friction over normal force", "s/m")
 CONTACT_NUMBERS = OF_JOINT("of its law of contact", size=LAW_NUMBERS)
 FRICTION_NUMBERS = OF_JOINT("of its law of friction", size=LAW_NUMBERS)
-FILM_SHORT = OF_JOINT("mu R L^3/c^3 of a short film; 0 where there is none", "N s/m")
-FILM_FINITE = OF_JOINT("the same of a finite one", "N s/m")
-FILM_LONG = OF_JOINT("12 mu L R^3/c^3", "N s/m")
+FILM_SCALE = OF_JOINT("of the film's force; 0 where there is none", "N s/m")
 FILM_SHEAR = OF_JOINT("2 pi mu L R^3/c", "N m s")
 FILM_FLOOR = OF_JOINT("least thickness over the clearance")
 FILM_STEEPNESS = OF_JOINT(
@@ -163,9 +163,9 @@ THRESHOLDS = OF_SAMPLE(
     "of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1",
     size=2 * MAX_JOINTS,
 )
-FINITE_ROWS = 180
-FINITE = OF_SAMPLE(
-    "what films of finite length have besides, joint by joint", size=MAX_JOINTS * FINITE_ROWS
+FURTHER_ROWS = 180
+FURTHER = OF_SAMPLE(
+    "what laws of films have besides, joint by joint", size=MAX_JOINTS * FURTHER_ROWS
 )
 PARAMETERS = OF_SAMPLE.end
 
@@ -390,7 +390,7 @@ class Joint(NamedTuple):
 
     place: int
     block: int  # of parameters
-    finite: int
+    further: int
     gap: int  # rates
     force: int
     rate: int
@@ -409,7 +409,7 @@ class Joint(NamedTuple):
 
 JOINTS = tuple(
     Joint(
-        k, JOINT_BLOCKS + JOINT_ROWS * k, FINITE + FINITE_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
+        k, JOINT_BLOCKS + JOINT_ROWS * k, FURTHER + FURTHER_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
         FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
         OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
         ACTIVE + k, INVERSE_IMPACT + k,

@@ -1,20 +1,23 @@
 """Kernel parameters of a scene's samples."""
 
+from typing import Any
+
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import bristles
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.bearing import correction
 from hpcclear.dynamics.joint_laws import fill, swing
+from hpcclear.dynamics.laws import laws, numbers
 from hpcclear.dynamics.planar.prescribed import held_extremes
 from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, parameters_of
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
 SAME_LENGTH = 0.01
-"""By how much length over diameter may differ between samples of a film of finite length, relative: worn bearings are wider."""
+"""By how much length over diameter may differ between samples of a film that is solved for one, relative: worn bearings are
+wider."""
 
 
 RAMP = 0.1
@@ -52,18 +55,18 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     get = Numbers(scene, points)
     p = _parameters(scene, points, get)
     p[:, at.EDGE] = _needed_at_edge(scene, get, p)
-    p = _with_waves(scene, get, p) if _has_further(scene) else p
-    return _with_finite_films(scene, get, p) if finite_rows(scene) else p
+    p = _with_waves(scene, get, p) if _has_waves(scene) else p
+    return _with_further_numbers(scene, get, p) if further_rows(scene) else p
 
 
 def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
-    """But for those of films of finite length."""
+    """But for further numbers of films."""
     p = parameters_of(scene, get, points)
     force = _inertia(scene, get, p)
-    for k, joint in zip(scene.open_places, scene.clearance_joints(), strict=True):
-        key, block = scene.joint_key(joint), at.JOINT_BLOCKS + k * at.JOINT_ROWS
-        fill(scene, get, key, scene.materials_key(joint), force, p[:, block:])
-        _film_parameters(scene, get, joint, p, block)
+    for k, contact in zip(scene.open_places, scene.contact_labels(), strict=True):
+        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        fill(scene, get, contact, force, p[:, block:])
+        _film_parameters(scene, get, contact, p, block)
     held = scene.responses_asked() and is_prescribed(scene)
     p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = (
         held_extremes(scene, points, get.size) if held else np.nan
@@ -74,7 +77,7 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
 def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:
     """Fill what a joint's block of parameters (its first column) has of its film; without one its force is 0."""
     film, own = scene.films().get(joint), p[:, block:]
-    own[:, at.FILM_SHORT : at.JOINT_ROWS] = 0.0
+    own[:, at.FILM_SCALE : at.JOINT_ROWS] = 0.0
     own[:, at.FILM_FLOOR] = 0.5
     own[:, at.FILM_STEEPNESS] = bristles.SMOOTH if scene.bristles else 0.0
     if film is None:
@@ -82,18 +85,14 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     key = scene.joint_key(joint)
     viscosity, length = get(f"{key}.film.viscosity"), get(f"{key}.film.length")
     clearance, radius = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
-    thin = viscosity * radius * (length / clearance) ** 3
-    if film.model == "short":
-        own[:, at.FILM_SHORT] = thin
-    elif film.model == "finite":
-        own[:, at.FILM_FINITE] = thin
-    else:
-        own[:, at.FILM_LONG] = 12.0 * viscosity * length * (radius / clearance) ** 3
+    given = {"viscosity": viscosity, "film_length": length, "bearing_radius": radius}
+    law = laws("film")[film.model]
+    own[:, at.FILM_SCALE] = numbers.evaluate(law.scale, given | {"clearance": clearance})
     own[:, at.FILM_SHEAR] = at.TURN * viscosity * length * radius**3 / clearance
     own[:, at.FILM_FLOOR] = get(f"{key}.film.roughness") / clearance
     masses = [path for path in scene.numeric_paths() if path.endswith(".mass")]
     inertia = sum(get(path) for path in masses) * p[:, at.DRIVEN_LENGTH] * p[:, at.SPEED] ** 2
-    own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SHORT : at.FILM_SHEAR].sum(axis=1) / inertia
+    own[:, at.FILM_STEEPNESS] = own[:, at.FILM_SCALE] / inertia
 
 
 def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
@@ -109,8 +108,7 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
     needed = np.ones(len(p))
     for key in scene.guide_friction_keys():
         needed = np.maximum(needed, 1.0 / (OF_RAMP * get(f"{key}.ramp_speed")))
-    for joint in scene.clearance_joints():
-        place = _place(scene, joint)
+    for place in scene.open_places:
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
         if scene.effects.friction.law != "none":
             needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
@@ -134,28 +132,28 @@ def _inertia(scene: Scene, get: Numbers, p: Array) -> Array:
 
 def parameter_rows(scene: Scene) -> int:
     """Parameters of a sample."""
-    return finite_rows(scene) or (
-        at.FINITE if _has_further(scene) else linkage_of(scene).parameter_rows
-    )
+    waving = at.FURTHER if _has_waves(scene) else linkage_of(scene).parameter_rows
+    return further_rows(scene) or waving
 
 
-def _has_further(scene: Scene) -> bool:
+def _has_waves(scene: Scene) -> bool:
     """Whether there are parameters of waves or of thresholds of wear."""
     return any(scene.waves().values()) or scene.has_thresholds
 
 
 def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
     """With the waves of surfaces that are out of round, and thresholds of wear; of joints without the former are 0."""
-    rows = np.zeros((len(p), at.FINITE))
+    rows = np.zeros((len(p), at.FURTHER))
     rows[:, : p.shape[1]] = p
-    for joint in scene.clearance_joints():
+    for joint in scene.pins():
         own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
         paths = wave_paths(scene, joint)
         for k in range(len(paths) // 2):
             cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
             n = int(paths[2 * k].rpartition("_")[2])
             own[:, 4 * k : 4 * k + 4] = np.stack([cosine, sine, n * sine, -n * cosine], axis=-1)
-        row = at.THRESHOLDS + 2 * _place(scene, joint)
+    for joint, place in zip(scene.contact_labels(), scene.open_places, strict=True):
+        row = at.THRESHOLDS + 2 * place
         rows[:, row : row + 2] = _share_that_wears(scene, get, joint)
     return rows
 
@@ -199,11 +197,16 @@ def wave_paths(scene: Scene, joint: str) -> list[str]:
     ]
 
 
-def finite_rows(scene: Scene) -> int:
-    """Parameters of a sample with films of finite length; 0 without such films."""
-    if all(film.model != "finite" for film in scene.films().values()):
-        return 0
-    return at.FINITE + at.FINITE_ROWS * (_place(scene, scene.clearance_joints()[-1]) + 1)
+def _solved_films(scene: Scene) -> dict[str, Any]:
+    """Joints whose films have further numbers, and the functions that give these."""
+    known = {name: laws("film")[film.model].further for name, film in scene.films().items()}
+    return {name: further for name, further in known.items() if further is not None}
+
+
+def further_rows(scene: Scene) -> int:
+    """Parameters of a sample with films that have further numbers; 0 without such films."""
+    last = max((_place(scene, joint) for joint in _solved_films(scene)), default=-1)
+    return 0 if last < 0 else at.FURTHER + at.FURTHER_ROWS * (last + 1)
 
 
 def _place(scene: Scene, joint: str) -> int:
@@ -211,25 +214,20 @@ def _place(scene: Scene, joint: str) -> int:
     return scene.joint_labels.index(joint)
 
 
-def _with_finite_films(scene: Scene, get: Numbers, p: Array) -> Array:
-    """With the coefficients of films of finite length; those of other joints are a short one's."""
-    rows = np.zeros((len(p), finite_rows(scene)))
+def _with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
+    """With what films are solved for once a bearing."""
+    rows = np.zeros((len(p), further_rows(scene)))
     rows[:, : p.shape[1]] = p
-    for joint in scene.clearance_joints():
-        first = at.FINITE + at.FINITE_ROWS * _place(scene, joint)
-        own = rows[:, first : first + at.FINITE_ROWS]
-        film = scene.films().get(joint)
-        if film is None or film.model != "finite":
-            own[:, :: at.FINITE_ROWS // 2] = 1.0
-            continue
-        key = scene.joint_key(joint)
-        ratio = 0.5 * film.length / scene.clearance_joint(joint).bearing_radius
+    for joint, further in _solved_films(scene).items():
+        key, table = scene.joint_key(joint), scene.pin(joint)
+        ratio = 0.5 * table.film.length / table.bearing_radius  # type: ignore[union-attr]
         varied = 0.5 * get(f"{key}.film.length") / get(f"{key}.bearing_radius")
         if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():
             raise InputError(
-                f"{key}.film.model", "finite",
-                "the samples differ in length over diameter, but the finite film is solved for one ratio",
+                f"{key}.film.model", scene.films()[joint].model,
+                "the samples differ in length over diameter, but the film is solved for one ratio",
                 'Vary neither film.length nor bearing_radius, or take model = "short" or "long"',
             )  # fmt: skip
-        own[:] = correction(ratio)
+        first = at.FURTHER + at.FURTHER_ROWS * _place(scene, joint)
+        rows[:, first : first + at.FURTHER_ROWS] = further(ratio)
     return rows

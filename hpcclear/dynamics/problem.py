@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -154,11 +154,11 @@ def coordinate_count(scene: Scene) -> int:
 def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
-    count = len(scene.clearance_joints())
+    count = len(scene.contact_labels())
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
-    models = {film.model for film in scene.films().values()}
+    films = {scene.joint_labels.index(name): film.model for name, film in scene.films().items()}
     return at.Effects(
         joints=count,
         first=next(iter(scene.open_places), 0),
@@ -177,10 +177,7 @@ def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        film=_flag(bool(models)),
-        short_film=_flag("short" in models),
-        long_film=_flag("long" in models),
-        finite_film=_flag("finite" in models),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)) if films else None,
     )
 
 
@@ -240,6 +237,7 @@ def check_objective(scene: Scene) -> None:
         )  # fmt: skip
 
 
+@lru_cache(maxsize=16)
 def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> Problem:
     """What is common to all samples of a scene."""
     e = scene.effects

@@ -25,6 +25,7 @@ from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -139,7 +140,7 @@ def simulate(
             **reported,
             **widest_contact(scene, Numbers(scene, None), reported["peak_contact_force"]),
         },
-        dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
+        provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
         | {"transient_turns": scene.numerics.transient_revolutions * _turns(scene)}

@@ -23,7 +23,7 @@ from hpcclear.dynamics.planar.problem import (
 )
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.planar.turning import loops_of, statuses
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -47,7 +47,7 @@ def start_states(
     start = Start.at_rest(len(par))
     places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
     if points is None or not _moved(scene, points):
-        places[:], speeds[:] = coordinates(trees, put_together(mechanism_of(scene.linkage)))
+        places[:], speeds[:] = _of_scene(scene)
         refusal = refused_of(scene) if walk else None
         found = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
@@ -57,6 +57,12 @@ def start_states(
     _start_contacts(scene, par, points, start)
     start.fail(found)
     return start
+
+
+@lru_cache(maxsize=16)
+def _of_scene(scene: Scene) -> tuple[Array, Array]:
+    """Coordinates and velocities (n,) that all samples start with whose geometry is the scene's."""
+    return coordinates(linkage_of(scene).forest, put_together(mechanism_of(scene.linkage)))
 
 
 def _moved(scene: Scene, points: Points) -> bool:
@@ -112,11 +118,12 @@ def _without_study(scene: Scene) -> Scene:
 
 
 def _start_contacts(scene: Scene, par: Array, points: Points | None, start: Start) -> None:
-    """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
+    """What starts as deep as its surfaces or deeper starts in contact, at the least impact speed."""
     law = scene.effects.contact
     if law is None or not law.latched:
         return
-    for k, joint in zip(scene.open_places, sample_of(scene, points).clearances, strict=True):
-        touching = np.hypot(*joint.start_eccentricity) >= Parameters(par).clearance[:, k]
+    gaps = [gap for joint in sample_of(scene, points).clearances for gap in joint.gaps]
+    for k, gap in zip(scene.open_places, gaps, strict=True):
+        touching = np.asarray(gap) >= 0.0
         start.active[:, k] = touching
         start.inverse_impact[:, k] = touching / law.minimum_impact_speed

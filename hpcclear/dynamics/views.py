@@ -223,9 +223,7 @@ class Parameters(View):
     journal_radius = _entry(at.JOURNAL_RADIUS)
     inverse_ramp = _entry(at.INVERSE_RAMP)
     steepness = _entry(at.STEEPNESS)  # s/m
-    film_short = _entry(at.FILM_SHORT)
-    film_finite = _entry(at.FILM_FINITE)
-    film_long = _entry(at.FILM_LONG)
+    film_scale = _entry(at.FILM_SCALE)
     film_shear = _entry(at.FILM_SHEAR)
     film_floor = _entry(at.FILM_FLOOR)
 

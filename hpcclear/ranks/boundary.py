@@ -81,13 +81,17 @@ def run_on_ranks(
         stop = stack.enter_context(StopSwitch()) if stop is None else stop
         stop.outlook = RESUMES if resumes else ANEW
         try:
+            check_address_space(launcher.launched_size()[1] > 1)
             mail = _open_mail()
+        except LimitError as error:  # MPI might end the process with a code of its own
+            launcher.end_job(f"Error: {error}", Exit.FAILED)
+            return Exit.FAILED
         except InputError as error:
             if launcher.launched_rank() in (0, None):  # every copy finds the same
                 _say(f"Error: {error}")
             return Exit.BAD_INPUT
         stop.last_resort = mail.abort
-        refused = _refused(mail, *_want(mail.size > 1))
+        refused = _refused(mail)
         if refused:
             return refused
         ranks = Ranks(mail, stop)
@@ -142,38 +146,29 @@ def refuse_together(complaint: str) -> int:
         if launcher.launched_rank() in (0, None):
             _say(complaint)
     else:
-        _refused(mail, complaint, Exit.BAD_INPUT)
+        _refused(mail, complaint)
     return Exit.BAD_INPUT
 
 
-def _want(others: bool) -> tuple[str, int]:
-    """What this rank's process lacks for the work, and the exit code of that."""
-    try:
-        check_address_space(others)
-    except LimitError as error:
-        return f"Error: {error}", Exit.FAILED
-    return "", Exit.DONE
-
-
-def _refused(mail: Mail, complaint: str, code: int) -> int:
+def _refused(mail: Mail, complaint: str = "") -> int:
     """Exit code if the ranks cannot begin together, which root says, or 0; every rank calls it and hears the same."""
-    said = mail.everyone((complaint, code, os.environ.get("HPCCLEAR_LANES", "")))
-    complaints = [(rank, text, code) for rank, (text, code, _) in enumerate(said) if text]
-    lanes = sorted({asked for _, _, asked in said})
+    said = mail.everyone((complaint, os.environ.get("HPCCLEAR_LANES", "")))
+    complaints = [(rank, text) for rank, (text, _) in enumerate(said) if text]
+    lanes = sorted({asked for _, asked in said})
     if complaints:
-        rank, text, code = complaints[0]
+        rank, text = complaints[0]
         text = text if rank == 0 else f"rank {rank} of {mail.size}: {text}"
     elif len(lanes) > 1:
         shown = ", ".join(asked or "nothing" for asked in lanes)
         reason = "it differs from rank to rank"
         remedy = "Set it to the same value on all ranks, or on none"
-        text, code = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}", Exit.BAD_INPUT
+        text = f"Error: {InputError('HPCCLEAR_LANES', shown, reason, remedy)}"
     else:
         return Exit.DONE
     if mail.rank == 0:
         _say(text)
     mail.finalize()
-    return code
+    return Exit.BAD_INPUT
 
 
 def alone() -> Ranks:

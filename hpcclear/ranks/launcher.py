@@ -1,9 +1,13 @@
 """What started this process: mpiexec, srun or a person; and one thread for each process."""
 
+import contextlib
 import importlib
 import os
 import sys
+import time
 from collections.abc import Mapping
+
+from hpcclear.base.plain import plain
 
 _SIZE = (
     "PMI_SIZE",  # MPICH, Intel MPI, Cray
@@ -55,6 +59,25 @@ def launched_rank(environment: Mapping[str, str] = os.environ) -> int | None:
 def is_launched(environment: Mapping[str, str] = os.environ) -> bool:
     """Whether a launcher started this process, so that MPI is needed."""
     return launched_rank(environment) is not None
+
+
+def end_job(complaint: str, code: int) -> None:
+    """Say why this process cannot begin, and have the launcher end the others, which may wait for it in MPI.
+
+    For want of what MPI itself needs; without a launcher it says so only. Open MPI and ``srun --kill-on-bad-exit`` end a
+    job by the exit code alone. MPICH's launcher waits, unless it gets a request by the descriptor it left (PMI-1).
+    """
+    rank = launched_rank()
+    if rank:
+        time.sleep(2.0)  # where all lack the same, root says it and ends the job meanwhile
+        complaint = f"rank {rank}: {complaint}"
+    with contextlib.suppress(OSError):
+        print(plain(complaint), file=sys.stderr, flush=True)
+    descriptor = os.environ.get("PMI_FD", "")
+    if rank is not None and descriptor.isdigit():
+        time.sleep(0.5)  # an end may overtake what the launcher has not passed on to the user yet
+        with contextlib.suppress(OSError):
+            os.write(int(descriptor), f"cmd=abort exitcode={int(code)}\n".encode())
 
 
 def pin_threads() -> None:

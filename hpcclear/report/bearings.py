@@ -212,8 +212,8 @@ def _projected_areas(response: xr.Dataset) -> dict[str, float]:
     except (InputError, KeyError):
         return {}  # a file of another version, or without its scene
     areas = {}
-    for joint in scene.clearance_joints():
-        one = scene.clearance_joint(joint)
+    for joint in scene.pins():
+        one = scene.pin(joint)
         path = length_path(one)
         if path is not None:
             length: float = attrgetter(path)(one)

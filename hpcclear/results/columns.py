@@ -82,7 +82,6 @@ SAMPLES: Columns = {
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "wave": count(("wave",), "number of a wave around a surface, by joint: cosine and sine of each order"),
     **outcome("sample"),
-    "sliding_waves": number(("sample", "wave"), "J", "sliding work of a revolution times waves of the contact's angle"),
 }
 
 BIFURCATION: Columns = {

@@ -5,7 +5,7 @@ from pydantic import model_validator
 from hpcclear.base.objectives import ENDS
 from hpcclear.scene.fields import Table, invalid
 from hpcclear.scene.goals import DEVIATION, MEAN, Constraint, Goal
-from hpcclear.scene.variables import NAME
+from hpcclear.scene.named import NAME
 
 
 class Case(Table):

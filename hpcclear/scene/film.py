@@ -1,8 +1,9 @@
 """Oil in a joint with clearance, as in the scene file."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 from hpcclear.scene.fields import PositiveLength, Quantity, Table, invalid
+from hpcclear.scene.laws import LawName, our_laws
 
 
 class Film(Table):
@@ -12,15 +13,16 @@ class Film(Table):
     """Dynamic viscosity at the temperature that the bearing runs at, Pa s."""
     length: PositiveLength
     """Of the bearing, at right angles to the plane, m."""
-    model: Literal["short", "long", "finite"]
+    model: Annotated[str, LawName("film")]
     """How Reynolds' equation is solved: for bearings that are short beside their diameter (Ocvirk), long (Sommerfeld), or of
     their own length, once a bearing."""
     roughness: PositiveLength = 1e-6
     """Of both surfaces together, m: how thin the film is where they touch."""
 
-
-LENGTHS = (0.05, 3.0)
-"""Lengths over diameters that `finite` is for."""
+    @property
+    def law(self) -> Any:
+        """The model, as `hpcclear.dynamics.laws.declared.FilmLaw`."""
+        return our_laws("film")[self.model]
 
 
 def check_film(film: Film | None, clearance: float, radius: float) -> None:
@@ -30,10 +32,10 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
     """
     if film is None:
         return
-    ratio = 0.5 * film.length / radius
-    if film.model == "finite" and not LENGTHS[0] <= ratio <= LENGTHS[1]:
+    ratio, (least, most) = 0.5 * film.length / radius, film.law.lengths
+    if film.law.further is not None and not least <= ratio <= most:
         raise invalid(
-            f"is for lengths from {LENGTHS[0]:g} to {LENGTHS[1]:g} diameters, and this bearing is {ratio:.3g} long",
+            f"is for lengths from {least:g} to {most:g} diameters, and this bearing is {ratio:.3g} long",
             'Take "short"' if ratio < 1.0 else 'Take "long"',
             key="film.model",
             value=film.model,

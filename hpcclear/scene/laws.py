@@ -14,7 +14,7 @@ from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_valida
 from pydantic_core import CoreSchema
 
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
-from hpcclear.scene.fields import Quantity, Table, check_table, invalid, nearest
+from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
 from hpcclear.scene.wanted import hint
 
@@ -63,6 +63,25 @@ def our_laws(kind: str) -> Mapping[str, Any]:
     return found
 
 
+@dataclasses.dataclass(frozen=True)
+class LawName(Converted):
+    """An entry that names one of our laws of a kind."""
+
+    kind: str
+
+    def convert(self, value: Any) -> str:
+        """The name, known to be there; raises PydanticCustomError."""
+        names = importlib.import_module(_HOME).names(self.kind)
+        if value not in names:
+            raise invalid("is not one of the known values", nearest(str(value), names))
+        return str(value)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "enum": [*importlib.import_module(_HOME).names(self.kind)]}
+
+
 @cache
 def _on(law: Any, geometry: Any) -> Any:
     return law.on(geometry)
@@ -90,8 +109,8 @@ def _with_entries(kind: str) -> Iterator[Any]:
 
 
 def known_laws(kind: str) -> dict[str, Any]:
-    """Our laws and those of installed packages, by name; geometries are ours alone."""
-    if kind == "geometry":
+    """Our laws and those of installed packages, by name; geometries and films are ours alone."""
+    if kind in ("geometry", "film"):
         return dict(our_laws(kind))
     registry = CONTACT_LAWS if kind == "contact" else FRICTION_LAWS
     others = {name: named(registry.get(name), name) for name in registry.names()}

@@ -102,6 +102,10 @@ class Surrogate(Table):
     kernel: Literal["squared-exponential", "matern-5/2"] | None = None
     """Covariance function: "squared-exponential", the default, for smooth f; or "matern-5/2", twice differentiable, for f with
     kinks. With the latter the swarm averages over 256 points of a Sobol sequence."""
+    of: Literal["f", "statistics"] | None = None
+    """What adaptive refinement goes by: "f", designs of the swarm on the surrogate of f; or "statistics", models of each
+    objective and constraint over designs, by expected improvement. Default "f" where its surrogate has R2 of 0.9 or more on
+    fresh points, else "statistics"."""
 
 
 class CertificateOfEffects(Table):

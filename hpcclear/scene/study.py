@@ -13,6 +13,9 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.formula import names_in
+from hpcclear.scene.moving import Moving
+from hpcclear.scene.named import SHORT_NAMES
+from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import (
     CertificateOfEffects,
     MomentAccuracy,
@@ -23,7 +26,7 @@ from hpcclear.scene.stages import (
     Verification,
     of_both,
 )
-from hpcclear.scene.variables import SHORT_NAMES, RandomInput, Variable
+from hpcclear.scene.variables import Variable
 
 _LINKS = ("crank", "rod", "slider")  # in the order they are joined
 LEAST_PER_INPUT = 3
@@ -31,7 +34,7 @@ LEAST_PER_INPUT = 3
 _LINK_NUMBERS = ("mass", "mass_center", "inertia")
 
 
-class Study(Table):
+class Study(Moving, Table):
     """Sampling and optimisation over a scene."""
 
     seed: Annotated[int, Count(0, 2**63 - 1)] = 0
@@ -84,6 +87,9 @@ class Study(Table):
             data["random"] = {
                 name: _with_paths(row, variables.get(name)) for name, row in random.items()
             }
+            data["variables"] = {
+                name: _with_unit(row, data["random"]) for name, row in variables.items()
+            }
         stage = data.get("sensitivity", {})
         if isinstance(variables, Mapping) and isinstance(stage, Mapping):
             data["sensitivity"] = {"parameter": _only_clearance(variables), **stage}
@@ -98,6 +104,9 @@ class Study(Table):
                 key="variables",
             )
         self._check_paths()
+        self.check_laws()
+        for row in self.random:
+            self._check_width(row)
         self._check_correlation()
         self._check_cases()
         self.sensitivity.check()
@@ -108,7 +117,7 @@ class Study(Table):
     def _check_paths(self) -> None:
         owner: dict[str, str] = {}
         for variable in self.variables:
-            for path in variable.paths:
+            for path in (*variable.paths, *self.own_entries(variable)):
                 if path in owner:
                     raise invalid(
                         f"{variable.name} and {owner[path]} both drive {path}",
@@ -135,7 +144,6 @@ class Study(Table):
                         "Remove one",
                         key=f"random.{row.name}",
                     )
-            self._check_width(row)
 
     def _check_width(self, row: RandomInput) -> None:
         if row.worn and row.name not in self.names:
@@ -146,7 +154,7 @@ class Study(Table):
             )
         if row.name not in self.names:
             return
-        if self.variable(row.name).range is None:
+        if self.variable(row.name).ratio is not None:
             if row.absolute:
                 raise invalid(
                     "a distribution that does not follow the design needs a domain in SI",
@@ -158,11 +166,11 @@ class Study(Table):
             return  # seen when its lives are known
         lower, upper = self.variable(row.name).bounds
         slack = 1e-12 * (upper - lower)  # half-widths of decimal numbers are not exact
-        low, high = row.span
+        low, high = self.reach(row)
         if row.absolute:
             inside = lower - slack <= low and high <= upper + slack
         else:
-            inside = high - low <= upper - lower + slack
+            inside = bool(row.relative) or self.moves(row) or high - low <= upper - lower + slack
         if not inside:
             raise invalid(
                 "the distribution is wider than its domain, "
@@ -230,6 +238,22 @@ class Study(Table):
                             key=f"cases.{case.name}.{table}.{k}.formula",
                             value=goal.formula,
                         )
+                    if self.variable(name).rows:
+                        raise invalid(
+                            f"{name!r} is a row of a table and no number",
+                            'Give its rows a cost, and write statistic = "cost"',
+                            key=f"cases.{case.name}.{table}.{k}.formula",
+                            value=goal.formula,
+                        )
+                if goal.statistic == "cost":
+                    priced = tuple(one for one in self.variables if one.name in own and one.priced)
+                    if not priced:
+                        raise invalid(
+                            "no design variable of this case has a cost",
+                            'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one, say',
+                            key=f"cases.{case.name}.{table}.{k}.statistic",
+                        )
+                    goal.priced_by(priced)
 
     def _check_names(self) -> None:
         lists: list[tuple[str, Iterable[str]]] = [
@@ -246,6 +270,12 @@ class Study(Table):
                     )
             if len(set(names)) < len(names):
                 raise invalid("a variable is named twice", "Remove one", key=key)
+            odd = [n for n in names if not self.variable(n).paths and "optimisation" not in key]
+            if odd:
+                raise invalid(
+                    f"{odd[0]!r} has no slope: it is a row of a table, or a width that f does not know",
+                    "Leave it out", key=key,
+                )  # fmt: skip
         if any(
             not names for names in (self.surrogate.models or ()) + (self.sensitivity.groups or ())
         ):
@@ -348,6 +378,7 @@ class Study(Table):
             row.name
             for row in self.variables
             if row.name != self.sensitivity.parameter
+            and row.paths
             and all(path.startswith("mechanism.bodies.") for path in row.paths)
         ]
         last = max(len(of_bodies) - len(of_bodies) % 2 - 2, 0)
@@ -356,12 +387,13 @@ class Study(Table):
 
     @property
     def models(self) -> tuple[Names, ...]:
-        """Inputs of the Kriging models; the last one, `optimisation`, is always among them."""
+        """Inputs of the Kriging models; the last one has those of `optimisation` that f knows."""
         models = self.surrogate.models
         if models is None:
             parameter = self.sensitivity.parameter
             models = tuple((*group, parameter) for group in self.groups if parameter is not None)
-        return (*(model for model in models if model != self.optimisation), self.optimisation)
+        searched = tuple(n for n in self.optimisation if not self.variable(n).silent)
+        return (*(model for model in models if model != searched), searched)
 
     @property
     def optimisation(self) -> Names:
@@ -388,6 +420,21 @@ def _with_paths(row: Any, variable: Any) -> Any:
     return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
 
 
+def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
+    """A variable that drives a random input with an entry that has the same unit."""
+    if not isinstance(row, Mapping) or "like" in row:
+        return row
+    given = row.get("follows", row.get("paths", row.get("path", ())))
+    first = given if isinstance(given, str) else next(iter(given or ()), "")
+    _, _, rest = str(first).partition("random.")
+    own = random.get(rest.partition(".")[0])
+    if not rest or not isinstance(own, Mapping) or "fits" in row:
+        return row
+    paths = own.get("paths", own.get("path", SHORT_NAMES.get(rest.partition(".")[0], ())))
+    like = paths if isinstance(paths, str) else next(iter(paths), None)
+    return row if own.get("relative") or like is None else {**row, "like": like}
+
+
 def _only_clearance(variables: Mapping[str, Any]) -> str | None:
     """Name of the only study variable that drives clearances; None if there is none or another."""
     found = []
@@ -395,9 +442,11 @@ def _only_clearance(variables: Mapping[str, Any]) -> str | None:
         own = row if isinstance(row, Mapping) else {}
         paths = own.get("paths", own.get("path", SHORT_NAMES.get(name, ())))
         paths = (paths,) if isinstance(paths, str) else paths
-        clear = isinstance(paths, (list, tuple)) and {
-            str(path).endswith(".clearance") for path in paths
-        }
+        clear = (
+            "range" in own
+            and isinstance(paths, (list, tuple))
+            and {str(path).endswith(".clearance") for path in paths}
+        )
         if clear == {True}:
             found.append(name)
     return found[0] if len(found) == 1 else None

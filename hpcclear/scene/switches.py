@@ -12,6 +12,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.scene.driving import PlanarTorque, speed_entry
 from hpcclear.scene.fields import Curve
+from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
@@ -21,9 +22,6 @@ from hpcclear.scene.validation import validated
 
 GENTLE_RAMP = 50.0
 """Friction coefficient over ramp speed, s/m, that a steeper ramp is widened to: half of what calls for implicit steps."""
-
-SHORT_TO = 1.5
-"""Length over diameter up to which a short film is nearer to the finite one, and from which a long one."""
 
 FEW_MODES = (2, 1)
 """Modes that a bar which bends in more of them is tried with."""
@@ -78,13 +76,17 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
 
 def _clearances(scene: Scene) -> Iterator[Switch]:
     for label in scene.clearance_joints():
-        if label in scene.numerics.objective_joints:
+        if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        if isinstance(joint, PlanarClearance):
+        ideal: dict[str, Any] | None = {"kind": "ideal"}
+        if isinstance(joint, SliderGuide):
+            ideal = None
+        elif isinstance(joint, PlanarClearance):
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
-        else:
-            ideal = {"kind": "ideal"}
+        elif isinstance(joint, PlanarSlide):
+            kept = ("kind", "point", "line", "angle")
+            ideal = {name: getattr(joint, name) for name in kept}
         yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
 
 
@@ -92,10 +94,9 @@ def _films(scene: Scene) -> Iterator[Switch]:
     for label, film in scene.films().items():
         key = f"{scene.joint_key(label)}.film"
         yield Switch(f"oil film in {label}", {key: None})
-        if film.model == "finite":
-            slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
-            closed = "short" if slender < SHORT_TO else "long"
-            yield Switch(f"finite length of the film in {label}", {f"{key}.model": closed})
+        slender = 0.5 * film.length / scene.pin(label).bearing_radius
+        for words, model in () if film.law.simpler is None else film.law.simpler(slender):
+            yield Switch(f"{words} in {label}", {f"{key}.model": model})
 
 
 def _surfaces(scene: Scene) -> Iterator[Switch]:

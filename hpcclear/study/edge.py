@@ -9,15 +9,15 @@ Source: X. Du and W. Chen, "Sequential optimization and reliability assessment m
 J. Mech. Design 126 (2004) 225-233, doi:10.1115/1.1649968.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.cases import Case
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_physical
-from hpcclear.scene.formula import value_of
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search.infill import TwoScales
@@ -100,16 +100,17 @@ def _of_case(
         with threadpool_limits(limits=1, user_api="blas"):
             model = TwoScales(coordinates, excess, bounds, rng)
             objectives = [
-                _objective(
-                    run, case, names, column, TwoScales(coordinates, values[:, column], bounds, rng)
+                exact or TwoScales(coordinates, column, bounds, rng).predict
+                for exact, column in zip(
+                    goals.exact_in(run.scene, case)[:2], values.T, strict=False
                 )
-                for column in range(2)
             ]
     except InputError:  # too few designs that did not fail for a model
         return kept
     for _ in range(ROUNDS):
 
         def judged(points: Array, off: float = shift + _gap(case, aim)) -> tuple[Array, Array]:
+            points = snapped(run.study, names, points)
             least = np.column_stack([one(points) for one in objectives])
             return least, np.maximum(model.predict(points) + off, 0.0)
 
@@ -120,6 +121,7 @@ def _of_case(
                 coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]],
                 rng,
             )
+            place = snapped(run.study, names, place[None])[0]
             guess = float(model.predict(place[None])[0])
         row = to_physical(run.scene, names, place[None])[0]
         choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
@@ -135,22 +137,6 @@ def _of_case(
             break
         shift, aim = now - guess, aim * (LESS if standing == Standing.UNDECIDED else 1.0)
     return kept
-
-
-def _objective(
-    run: StudyRun, case: Case, names: Sequence[str], column: int, model: TwoScales
-) -> Callable[[Array], Array]:
-    """What a case makes small of designs, (n, d) to (n,): a formula as it is, else by a model of what was simulated."""
-    formula = case.goals[column].formula
-    if formula is None:
-        return model.predict
-
-    def exact(points: Array) -> Array:
-        rows = to_physical(run.scene, names, points)
-        found = value_of(formula, dict(zip(names, rows.T, strict=True)))
-        return np.asarray(np.broadcast_to(found, len(points)))
-
-    return exact
 
 
 def _best(judged: Judge, bounds: Array, start: Array, rng: np.random.Generator) -> Array:

@@ -1,14 +1,15 @@
 """Objectives and constraints of a case: values with confidence intervals from simulations, or surrogate predictions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
+from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
-from hpcclear.scene.formula import value_of
+from hpcclear.scene.domain import to_physical
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
@@ -37,8 +38,8 @@ def goal_value(
     goal: Goal, values: Array, design: Mapping[str, float], confidence: float
 ) -> GoalValue:
     """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
-    if goal.formula is not None:
-        value = float(value_of(goal.formula, design))
+    if goal.exact:
+        value = float(goal.of_design(design))
         return GoalValue(value, value, value, np.zeros(len(values)))
     if goal.statistic == "quantile":
         found = replicates.quantile(values, goal.order, confidence)
@@ -111,8 +112,8 @@ def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, floa
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     """A goal of designs by the surrogate: f at draws of the random inputs (n, s), design variables (n,) each; to (n,)."""
-    if goal.formula is not None:
-        return np.broadcast_to(value_of(goal.formula, designs), len(drawn))
+    if goal.exact:
+        return np.broadcast_to(goal.of_design(designs), len(drawn))
     if goal.statistic == "mean":
         return np.asarray(drawn.mean(axis=1))
     if goal.statistic == "deviation":
@@ -122,6 +123,20 @@ def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
     assert goal.limit is not None  # by validation
     width = SMOOTH * drawn.std(axis=1, keepdims=True) + 1e-300
     return np.asarray(ndtr((drawn - goal.limit) / width).mean(axis=1))
+
+
+def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
+    """Of each that a case makes small, sampling coordinates (n, d) to its values (n,) if it is exact, else None."""
+    names = scene.required_study.design_variables(case.name)
+
+    def of(goal: Goal) -> Callable[[Array], Array]:
+        def exact(points: Array) -> Array:
+            designs = dict(zip(names, to_physical(scene, names, points).T, strict=True))
+            return np.array(np.broadcast_to(goal.of_design(designs), len(points)))
+
+        return exact
+
+    return [of(goal) if goal.exact else None for goal in case.goals]
 
 
 def names_of(case: Case, unit: str) -> tuple[str, ...]:

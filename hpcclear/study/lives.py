@@ -15,7 +15,7 @@ from hpcclear.ensemble.lives import doubts
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.wear import check_worn, run_wear
 from hpcclear.scene import Scene
-from hpcclear.scene.variables import RandomInput
+from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.statistics.random.replicates import moments, student
 from hpcclear.study.goals import ends_in_all
 from hpcclear.study.optimisation import Choice
@@ -87,8 +87,10 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
 
 def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]:
     """Mean, its half-width, deviation and its half-width of a design; each life is a replicate."""
-    paths = {name: run.study.variable(name).paths for name in choice.design}
-    own = scene.with_({path: choice.design[name] for name in paths for path in paths[name]})
+    entries: dict[str, float] = {}
+    for name, value in choice.design.items():
+        entries |= run.study.variable(name).entries(value)
+    own = scene.with_(entries)
     name = NAME if own == scene else f"{FOLDER}/{choice.name.replace(' ', '_')}.nc"
     options = Options(style=run.simulations.style)
     timing = run.directory / "timing.nc"

@@ -207,8 +207,9 @@ def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
 def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
     """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
     random = run.study.case(choice.case).random
-    moved = offsets(run.scene, random, list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T))
     design = dict(choice.design)
+    chances = list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T)
+    moved = offsets(run.scene, random, chances, choice.design)
     for name, values in moved.items():
         row = run.study.random_input(name)
         centre = design.get(name, run.scene.number(row.paths[0]))

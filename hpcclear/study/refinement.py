@@ -9,20 +9,25 @@ win nothing or all are spent.
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import moocore
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
+from hpcclear.statistics.random.replicates import spread
+from hpcclear.statistics.search import improvement
+from hpcclear.statistics.search.improvement import Known, Space
 from hpcclear.statistics.search.infill import believed_ends, eligible, proposals
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.study import edge, truth
-from hpcclear.study.goals import most_of, wanted
+from hpcclear.study.goals import exact_in, most_of, wanted
 from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
 
@@ -31,6 +36,14 @@ RAYS = 6
 
 PATIENCE = 3
 """Rounds in a row that win nothing together, after which a front stands."""
+
+
+ROUGH = 0.9
+"""R2 of the searched surrogate on fresh points, below which the statistics are searched and not f."""
+
+FIRST, PARTS = 4, 3
+"""There: designs per design variable at first, and parts that a round is cut into, since each new design says where the next
+belongs."""
 
 
 @dataclass
@@ -47,12 +60,15 @@ class Tried:
         What its case makes small: mean and deviation, if nothing else is asked for.
     excess : array, shape (n,)
         By how much its constraints are broken (`hpcclear.study.goals.steered`).
+    errors : array, shape (n, goals)
+        Standard errors of the values.
     """
 
     names: tuple[str, ...]
     coordinates: Array
     values: Array
     excess: Array
+    errors: Array
 
     def best(self) -> Array:
         """Numbers of the designs that no other one dominates, of those that keep the constraints; if none does, of the one that
@@ -78,7 +94,16 @@ def length(study: Study) -> int:
     return 2 ** max(int(np.log2(max(wanted, REPLICATES) // REPLICATES)), 1)
 
 
-def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[str]]:
+def by_statistics(study: Study, r2: float) -> bool:
+    """Whether statistics over designs are modelled in place of f: as the study asks, or where a surrogate of f has less than
+    `ROUGH` on fresh points."""
+    asked = study.surrogate.of
+    return not r2 >= ROUGH if asked is None else asked == "statistics"
+
+
+def search(
+    run: StudyRun, start: Sequence[Choice], statistics: bool
+) -> tuple[list[Choice], list[str]]:
     """Designs to verify beside those of the swarm, the best that were found; and what a reader should know.
 
     Parameters
@@ -86,6 +111,8 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
     run : StudyRun
     start : sequence of Choice
         Designs of the swarm, of all cases.
+    statistics : bool
+        Whether the search goes by models of the statistics alone.
 
     Raises
     ------
@@ -94,24 +121,31 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
     """
     if run.study.verification.infill_rounds == 0:
         return [], []
-    begun = run.stage("check-0", _begin, start)
+    begun = run.stage("check-0", _begin_wide if statistics else _begin, start)
     met = {case.name: [_tried(run, case.name, begun, None)] for case in run.study.cases}
-    for round_ in range(run.study.verification.infill_rounds):
-        going = {name: its[-1] for name, its in met.items() if not _stands(run, name, its)}
+    patience = PATIENCE * (PARTS if statistics else 1)
+    for round_, count in enumerate(_rounds(run, begun, statistics)):
+        going = {
+            name: its[-1] for name, its in met.items() if not _stands(run, name, its, patience)
+        }
         if not going:
             break
         stage = f"infill-{round_}"
-        found = run.stage(stage, _go_on, going, stage)
+        found = run.stage(stage, _go_on, going, stage, count, statistics)
         for name, before in going.items():
             met[name].append(_tried(run, name, found, before))
     remarks = [
         f"The search of {name} ended with its rounds while the last one {won}; more "
         "study.verification.infill_rounds may still win."
         for name, its in met.items()
-        if not _stands(run, name, its) and (won := _won(run, name, its[-2:]))
+        if not _stands(run, name, its, patience) and (won := _won(run, name, its[-2:]))
     ]
     named = [choice for choice in start if choice.name]
-    finalists = [one for name, its in met.items() for one in _finalists(run, name, its[-1], named)]
+    finalists = [
+        one
+        for name, its in met.items()
+        for one in _finalists(run, name, its[-1], named, statistics)
+    ]
     if edge.cases_of(run.study):
         last = {name: its[-1] for name, its in met.items()}
         known = {name: (one.coordinates, one.values, one.excess) for name, one in last.items()}
@@ -119,9 +153,21 @@ def search(run: StudyRun, start: Sequence[Choice]) -> tuple[list[Choice], list[s
     return finalists, remarks
 
 
-def _stands(run: StudyRun, name: str, met: Sequence[Tried]) -> bool:
+def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
+    """Designs of a case in each round. A search by statistics has as many in all as the other one, first designs included."""
+    settings = run.study.verification
+    if not statistics:
+        return [settings.infill_designs] * settings.infill_rounds
+    each = length(run.study) * REPLICATES
+    cases = len(run.study.cases)
+    left = sum(simulations(run.study)) // each // cases - len(begun["case"]) // cases
+    count = max(settings.infill_designs // PARTS, 1)
+    return [count] * (left // count)
+
+
+def _stands(run: StudyRun, name: str, met: Sequence[Tried], patience: int = PATIENCE) -> bool:
     """Whether a front stands, from what was known after each round."""
-    return len(met) > PATIENCE and not _won(run, name, met[-1 - PATIENCE :])
+    return len(met) > patience and not _won(run, name, met[-1 - patience :])
 
 
 def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
@@ -138,7 +184,19 @@ def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
             ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))
             places = (np.arange(RAYS) + rng.random(RAYS)) / RAYS
             ray[:, k] = region.lower[k] + places * (region.upper[k] - region.lower[k])
-            chosen += _choices(run, case.name, ray)
+            chosen += _distinct(_choices(run, case.name, ray))
+    return _simulated(run, chosen, "check-0")
+
+
+def _begin_wide(run: StudyRun, start: Sequence[Choice]) -> Result:
+    """The ends of the swarm, the design in the scene, and others all over the box."""
+    chosen = []
+    for case in run.study.cases:
+        names = run.study.design_variables(case.name)
+        region, rng = box(run.scene, names), run.rng("search", case.name)
+        unit = unit_lhs(max(FIRST * len(names), len(names) + 4), len(names), rng)
+        chosen += _distinct([one for one in start if one.case == case.name and one.name])
+        chosen += _choices(run, case.name, region.lower + unit * (region.upper - region.lower))
     return _simulated(run, chosen, "check-0")
 
 
@@ -149,20 +207,37 @@ def _distinct(choices: Sequence[Choice]) -> list[Choice]:
     ]
 
 
-def _go_on(run: StudyRun, tried: Mapping[str, Tried], stage: str) -> Result:
+def _go_on(
+    run: StudyRun, tried: Mapping[str, Tried], stage: str, count: int, statistics: bool
+) -> Result:
     """One round of the cases that are not decided."""
     chosen = []
     for name, one in tried.items():
-        bounds = _bounds(run, one.names)
-        count, rng = run.study.verification.infill_designs, run.rng(stage, name)
+        bounds, rng = _bounds(run, one.names), run.rng(stage, name)
+        broken = one.excess if run.study.case(name).kept else None
         try:
-            broken = one.excess if run.study.case(name).kept else None
-            where = proposals(one.coordinates, one.values, bounds, count, rng, broken)
+            snap = partial(snapped, run.study, one.names)
+            if statistics:
+                where = improvement.proposals(*_problem(run, name, one), count, rng)
+            else:
+                where = proposals(one.coordinates, one.values, bounds, count, rng, broken, snap)
         except InputError:  # too few designs that did not fail for a model
             unit = unit_lhs(count, len(one.names), rng)
             where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
         chosen += _choices(run, name, where)
     return _simulated(run, chosen, stage)
+
+
+def _problem(run: StudyRun, name: str, one: Tried) -> tuple[Known, Space]:
+    """What is known of a case, and where to look: at least each objective, and mean + 2 standard deviations, the usual merit."""
+    case = run.study.case(name)
+    directions = np.eye(len(case.goals))
+    if case.plain:
+        directions = np.vstack([directions, [1.0, 2.0]])
+    snap = partial(snapped, run.study, one.names)
+    space = Space(_bounds(run, one.names), directions, exact_in(run.scene, case), snap)
+    broken = one.excess if case.kept else None
+    return Known(one.coordinates, one.values, one.errors, broken), space
 
 
 def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
@@ -173,7 +248,7 @@ def _bounds(run: StudyRun, names: Sequence[str]) -> Array:
 
 def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
     names = run.study.design_variables(case)
-    rows = to_physical(run.scene, names, coordinates)
+    rows = to_physical(run.scene, names, snapped(run.study, names, coordinates))
     return [Choice("", case, dict(zip(names, row.tolist(), strict=True))) for row in rows]
 
 
@@ -183,7 +258,7 @@ def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
     most = most_of(run.study.cases)
     if not choices:
         nothing = np.empty((0, len(names)))
-        none = {"values": np.empty((0, most)), "excess": np.empty(0)}
+        none = {"values": np.empty((0, most)), "errors": np.empty((0, most)), "excess": np.empty(0)}
         return {"case": np.array([], "U1"), "design": nothing, **none}
     count = length(run.study)
     found = truth.sequences(run, choices, stage, "search", count, count * REPLICATES)
@@ -191,6 +266,7 @@ def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
         "case": np.array([choice.case for choice in choices]),
         "design": np.array([[c.design.get(name, np.nan) for name in names] for c in choices]),
         "values": found["goal"][:, :most],
+        "errors": np.array([spread(one) for one in found["goal_shifts"][:, :most]]),
         "excess": found["excess"],
     }
 
@@ -203,15 +279,17 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
     coordinates = to_coordinates(run.scene, names, found["design"][rows][:, columns])
     region = box(run.scene, names)
     coordinates = np.clip(coordinates, region.lower, region.upper)  # round-off at the border
-    values = found["values"][rows, : len(run.study.case(case).goals)]
+    count = len(run.study.case(case).goals)
+    values, errors = (found[part][rows, :count] for part in ("values", "errors"))
     broken = found["excess"][rows]
     if before is None:
-        return Tried(names, coordinates, values, broken)
+        return Tried(names, coordinates, values, broken, errors)
     return Tried(
         names,
         np.concatenate([before.coordinates, coordinates]),
         np.concatenate([before.values, values]),
         np.concatenate([before.excess, broken]),
+        np.concatenate([before.errors, errors]),
     )
 
 
@@ -249,25 +327,31 @@ def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
     return np.asarray(np.where(relative, shares, old[:, None] - new))
 
 
-def _finalists(run: StudyRun, case: str, tried: Tried, verified: Sequence[Choice]) -> list[Choice]:
+def _finalists(
+    run: StudyRun, case: str, tried: Tried, verified: Sequence[Choice], statistics: bool
+) -> list[Choice]:
     """The best designs of a case, well spread, for verification on scatter of its own; those of `verified` have it anyway.
 
     Beside those of the front one for each end, since ends are chosen among designs that are nearly as good, and what all
     values together make the end: the least of them has luck.
     """
-    best = tried.best()
     most = run.study.verification.designs + len(run.study.case(case).goals)
-    kept = best[cut(tried.values[best], most)]
     rng, broken = run.rng("finalists", case), tried.excess if run.study.case(case).kept else None
+    best = tried.best()
+    where = tried.coordinates[best[cut(tried.values[best], most)]]
     with contextlib.suppress(InputError):  # too few designs that did not fail for a model
-        believed = believed_ends(
-            tried.coordinates, tried.values, _bounds(run, tried.names), rng, broken
-        )
-        kept = np.unique(np.append(kept, believed))
+        if statistics:
+            where = improvement.finalists(*_problem(run, case, tried), most, rng)
+        else:
+            believed = believed_ends(
+                tried.coordinates, tried.values, _bounds(run, tried.names), rng, broken
+            )
+            rows = np.unique(np.append(best[cut(tried.values[best], most)], believed))
+            where = tried.coordinates[rows]
     own = [list(choice.design.values()) for choice in verified if choice.case == case]
     return [
         choice
-        for choice in _choices(run, case, tried.coordinates[kept])
+        for choice in _choices(run, case, where)
         if not any(
             np.allclose(list(choice.design.values()), one, rtol=1e-9, atol=0.0) for one in own
         )

@@ -11,7 +11,8 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
-from hpcclear.results.dataset import provenance, variable_name
+from hpcclear.results.dataset import variable_name
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
@@ -53,7 +54,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
         "numerics.objective": run.scene.objective.name,
     }
     for name, value in choice.design.items():
-        changes |= dict.fromkeys(run.study.variable(name).paths, value)
+        changes |= run.study.variable(name).entries(value)
     if settings.response_clearance is not None:
         for joint in run.scene.clearance_joints():
             changes[f"{run.scene.joint_key(joint)}.clearance"] = settings.response_clearance

@@ -87,7 +87,7 @@ class Simulations:
                     "a model leaves it out, but the entries that it drives differ in the scene",
                     "Make these entries equal, or give each a variable of its own",
                 )
-            columns.append(np.full(len(values), numbers.pop()))
+            columns.append(np.full(len(values), self.scene.baseline(variable.name)))
         points = Points(
             tuple(variable.name for variable in self._variables),
             np.column_stack(columns),

@@ -104,7 +104,8 @@ def _search(run: StudyRun, models: Models) -> Found:
     found = run.stage("optimisation", optimisation.optimise, models.searched)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
-    better, remarks = refinement.search(run, [*ends, *between])
+    statistics = refinement.by_statistics(run.study, surrogates.checked_r2(run.study, models.kept))
+    better, remarks = refinement.search(run, [*ends, *between], statistics)
     designs = [*ends, *(better or between)]
     return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
 

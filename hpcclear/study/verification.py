@@ -27,7 +27,7 @@ def original(run: StudyRun) -> list[Choice]:
     found = []
     for case in run.study.cases:
         names = run.study.design_variables(case.name)
-        design = {n: run.scene.number(run.study.variable(n).paths[0]) for n in names}
+        design = {n: run.scene.baseline(n) for n in names}
         found.append(Choice(f"{case.name} original", case.name, design, origin="given"))
     return found
 

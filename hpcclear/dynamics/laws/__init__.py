@@ -1,4 +1,4 @@
-"""Laws, one file each: normal forces and friction.
+"""Laws, one file each: normal forces, friction, oil films.
 
 A law never sees a row: it declares its parameters, gets numbers, returns numbers. A file here holds ``LAW`` (in ``geometry``
 ``GEOMETRY``), and its name with hyphens is the law's: adding a law is adding a file.
@@ -10,17 +10,21 @@ import pkgutil
 from functools import cache
 from typing import Any
 
-FOLDERS = {"contact": "normal", "friction": "friction", "geometry": "geometry"}
+FOLDERS = {"contact": "normal", "friction": "friction", "film": "film", "geometry": "geometry"}
 
 
 @cache
 def laws(kind: str) -> dict[str, Any]:
-    """The laws of a kind, "contact" or "friction", or the geometries of contact ("geometry"), by name."""
-    package = importlib.import_module(f"{__name__}.{FOLDERS[kind]}")
+    """The laws of a kind, "contact", "friction" or "film", or the geometries of contact ("geometry"), by name."""
     found = {}
-    for module in pkgutil.iter_modules(package.__path__):
-        name = module.name.replace("_", "-")
-        held = importlib.import_module(f"{package.__name__}.{module.name}")
+    for name in names(kind):
+        held = importlib.import_module(f"{__name__}.{FOLDERS[kind]}.{name.replace('-', '_')}")
         law = held.GEOMETRY if kind == "geometry" else held.LAW
         found[name] = dataclasses.replace(law, name=name)
     return found
+
+
+def names(kind: str) -> tuple[str, ...]:
+    """Their names; none of them is loaded."""
+    package = importlib.import_module(f"{__name__}.{FOLDERS[kind]}")
+    return tuple(one.name.replace("_", "-") for one in pkgutil.iter_modules(package.__path__))

@@ -5,8 +5,10 @@ Each function names what it needs by its arguments, and gets it: first what vari
 are arithmetic, so that one and the same source is compiled into the lanes, runs on arrays, and is checked with units.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from inspect import signature
 from typing import Any
 
@@ -107,7 +109,9 @@ class Law:
 
     kind = ""
 
-    def arguments(self, function: Function) -> tuple[str, ...]:
+    @staticmethod
+    @cache
+    def arguments(function: Function) -> tuple[str, ...]:
         """Names of what a function asks for."""
         return tuple(signature(function).parameters)
 
@@ -121,7 +125,7 @@ class Law:
         """Those that run in the lanes, by name."""
         raise NotImplementedError
 
-    @property
+    @cached_property
     def read(self) -> tuple[str, ...]:
         """Numbers of a sample that they ask for, in the order of their rows."""
         varying = VARYING[self.kind]
@@ -258,3 +262,20 @@ class FrictionLaw(Law):
     def bristled(self) -> bool:
         """Whether it has a state."""
         return self.deflection is not None
+
+
+@dataclass(frozen=True, eq=False)
+class FilmLaw(Law):
+    """An oil film between journal and bearing: Reynolds' equation, solved in some way. Its forces are compiled as they are."""
+
+    force: Any = None
+    """Lane function (par, row, scale, place, w, s2, i, W): force on the journal, N; `place`: the eccentricity over the
+    clearance, 1 - `s2` its square, `w` as of `dynamics.physics.film`, `row` the first of the ``further`` numbers."""
+    scale: Function = lambda viscosity: 0.0 * viscosity
+    """Factor of the force, N s/m, of viscosity, film_length, bearing_radius and clearance."""
+    lengths: tuple[float, float] = (0.0, math.inf)
+    """Lengths over diameters that it is for."""
+    further: Function | None = None
+    """More numbers, of length over diameter: a film that has them is solved for the ``lengths`` alone."""
+
+    kind = "film"

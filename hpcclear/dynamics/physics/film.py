@@ -11,10 +11,7 @@ circumference. All that is integrated there follows from
 
 by differentiation, as d psi/da = 1/s and d psi/db = a b/(s (1 - b^2)). No term divides by the eccentricity.
 
-- Short bearing (Ocvirk 1953, NACA TN 2808): pressure is positive around the direction of w.
-- Finite bearing: as a short one, but for factors by which Reynolds' equation in both directions differs (`dynamics.bearing`).
-- Long bearing (Sommerfeld 1904): at both ends of the half circle that is ambient; it lies around 2 w + e (e.w)/c^2. For pure
-  wedge this is Sommerfeld's half film, for pure squeeze the half that is being squeezed.
+Which half that is, and what follows, each film of `dynamics.laws.film` says.
 """
 
 import math
@@ -22,13 +19,10 @@ import math
 from hpcclear.base.bits import no_less
 from hpcclear.base.jit import lane_function
 
-LEAST_S = 0.19899748742132398
-"""s at an eccentricity of 0.98, up to which finite bearings are fitted."""
-
 EIGHTH = math.tan(math.pi / 8.0)
 HALF_TURN = math.pi
 
-_TINY = 1e-300  # keeps the direction of a film at rest defined (and zero)
+TINY = 1e-300  # keeps the direction of a film at rest defined (and zero)
 
 
 @lane_function
@@ -67,14 +61,6 @@ def half_circle_angle(a, s, r2):
 
 
 @lane_function
-def half_angle_sine(a, s, r):
-    """sin(psi/2) for r = sqrt(a^2 + s^2)."""
-    far = r + abs(a)
-    less = far if a <= 0.0 else s * s / far  # r - a = r (1 + cos psi)
-    return s / math.sqrt(2.0 * r * less)
-
-
-@lane_function
 def film_thickness(gap, clearance, floor):
     """Least film thickness over the clearance, for a `gap` |e| - c of the centres.
 
@@ -109,70 +95,15 @@ def short_impedance(a, b, s2):
 
 
 @lane_function
-def long_impedance(a, b, s2, along, across):
-    """Force of the long film along its middle and across, over 12 mu L R^3/c^3, on the half circle around the first axis; w has
-    the components `along` and `across`. Turned against w: minus what is returned.
-
-    From R dp/dtheta = 12 mu R^3/h^3 (w.t + C), whose C makes the pressure periodic, by parts.
-    """
-    inverse, q, q2, turned = half_circle(a, s2)
-    # of Phi: its first derivatives, and half of the second
-    first_a = 2.0 * (q + a * turned * s2)
-    over = a * inverse
-    first_b = 2.0 * b * (over * q + turned * s2)
-    aa = 3.0 * a * q2 + turned * (s2 + 3.0 * a * a)
-    ab = b * (2.0 + a * over) * q2 + 3.0 * a * b * turned
-    bb = over * q + turned * s2 + b * b * (over * (3.0 * q2 + 2.0 * q * inverse) + 3.0 * turned)
-    cosine = first_a + a * aa + b * ab  # integrals of cos/D^3, sin/D^3
-    sine = first_b + a * ab + b * bb
-    constant = -3.0 * (a * across - b * along) / (3.0 - s2)
-    return along * bb - across * ab - constant * sine, across * aa - along * ab + constant * cosine
-
-
-@lane_function
 def along_and_across(eccentricity, w):
     """The eccentricity's components along w and across it, where w is not zero."""
     ex, ey = eccentricity
     wx, wy = w
-    inverse = 1.0 / math.sqrt(wx * wx + wy * wy + _TINY)
+    inverse = 1.0 / math.sqrt(wx * wx + wy * wy + TINY)
     return (ex * wx + ey * wy) * inverse, (ey * wx - ex * wy) * inverse
 
 
 @lane_function
-def short_force(flag, scale, eccentricity, w, s2):
-    """Force on the journal, N, of a short film; `scale`: mu R L^3/c^3; eccentricity over c, w in m/s; 0 with it off."""
-    if flag is not None:
-        wx, wy = w
-        a, b = along_and_across(eccentricity, w)
-        along, across = short_impedance(a, b, s2)
-        return -scale * (along * wx - across * wy), -scale * (along * wy + across * wx)
-    else:
-        return 0.0, 0.0
-
-
-@lane_function
-def long_force(flag, scale, eccentricity, w, s2):
-    """As `short_force`, of a long film; `scale`: 12 mu L R^3/c^3."""
-    if flag is not None:
-        ex, ey = eccentricity
-        wx, wy = w
-        pressed = ex * wx + ey * wy
-        mx = 2.0 * wx + ex * pressed
-        my = 2.0 * wy + ey * pressed
-        inverse = 1.0 / math.sqrt(mx * mx + my * my + _TINY)
-        mx *= inverse
-        my *= inverse
-        along, across = long_impedance(
-            ex * mx + ey * my, ey * mx - ex * my, s2, wx * mx + wy * my, wy * mx - wx * my
-        )
-        return -scale * (along * mx - across * my), -scale * (along * my + across * mx)
-    else:
-        return 0.0, 0.0
-
-
-@lane_function
-def finite_scales(a, s2):
-    """s and sin(psi/2) as the polynomials of finite bearings take them, from -1 to 1; s no less than is fitted."""
-    s = math.sqrt(s2)
-    sine = half_angle_sine(a, s, math.sqrt(s2 + a * a))
-    return (2.0 * max(s, LEAST_S) - (1.0 + LEAST_S)) / (1.0 - LEAST_S), 2.0 * sine - 1.0
+def turned_against(scale, along, across, wx, wy):
+    """Force on the journal, N: against w by `along`, and across it, over `scale`."""
+    return -scale * (along * wx - across * wy), -scale * (along * wy + across * wx)

@@ -18,10 +18,9 @@ from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, with_numbers
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import (
-    Clearance,
     ConstantSpeed,
     Joint,
-    Revolute,
+    Loose,
     TorqueDrive,
 )
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Node, Passage, clear
@@ -57,12 +56,9 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 
 
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
-    """The joints of a mechanism, pins in place of clearances."""
+    """The joints of a mechanism, none with clearance."""
     return tuple(
-        Revolute(joint.name, joint.journal, joint.bearing)
-        if isinstance(joint, Clearance)
-        else joint
-        for joint in mechanism.joints
+        joint.without_play if isinstance(joint, Loose) else joint for joint in mechanism.joints
     )
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS
-from hpcclear.report.answer import goals_of, leading_goals, recommended
 from hpcclear.report.figures import labels, motion, moving
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
+from hpcclear.report.merit import goals_of, leading_goals, recommended
 
 _LEGEND = {
     "design": "simulated",

@@ -60,6 +60,7 @@ def fit_kriging(
     restarts: int = 3,
     lengths: tuple[float, float] = LENGTH_BOUNDS,
     kernel: Kernel = SQUARED_EXPONENTIAL,
+    noise: tuple[float, float] | None = None,
 ) -> Kriging:
     """Fit a Kriging model by maximum likelihood.
 
@@ -81,6 +82,8 @@ def fit_kriging(
         Between which the length scales are, in the unit cube.
     kernel : str
         "squared-exponential" or "matern-5/2".
+    noise : (float, float), optional
+        Between which the noise variance is, in units of the variance of the values.
 
     Returns
     -------
@@ -101,7 +104,9 @@ def fit_kriging(
         outcomes = np.full_like(outcomes, mean)
     lower, upper = bounds.T
     unit = (inputs - lower) / (upper - lower)
-    found = _maximise_likelihood(unit, (outcomes - mean) / scale, rng, restarts, lengths, kernel)
+    found = _maximise_likelihood(
+        unit, (outcomes - mean) / scale, rng, restarts, lengths, kernel, noise or NOISE_BOUNDS
+    )
     samples: dict[str, Any] = {
         "inputs": inputs,
         "values": values[valid],
@@ -117,13 +122,14 @@ def _maximise_likelihood(
     restarts: int,
     lengths: tuple[float, float],
     kernel: Kernel,
+    noise: tuple[float, float],
 ) -> dict[str, Any]:
     """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     dims = unit.shape[1]
-    start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), 1e-3])
-    bounds = np.array([SIGNAL_BOUNDS, *[lengths] * dims, NOISE_BOUNDS])
+    start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *noise)])
+    bounds = np.array([SIGNAL_BOUNDS, *[lengths] * dims, noise])
     seed = int(rng.integers(2**31))
     # One BLAS thread: more are slower at these sizes, and would change the last bits of the fit.
     with threadpool_limits(limits=1, user_api="blas"):

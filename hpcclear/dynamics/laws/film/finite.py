@@ -1,18 +1,28 @@
-"""A bearing of finite length: Reynolds' equation solved once, and how its film differs from a short bearing's as polynomials.
+"""Oil in a bearing of its own length: Reynolds' equation solved once, and what differs from a short film as polynomials.
 
 Pressure is a sum over cosines along the axis, each with an equation around the bearing alone, solved by Fourier sums: even
 in the angle for what is squeezed along the eccentricity, odd for what is squeezed across. Where their sum is below ambient
 there is no pressure. A film's force over that of a short bearing, along w and across, is s^2/P with s^2 = 1 - e^2 and
-polynomials P in s and in sin(psi/2) of `physics.film`, in which it is smooth up to touching.
+polynomials P in s and in sin(psi/2) of `dynamics.physics.film`, in which it is smooth up to touching.
 """
 
+import math
 from functools import lru_cache
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.physics.film import LEAST_S, finite_scales, short_impedance
+from hpcclear.dynamics.laws.declared import FilmLaw
+from hpcclear.dynamics.laws.film import short
+from hpcclear.dynamics.physics.film import along_and_across, short_impedance, turned_against
+
+LEAST_S = 0.19899748742132398
+"""s at an eccentricity of 0.98, up to which finite bearings are fitted."""
+
+SHORT_TO = 1.5
+"""Length over diameter up to which a short film is nearer to the finite one, and from which a long one."""
 
 DEGREES = (5, 14)  # in s, in sin(psi/2)
 _MODES, _ACROSS, _AROUND = 32, 64, 2048
@@ -77,7 +87,7 @@ def forces(eccentricity: float, ratio: float, angles: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def correction(ratio: float) -> Array:
-    """Coefficients of P along w, then across, each in powers of s, in powers of the sine; shape (FINITE_ROWS,).
+    """Coefficients of P along w, then across, each in powers of s, in powers of the sine; shape (FURTHER_ROWS,).
 
     `ratio`: length over diameter.
     """
@@ -101,7 +111,7 @@ def correction(ratio: float) -> Array:
         fitted = np.linalg.lstsq(terms * (weight / side)[:, None], weight, rcond=None)[0]
         found.append(_in_powers(fitted.reshape(DEGREES[0] + 1, DEGREES[1] + 1)))
     coefficients = np.array(found).ravel()
-    assert len(coefficients) == at.FINITE_ROWS
+    assert len(coefficients) == at.FURTHER_ROWS
     return coefficients
 
 
@@ -117,3 +127,82 @@ def _powers_of(k: int, degree: int) -> Array:
     """Coefficients of Chebyshev's polynomial k, shape (degree + 1,)."""
     one = np.polynomial.chebyshev.cheb2poly(np.eye(k + 1)[k])
     return np.pad(one, (0, degree + 1 - len(one)))
+
+
+@lane_function
+def half_angle_sine(a, s, r):
+    """sin(psi/2) for r = sqrt(a^2 + s^2)."""
+    far = r + abs(a)
+    less = far if a <= 0.0 else s * s / far  # r - a = r (1 + cos psi)
+    return s / math.sqrt(2.0 * r * less)
+
+
+@lane_function
+def finite_scales(a, s2):
+    """s and sin(psi/2) as the polynomials of finite bearings take them, from -1 to 1; s no less than is fitted."""
+    s = math.sqrt(s2)
+    sine = half_angle_sine(a, s, math.sqrt(s2 + a * a))
+    return (2.0 * max(s, LEAST_S) - (1.0 + LEAST_S)) / (1.0 - LEAST_S), 2.0 * sine - 1.0
+
+
+@lane_function
+def polynomial(par, row, y, i, W):
+    """Of degree 14, from coefficients in the rows from `row` on."""
+    p = par[(row + 14) * W + i]
+    p = p * y + par[(row + 13) * W + i]
+    p = p * y + par[(row + 12) * W + i]
+    p = p * y + par[(row + 11) * W + i]
+    p = p * y + par[(row + 10) * W + i]
+    p = p * y + par[(row + 9) * W + i]
+    p = p * y + par[(row + 8) * W + i]
+    p = p * y + par[(row + 7) * W + i]
+    p = p * y + par[(row + 6) * W + i]
+    p = p * y + par[(row + 5) * W + i]
+    p = p * y + par[(row + 4) * W + i]
+    p = p * y + par[(row + 3) * W + i]
+    p = p * y + par[(row + 2) * W + i]
+    p = p * y + par[(row + 1) * W + i]
+    p = p * y + par[(row + 0) * W + i]
+    return p
+
+
+@lane_function
+def corrected(par, row, s2, x, y, i, W):
+    """Force of a finite film over that of a short one, by 6 times 15 coefficients from `row` on (`correction`)."""
+    p = polynomial(par, row + 75, y, i, W)
+    p = p * x + polynomial(par, row + 60, y, i, W)
+    p = p * x + polynomial(par, row + 45, y, i, W)
+    p = p * x + polynomial(par, row + 30, y, i, W)
+    p = p * x + polynomial(par, row + 15, y, i, W)
+    p = p * x + polynomial(par, row, y, i, W)
+    return s2 / p
+
+
+@lane_function
+def force(par, row, scale, place, w, s2, i, W):
+    """See `FilmLaw.force`."""
+    wx, wy = w
+    a, b = along_and_across(place, w)
+    along, across = short_impedance(a, b, s2)
+    x, y = finite_scales(a, s2)
+    along = along * corrected(par, row, s2, x, y, i, W)
+    across = across * corrected(par, row + 90, s2, x, y, i, W)
+    return turned_against(scale, along, across, wx, wy)
+
+
+def simpler(slender):
+    """A film in closed form."""
+    yield "finite length of the film", "short" if slender < SHORT_TO else "long"
+
+
+LAW = FilmLaw(
+    words="film of a bearing of finite length, solved once a bearing",
+    source="Reynolds 1886; half-Sommerfeld",
+    formula="short's, times factors along and across w that are fitted to the solution",
+    valid="bearings of 0.05 to 3 diameters in length; within 0.1 % of the solution up to an eccentricity of 0.95",
+    force=force,
+    scale=short.scale,
+    lengths=(0.05, 3.0),
+    further=correction,
+    simpler=simpler,
+)

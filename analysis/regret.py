@@ -1,0 +1,280 @@
+"""How far the recommended design of a study with a rough objective is from the best that many more simulations find.
+
+    python analysis/regret.py OUT                          # all studies; each some minutes on one core
+    python analysis/regret.py OUT press my_study.toml      # some of them, or a scene with one case of one's own
+
+Each study is carried out twice, with models of f (`study.surrogate.of = "f"`) and of the statistics over designs. The reference
+is a search by expected improvement over far more designs, with `POINTS` simulations each. The recommended designs and the best of
+the reference are then judged together, each by `JUDGED` simulations of the same scatter, which no search has seen.
+Regret is what the first objective of a recommended design is above the least that was judged, with the standard error of that
+difference. Results are kept in OUT, so that the command goes on where it was stopped.
+"""
+
+import argparse
+import json
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from directly import run_of
+
+from hpcclear.report.answer import recommended
+from hpcclear.results import dataset
+from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import unit_lhs
+from hpcclear.scene.stages import SCRAMBLINGS
+from hpcclear.statistics.random.replicates import spread
+from hpcclear.statistics.search import improvement
+from hpcclear.statistics.search.improvement import Known
+from hpcclear.study import refinement, run_study, simulations, truth
+from hpcclear.study.optimisation import Choice
+
+HERE = Path(__file__).parent
+JOBS = HERE.parent / "jobs"
+WIDE, ROUNDS, BATCH, POINTS = 60, 12, 10, 512
+JUDGED, BEST = 8192, 12
+
+SMALL: dict[str, Any] = {
+    "seed": 5,
+    "samples": 150,
+    "test_samples": 40,
+    "accuracy": {"mean": 0.005, "deviation": 0.03, "quantile": 0.01},
+    "sensitivity": {"groups": []},
+    "surrogate": {"models": [], "restarts": 1},
+    "swarm": {"particles": 50, "iterations": 50, "runs": 2},
+    "verification": {"most_samples": 2048, "infill_rounds": 3, "infill_samples": 128},
+}
+QUICK = {"rtol": 1e-5, "transient_revolutions": 2, "averaged_revolutions": 2}
+QUANTILE = {"statistic": "quantile", "level": 0.95}
+
+
+def mass(path: str, low: float, high: float) -> dict[str, Any]:
+    """A mass as a study variable."""
+    return {"path": path, "range": [low, high]}
+
+
+def uniform(low: str, high: str) -> dict[str, Any]:
+    """A clearance wherever the design is."""
+    return {"distribution": "uniform", "range": [low, high]}
+
+
+STUDIES: dict[str, tuple[str, dict[str, Any]]] = {
+    "press": (
+        "linkages/press.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "ram": mass("mechanism.bodies.ram.mass", 1.0, 2.0),
+                "link": {"path": "mechanism.bodies.link.length", "range": ["145 mm", "160 mm"]},
+                "C": {"range": ["0.03 mm", "0.2 mm"]},
+            },
+            "random": {
+                "C": uniform("0.05 mm", "0.15 mm"),
+                "ram": {"distribution": "uniform", "half_width": "20 g"},
+            },
+            "cases": {"made": {"random": ["C", "ram"], "objectives": [QUANTILE, {"formula": "ram"}]}},
+        },
+    ),
+    "quick_return": (
+        "linkages/quick_return.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "crank": {"path": "mechanism.bodies.crank.length", "range": ["45 mm", "55 mm"]},
+                "lever": mass("mechanism.bodies.lever.mass", 0.4, 0.8),
+                "C": {"range": ["0.03 mm", "0.2 mm"]},
+            },
+            "random": {
+                "C": uniform("0.05 mm", "0.15 mm"),
+                "lever": {"distribution": "uniform", "half_width": "10 g"},
+            },
+            "cases": {"made": {"random": ["C", "lever"], "objectives": ["mean", "deviation"]}},
+        },
+    ),
+    "four_stroke": (
+        "linkages/four_stroke.toml",
+        {
+            "objective": "peak-crank-moment",
+            "variables": {
+                "rod": mass("mechanism.bodies.rod.mass", 0.35, 0.65),
+                "piston": mass("mechanism.bodies.piston.mass", 0.3, 0.5),
+                "C": {"range": ["10 um", "50 um"]},
+            },
+            "random": {
+                "C": uniform("15 um", "45 um"),
+                "piston": {"distribution": "uniform", "half_width": "8 g"},
+            },
+            "cases": {"made": {"random": ["C", "piston"], "objectives": [QUANTILE, {"formula": "0 - rod"}]}},
+        },
+    ),
+    "v_twin": (
+        "linkages/v_twin.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "piston": {
+                    "paths": ["mechanism.bodies.piston_left.mass", "mechanism.bodies.piston_right.mass"],
+                    "range": [0.3, 0.5],
+                },
+                "rod": {
+                    "paths": ["mechanism.bodies.rod_left.mass", "mechanism.bodies.rod_right.mass"],
+                    "range": [0.2, 0.4],
+                },
+                "C": {"range": ["20 um", "80 um"]},
+            },
+            "random": {"C": uniform("25 um", "70 um")},
+            "cases": {"made": {"random": ["C"], "objectives": [QUANTILE, "mean"]}},
+        },
+    ),
+    "slider_crank": (
+        "hunt_crossley.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "m2": mass("mechanism.rod.mass", 0.12, 0.4),
+                "m3": mass("mechanism.slider.mass", 0.08, 0.28),
+                "u2": {"path": "mechanism.rod.mass_center", "range": ["10 mm", "110 mm"]},
+                "C12": {"path": "joints.crank_rod.clearance", "range": ["0.1 mm", "0.6 mm"]},
+                "C23": {"path": "joints.rod_slider.clearance", "range": ["0.1 mm", "0.6 mm"]},
+            },
+            "random": {
+                "C12": uniform("0.15 mm", "0.5 mm"),
+                "C23": uniform("0.15 mm", "0.5 mm"),
+                "m3": {"distribution": "normal", "deviation": "2 g"},
+            },
+            "cases": {"made": {"random": ["C12", "C23", "m3"], "objectives": [QUANTILE, {"formula": "0 - m2 - m3"}]}},
+        },
+    ),
+}  # fmt: skip
+"""Studies of our own mechanisms, small enough to be judged."""
+
+
+def scene_of(name: str) -> Scene:
+    """A study by its name, or from a file."""
+    if name not in STUDIES:
+        return load_scene(name)
+    job, study = STUDIES[name]
+    table = tomllib.loads((JOBS / job).read_text())
+    table["study"] = SMALL | study
+    table["numerics"] = table["numerics"] | QUICK
+    return load_scene(table)
+
+
+def main() -> None:
+    """Carry out, judge and print studies."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("studies", nargs="*", default=list(STUDIES))
+    parser.add_argument("--seed", type=int, help="another seed than the study's")
+    words = parser.parse_args()
+    words.out.mkdir(exist_ok=True)
+    print(
+        f"{'study':24} {'searched by':12} {'R2 of f':>8} {'simulations':>12}  regret of the first objective"
+    )
+    for name in words.studies:
+        scene = scene_of(name)
+        if words.seed is not None:
+            scene = scene.with_({"study.seed": words.seed})
+        label = Path(name).stem + ("" if words.seed is None else f"_{words.seed}")
+        measured(words.out / label, label, scene)
+
+
+def measured(place: Path, label: str, scene: Scene) -> None:
+    """Carry out a study both ways, and print the regret of each."""
+    place.mkdir(exist_ok=True)
+    runs = {}
+    for of in ("f", "statistics"):
+        changed = scene.with_({"study.surrogate.of": of})
+        runs[of] = carried_out(changed, place / of)
+    case = scene.required_study.cases[0].name
+    names = scene.required_study.design_variables(case)
+    taken = []
+    for directory, _ in runs.values():
+        table = dataset.read(directory / "verification.nc", "verification")
+        best = table.sel(design=recommended(table))
+        taken.append({name: float(best[name]) for name in names})
+    kept = place / "reference.npy"
+    if not kept.exists():
+        np.save(kept, reference(scene, case))
+    rows = [list(one.values()) for one in taken] + np.load(kept).tolist()
+    choices = [Choice("", case, dict(zip(names, row, strict=True))) for row in rows]
+    found = told(scene, choices, JUDGED // SCRAMBLINGS, "judge")
+    values, shifts = found["goal"][:, 0], found["goal_shifts"][:, 0]
+    broken = found["excess"] > 0.0
+    least = int(np.where(broken, np.inf, values).argmin())
+    for row, (of, (directory, count)) in enumerate(runs.items()):
+        error = float(spread((shifts[row] - shifts[least])[None])[0])
+        scale = abs(values[least]) / 100.0
+        models = dataset.read(directory / "kriging.nc", "kriging")
+        text = f"{(values[row] - values[least]) / scale:.2f} % ± {error / scale:.2f} %"
+        text += " (breaks a constraint)" if broken[row] else ""
+        print(f"{label:24} {of:12} {float(models.r2[-1]):8.2f} {count:12} {text}", flush=True)
+
+
+def carried_out(scene: Scene, place: Path) -> tuple[Path, int]:
+    """Results of a study, and how much it simulated in all."""
+    counted, kept = Counter[str](), place.with_suffix(".json")
+
+    def counting(scene: Scene, points: Points, *words: Any, stage: str, **more: Any) -> Any:
+        counted[stage.partition(":")[0].partition("-")[0]] += len(points)
+        return sampled(scene, points, *words, stage=stage, **more)
+
+    sampled = simulations.sample_points
+    simulations.sample_points = counting
+    try:
+        directory = run_study(scene, place, progress_style="quiet")
+    finally:
+        simulations.sample_points = sampled
+    if not kept.exists():
+        kept.write_text(json.dumps(counted))
+    return directory, sum(json.loads(kept.read_text()).values())
+
+
+def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict[str, np.ndarray]:
+    """What designs come to by so many points of each scrambling."""
+    return truth.sequences(run_of(scene), choices, purpose, purpose, length, length * SCRAMBLINGS)
+
+
+def reference(scene: Scene, case: str) -> np.ndarray:
+    """The best designs of a long search, (k, d)."""
+    run = run_of(scene)
+    names = scene.required_study.design_variables(case)
+    rng = np.random.default_rng(77)
+    bounds = refinement._bounds(run, names)
+    tried = None
+    unit = unit_lhs(WIDE, len(names), rng)
+    where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
+    for round_ in range(ROUNDS + 1):
+        choices = refinement._choices(run, case, where)
+        found = told(scene, choices, POINTS // SCRAMBLINGS, "reference")
+        count = len(scene.required_study.case(case).goals)
+        made = {
+            "case": np.array([case] * len(choices)),
+            "design": np.array([[one.design.get(n, np.nan) for n in scene.required_study.optimisation] for one in choices]),
+            "values": found["goal"][:, :count],
+            "errors": np.array([spread(one) for one in found["goal_shifts"][:, :count]]),
+            "excess": found["excess"],
+        }  # fmt: skip
+        tried = refinement._tried(run, case, made, tried)
+        known, space = refinement._problem(run, case, tried)
+        if round_ < ROUNDS:
+            where = improvement.proposals(known, space, BATCH, rng)
+    return np.array([list(one.design.values()) for one in _ended(run, case, known, space, rng)])
+
+
+def _ended(run: Any, case: str, known: Known, space: improvement.Space, rng: np.random.Generator) -> list[Choice]:  # fmt: skip
+    """Designs that are believed to have the least first objective, and those that had it."""
+    beliefs = improvement.Beliefs(known, space, rng)
+    order = np.argsort(beliefs.believed[:, 0], kind="stable")[: BEST // 2]
+    lucky = np.argsort(known.values[beliefs.allowed][:, 0], kind="stable")[: BEST // 2]
+    rows = known.designs[beliefs.allowed][np.union1d(order, lucky)]
+    return refinement._choices(
+        run, case, np.vstack([rows, improvement.finalists(known, space, 4, rng)])
+    )
+
+
+if __name__ == "__main__":
+    main()

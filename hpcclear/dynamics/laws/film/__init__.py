@@ -1,0 +1,1 @@
+"""Oil films, one file each: Reynolds' equation, solved in some way."""
