@@ -190,7 +190,7 @@ SPUN_UP, SHOWN = 20, 10
 
 
 def _steady(scene: Scene) -> Records | None:
-    """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
+    """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a segment."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
     return evaluate_records(scene, ITSELF)

@@ -12,7 +12,7 @@ LEVEL = 0.97
 one more chance to stop on limits that are too narrow."""
 
 PARTS = 8
-"""Of a copy's stretches, at most, whose scatter tells that of its mean: each as long as it can be."""
+"""Of a copy's segments, at most, whose scatter tells that of its mean: each as long as it can be."""
 
 APART = 1.5
 """Variance between means of copies over that which their parts explain, from which on it alone counts."""
@@ -120,14 +120,14 @@ def quantile(freedom: float, level: float) -> float:
 def variance_of_mean(groups: list[Array]) -> tuple[float, float]:
     """Variance of the mean over time of one copy, and its degrees of freedom.
 
-    Copies are independent of each other: how their means differ needs no model of how stretches depend on one another. Parts of
+    Copies are independent of each other: how their means differ needs no model of how segments depend on one another. Parts of
     them say the same with more degrees of freedom where only neighbours depend on each other: variance of a part and twice
     the covariance of two. Both count by their degrees of freedom; where copies differ by more than parts explain, they alone.
 
     Parameters
     ----------
-    groups : list of ndarray, shape (stretches, copies)
-        Of copies that share a mean; all of as many stretches.
+    groups : list of ndarray, shape (segments, copies)
+        Of copies that share a mean; all of as many segments.
     """
     off = np.concatenate([group - group.mean() for group in groups], axis=1)
     n, copies = off.shape
@@ -166,7 +166,7 @@ def spin_up(series: Array, noise: float = 0.0) -> int:
 
 
 def parted(between: Array) -> int:
-    """First of the stretches from which on copies are as far apart as they get: variances between copies (n,) to an index."""
+    """First of the segments from which on copies are as far apart as they get: variances between copies (n,) to an index."""
     lasting = np.median(between[len(between) // 2 :])
     return int(np.argmax(between >= 0.3 * lasting))
 
