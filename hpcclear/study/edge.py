@@ -36,7 +36,7 @@ AIM, LESS = 0.8, 0.75
 a design that could not be decided."""
 
 NEAR = 0.65
-"""Of the allowed probability: a design that surely keeps it and has more is near enough."""
+"""Of the allowed probability: a design that significantly keeps it and has more is near enough."""
 
 PARTICLES, ITERATIONS = 48, 60
 STEPS, LOCAL = (0.1, 0.03, 0.01, 0.003), 256
@@ -72,7 +72,7 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
     Returns
     -------
     dict of arrays
-        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that surely
+        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that significantly
         break a constraint left out.
     """
     found: list[Choice] = []

@@ -58,7 +58,7 @@ def _symmetric(one: Estimate, confidence: float) -> GoalValue:
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
-    """Half-width of its limits that is asked for, and whether it is relative; a formula is known."""
+    """Half-width of its confidence interval that is requested, and whether it is relative; a formula is known."""
     if goal.statistic == "mean":
         return accuracy.mean, True
     if goal.statistic == "deviation":
@@ -72,7 +72,7 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
 
 
 def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
-    """Whether its limits are as narrow as asked for."""
+    """Whether its confidence interval is as narrow as requested."""
     share, relative = wanted(goal, accuracy)
     half = (one.upper - one.lower) / 2.0
     return bool(half <= share * (abs(one.value) if relative else 1.0))

@@ -1,4 +1,4 @@
-"""Responses of the original and the optimised designs, side by side (the paper's Fig. 10)."""
+"""Responses of the baseline and the optimised designs beside each other (the paper's Fig. 10)."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -28,7 +28,7 @@ STATISTICS = ("mean", "fluctuation", "peak")
 
 
 def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
-    """Names and designs whose responses are compared: the original, alpha, beta (and further ends) of each case."""
+    """Names and designs whose responses are compared: the baseline design, alpha, beta (and further ends) of each case."""
     known = {choice.name: choice for choice in designs}
     cases = run.study.cases
     original = known[f"{cases[0].name} original"]

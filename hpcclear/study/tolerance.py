@@ -1,4 +1,4 @@
-"""What the tolerance of the integration takes of an accuracy that is asked of a study (`study.accuracy`).
+"""What the tolerance of the integration takes of an accuracy that is required of a study (`study.accuracy`).
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
@@ -71,7 +71,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
     Returns
     -------
     dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and deviation of the designs of
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and standard deviation of the designs of
         its case, at worst, relative; and to what standard error that is known.
     """
     settings, everything = run.study.verification, range(len(designs))

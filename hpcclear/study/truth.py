@@ -1,4 +1,4 @@
-"""Designs through the true dynamics: mean, deviation and 95th percentile with confidence limits."""
+"""Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
+"""Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
@@ -61,7 +61,7 @@ def _of_design(
 def simulate(
     run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str = "verification"
 ) -> Result:
-    """Moments of designs, by as many simulations as the study asks for.
+    """Moments of designs, by as many simulations as the study requires.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def doubled(
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
     from."""
     wanted = wanted or run.study.wanted
     made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
@@ -243,7 +243,7 @@ def _values(
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation."""
+    """Half-widths of the confidence intervals of mean and standard deviation."""
     return tuple(
         one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
         for one in moments(values)
@@ -253,8 +253,8 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is a probability or
-    quantile that surely keeps or breaks its threshold, as one of `many` designs."""
+    """Whether all intervals are as narrow as requested; a standard deviation that is round-off only is, and so is a probability or
+    quantile that significantly keeps or breaks its threshold, as one of `many` designs."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))
     reach = _reaches(settings, values)
@@ -274,14 +274,14 @@ def _accurate(
 
 
 def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
-    """What a design comes to in all that its case asks."""
+    """What a design comes to in all that its case requires."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
     return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
 def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
-    """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
+    """Mean, standard deviation, percentile and all that the case of a design requires, from values of f (replicates, n)."""
     percentile = quantile(values, QUANTILE, run.study.verification.confidence)
     return [*moments(values), percentile, *_goals(run, choice, values)]
 

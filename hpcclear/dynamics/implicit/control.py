@@ -56,7 +56,7 @@ LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0
 
 @scalar_function
 def loosened(rtol, strictness, steep, smooth):
-    """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
+    """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol requires.
 
     Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff segments are full of kinks, where
     the result is no better than the estimate, most of all where a steep friction ramp sticks and tears loose. There the

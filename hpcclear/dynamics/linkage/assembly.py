@@ -111,7 +111,7 @@ def _ideal(mechanism: Mechanism, loops: Loops) -> Booleans:
 
 
 def _least_change(loops: Loops, jacobian: Array, asked: Array, rcond: float) -> Array:
-    """The smallest scaled change (n, m) that gives constraints what is asked of them (rows, m)."""
+    """The smallest scaled change (n, m) that gives constraints what is required of them (rows, m)."""
     inverse = np.linalg.pinv(jacobian * _columns(loops), rcond=rcond)
     change: Array = (inverse @ asked.T[..., None])[..., 0].T
     return change

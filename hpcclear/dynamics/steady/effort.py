@@ -1,4 +1,4 @@
-"""What the procedures of steady means share: a design, the segments of it that are asked for, what was found.
+"""What the procedures of steady means share: a design, the segments of it that are requested, what was found.
 
 Each procedure is a generator: it yields the `Segment` it wants simulated, is sent its `Outcome`, and returns a `Mean`. So
 that thousands of designs share the lanes, and a design's numbers depend on nothing but the design.
@@ -64,7 +64,7 @@ class Mean:
 
     regime: Regime
     limit: float
-    """Half-width of the limits of f, m; NaN where there is no steady mean."""
+    """Half-width of the confidence interval of f, m; NaN where there is no steady mean."""
     outcomes: Outcome
     """Shape (segments, copies): what the average is made of."""
     segment: int
@@ -76,7 +76,7 @@ class Mean:
     growth: float = np.nan
     """Of a perturbation, per revolution: mean of the logarithm, as far as the look showed."""
     growth_limit: float = np.nan
-    """Half-width of its limits, if it was measured on purpose."""
+    """Half-width of its confidence interval, if it was measured on purpose."""
     attractors: int | None = None
     """Kinds of motion found from several starts, if they were looked for."""
     status: Status = Status.OK
@@ -97,7 +97,7 @@ class Mean:
 
 @dataclass
 class Effort:
-    """What was simulated so far, and how a segment of it is asked for."""
+    """What was simulated so far, and how a segment of it is requested."""
 
     sample: Sample
     budget: int

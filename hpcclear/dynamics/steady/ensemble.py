@@ -29,7 +29,7 @@ LOOSEST_LATCHED = 1e-6
 """Likewise with a damping that keeps the impact speed."""
 
 LEVEL = 0.96
-"""Of the limits that are called 95 %: at 0.95 they hold 92 to 93 %, as a mean is looked at until they are narrow enough."""
+"""Of the intervals that are called 95 %: at 0.95 they hold 92 to 93 %, as a mean is looked at until they are narrow enough."""
 
 SHIFT = 2e-3
 """What the looser of these tolerances moves a mean by as a rule, relative."""
@@ -122,7 +122,7 @@ class _Interval:
 def ensemble(
     effort: Effort, target: float, rtol: float, growth: float
 ) -> Generator[Segment, Outcome, Mean]:
-    """Go on with copies from perturbed starts until the limits of their mean are narrow enough, or the budget is spent."""
+    """Go on with copies from perturbed starts until the confidence interval of their mean is narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
     segments, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
@@ -208,7 +208,7 @@ def _extend(
 def _more(
     effort: Effort, copies: _Copies, rtol: float, seen: _Interval, level: float
 ) -> Generator[Segment, Outcome, int]:
-    """Add copies where their orbits differ for good; how many further segments to ask for."""
+    """Add copies where their orbits differ for good; how many further segments to request."""
     used, total = len(copies.outcomes) - seen.first, len(copies.outcomes)
     missing = min((seen.limit / max(level, 1e-300)) ** 2, 1e6)
     count = len(copies.start)

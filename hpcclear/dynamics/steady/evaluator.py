@@ -81,7 +81,7 @@ class SteadyEvaluator:
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do.
+        If the scene requires what the kernel cannot do.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class SteadyEvaluator:
         self._queue([self._asks[sample] for sample in numbers])
 
     def _queue(self, asks: "list[_Ask]") -> None:
-        """Hand the segments that procedures ask for to the lanes."""
+        """Hand the segments that procedures request to the lanes."""
         by_kind: dict[tuple[float, int], list[_Ask]] = {}
         for ask in asks:
             by_kind.setdefault((ask.segment.rtol, ask.segment.revolutions), []).append(ask)

@@ -1,4 +1,4 @@
-"""What revolutions of several copies say: periods, whether they have settled, means with limits. Plain arrays, no mechanism."""
+"""Periods, steady state and means with confidence intervals, from revolutions of several copies. Plain arrays, no mechanism."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.dynamics.revolutions import objective
 
 LEVEL = 0.97
-"""Of the limits that are called 95 %: a mean is looked at several times until its limits are narrow enough, and each look is
+"""Of intervals that are called 95 %: a mean is looked at until its interval is narrow enough, and each look is
 one more chance to stop on limits that are too narrow."""
 
 PARTS = 8
@@ -104,7 +104,7 @@ def speed_settling(speeds: Array, tolerance: float) -> float:
 
 
 def student(values: Array) -> tuple[float, float, float]:
-    """Mean of independent values (n,), its standard error, and the half-width of its limits."""
+    """Mean of independent values (n,), its standard error, and the half-width of its confidence interval."""
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
     return float(np.mean(values)), error, quantile(len(values) - 1, LEVEL) * error
 
@@ -154,7 +154,7 @@ def projected(gaps: Array) -> Array:
 
 
 def spin_up(series: Array, noise: float = 0.0) -> int:
-    """Values at the start of a series (n,) to leave out, at most half of them: those that widen the limits of its mean.
+    """Values at the start of a series (n,) to leave out, at most half of them: those that widen the confidence interval of its mean.
 
     MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601); the
     first that makes it nearly so, since in noise the least is anywhere. No cut makes the scatter of what is left less than
