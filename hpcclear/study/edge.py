@@ -36,7 +36,7 @@ AIM, LESS = 0.8, 0.75
 a design that could not be decided."""
 
 NEAR = 0.65
-"""Of the allowed probability: a design that surely keeps it and has more is near enough."""
+"""Of the allowed probability: a design that significantly keeps it and has more is near enough."""
 
 SMALL = 0.02
 """Of the same for other statistics than probabilities: 0.4 % below the threshold is sought, then 0.8 % and more."""
@@ -75,7 +75,7 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
     Returns
     -------
     dict of arrays
-        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that surely
+        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that significantly
         break a constraint left out.
     """
     found: list[Choice] = []

@@ -53,7 +53,7 @@ def goal_value(
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
-    """Half-width of its limits that is asked for, and whether it is relative; a formula is known."""
+    """Half-width of its confidence interval that is requested, and whether it is relative; a formula is known."""
     if goal.statistic == "mean":
         return accuracy.mean, True
     if goal.statistic == "deviation":

@@ -166,7 +166,7 @@ def _together(
     going: Sequence[Generator[Array, Array, None]],
     stage: str,
 ) -> None:
-    """Answer procedures of several designs by f, all they ask for at a time in one batch."""
+    """Answer procedures of several designs by f, all that they request at a time in one batch."""
     wanted = {k: next(one) for k, one in enumerate(going)}
     while wanted:
         parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)

@@ -58,7 +58,7 @@ class Tried:
     coordinates : array, shape (n, d)
         Sampling coordinates.
     values : array, shape (n, goals)
-        What its case makes small: mean and deviation, if nothing else is asked for.
+        What its case makes small: mean and standard deviation, if nothing else is requested.
     excess : array, shape (n,)
         By how much its constraints are broken (`hpcclear.study.goals.steered`).
     errors : array, shape (n, goals)
@@ -96,7 +96,7 @@ def length(study: Study) -> int:
 
 
 def by_statistics(study: Study, r2: float) -> bool:
-    """Whether statistics over designs are modelled in place of f: as the study asks, or where a surrogate of f has less than
+    """Whether statistics over designs are modelled in place of f: as the study requires, or where a surrogate of f has less than
     `ROUGH` on fresh points."""
     asked = study.surrogate.of
     return not r2 >= ROUGH if asked is None else asked == "statistics"
@@ -174,7 +174,7 @@ def _stands(run: StudyRun, name: str, met: Sequence[Tried], patience: int = PATI
 
 
 def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
-    """The swarm's designs, and rays along each variable through its design of least deviation."""
+    """The swarm's designs, and rays along each variable through its design of lowest standard deviation."""
     chosen = []
     for case in run.study.cases:
         own = [choice for choice in start if choice.case == case.name]
@@ -300,7 +300,7 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
 def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
     """What was won from the first to the last of what was known, in words; empty if nothing that counts.
 
-    That is the accuracy asked for: many small steps are one large one. Designs that only stand between those of the earlier
+    That is the accuracy requested: many small steps are one large one. Designs that only stand between those of the earlier
     front count for nothing.
     """
     before, now = met[0], met[-1]

@@ -49,8 +49,8 @@ class Stage:
     run: Callable[..., Any]
     """Does it, from the run and the results of `needs`; what it returns is its result."""
     needs: tuple[str, ...] = ()
-    """Stages, all of them earlier, whose results it takes: None of one that does not apply. Beside them
-    there are "scene", as it was written, and "extent", which counts what the certificate of effects may take."""
+    """Stages, all of them earlier, whose results it takes: None for one that does not apply. Beside them
+    there are "scene", as it was written, and "extent", which counts what the effect screening may take."""
     applies: Callable[[Scene], bool] = lambda scene: True
     """Whether a study of this scene has it."""
     words: Mapping[str, str] = field(default_factory=dict)
@@ -295,7 +295,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
     run : StudyRun
         Of the scene as written.
     extent : function
-        How much the certificate of effects simulates (`hpcclear.study.extent.certificate_extent`).
+        How much the effect screening simulates (`hpcclear.study.extent.certificate_extent`).
     """
     results: dict[str, Any] = {"scene": run.scene, "extent": extent}
     for stage in stages_of(run.scene):

@@ -1,4 +1,4 @@
-"""What the tolerance of the integration does to verified designs: part of all their limits, and of an accuracy that is asked.
+"""What the tolerance of the integration does to verified designs: part of all their intervals, and of an accuracy that is requested.
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
@@ -83,7 +83,7 @@ def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
     Returns
     -------
     dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and deviation of the designs of
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and standard deviation of the designs of
         its case, at worst, relative; and to what standard error that is known.
     """
     made = truth.begun(run, designs) if run.study.paired else truth.made(run, designs)

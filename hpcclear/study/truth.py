@@ -1,4 +1,4 @@
-"""Designs through the true dynamics: mean, deviation and 95th percentile with confidence limits."""
+"""Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
+"""Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
 
 CLOSE = 0.25
 """Of the accuracy asked for: what a constraint that is not decided is known to, unless it is a probability."""
@@ -63,7 +63,7 @@ def _of_design(
 
 
 def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
-    """The first points of each scrambling of designs, (2, replicates, values) each as `doubled` returns them."""
+    """The first points of each replicate of designs, (2, replicates, values) each as `doubled` returns them."""
     made = [np.empty((2, REPLICATES, 0))] * len(choices)
     length = first_length(run.study.verification)
     lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
@@ -152,7 +152,7 @@ def doubled(
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
     from."""
     wanted = wanted or run.study.wanted
     made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
@@ -284,14 +284,14 @@ def _accurate(
 
 
 def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
-    """What a design comes to in all that its case asks."""
+    """What a design comes to in all that its case requires."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
     return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
 def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
-    """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
+    """Mean, standard deviation, percentile and all that the case of a design requires, from values of f (replicates, n)."""
     percentile = quantile(values, QUANTILE, run.study.verification.confidence)
     return [*moments(values), percentile, *_goals(run, choice, values)]
 

@@ -1,4 +1,4 @@
-"""Probabilities of rare failures by adaptive importance sampling, with limits from independent repeats.
+"""Probabilities of rare failures by adaptive importance sampling, with confidence intervals from independent repeats.
 
 Inputs are independent standard normals u. A pilot moves a mixture of normal densities, by a few levels of f, to where f exceeds
 the limit (cross-entropy method); failures may lie in several places. Then values are drawn from a mixture of it, of a wide
@@ -250,7 +250,7 @@ class Rare:
         return _worth(self.f, self.weights, self.limit) >= ENOUGH
 
     def interval(self, confidence: float) -> Limited:
-        """The probability with limits, at a two-sided confidence."""
+        """The probability with confidence intervals, at a two-sided confidence."""
         one = weighted(self.f, self.weights, self.limit, confidence)
         if self.known:
             upper = min(self.factor * one.upper, 1.0)
