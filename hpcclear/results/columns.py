@@ -241,6 +241,18 @@ CONTRIBUTIONS: Columns = {
     "together": flag(("input",), "whether the input is correlated with others, whose contribution is one"),
 }
 
+WORST: Columns = {
+    "design": text(("design",), "name of the design"),
+    "input": text(("input",), "random input"),
+    "worst": number(("design",), "objective",
+        "largest objective found within the bounds of the random inputs", required=True),
+    "worst_corner": number(("design",), "objective", "the largest at a corner of these bounds", required=True),
+    "at": number(("design", "input"), "", "value of the random input at the largest, in the unit beside it", required=True),
+    "tried": count(("design",), "simulations of the search", required=True),
+    "without_bounds": flag(("input",), "whether the input has no bounds and is taken within three standard deviations"),
+    "input_unit": text(("input",), "unit of the random input"),
+}
+
 CLAIMS: Columns = {
     "claim": count(("claim",), "number of the claim"),
     "text": text(("claim",), "what is claimed", required=True),
