@@ -273,7 +273,12 @@ class SceneTables(Table):
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        return self.numerics.responses or self.objective.needs_responses
+        asked = self.numerics.responses or self.objective.needs_responses
+        return asked or self.impacts_asked()
+
+    def impacts_asked(self) -> bool:
+        """Whether each sample records measures of impact and noise: ``numerics.impacts``, or the study's objective."""
+        return self.numerics.impacts or self.objective.needs_impacts
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""
