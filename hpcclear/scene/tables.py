@@ -162,9 +162,12 @@ class SceneTables(Table):
         if contact is not None and contact.has_length:
             for name in clearance:
                 if length_path(self.clearance_joint(name)) is None:
+                    entry, part = (
+                        ("width", "slider") if name in self.guides() else ("length", "bearing")
+                    )
                     raise invalid(
-                        f'the contact geometry "{contact.geometry}" needs the length of the bearing',
-                        'Add length = "20 mm" or so to the joint', f"{self.joint_key(name)}.length", None,
+                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
+                        f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
                     )  # fmt: skip
         if clearance and self.effects.contact is None:
             raise invalid(
