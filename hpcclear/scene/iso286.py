@@ -1,7 +1,7 @@
 """Limits of size of holes and shafts by ISO 286, and the clearance of a fit.
 
 Source: ISO 286-1:2010 (standard tolerances, fundamental deviations) and ISO 286-2:2010 (limit deviations), sizes to 500 mm,
-grades 5 to 11, deviations A to H, JS (holes) and a to h, js, k to p (shafts). The numbers were compared with the tables of limit
+grades 5 to 11, deviations A to H, JS (holes) and a to h, js, k to p (shafts). The numbers were compared with tables of limit
 deviations of bearing and tool catalogues, a textbook's tables of fundamental deviations, and the package pressfit 0.1.0.
 """
 
