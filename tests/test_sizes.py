@@ -1,4 +1,4 @@
-"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused, loops that are written out."""
+"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused."""
 
 import dis
 from dataclasses import replace

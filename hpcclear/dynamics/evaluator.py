@@ -106,7 +106,7 @@ class Evaluator:
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
-        Samples in lockstep.
+        Samples of a batch.
     perturbations : sequence of int, optional
         In units of `PERTURBATION`, of replicas at a tighter tolerance that run beside each sample and give its objective a
         half-width, as `alone` gives those of a single response; none by default.
@@ -118,7 +118,7 @@ class Evaluator:
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do.
+        If the scene requires what the kernel cannot do.
     """
 
     def __init__(
@@ -200,7 +200,7 @@ class Evaluator:
 
 
 def responses_reported(problem: Problem) -> tuple[str, ...]:
-    """Which of `RESPONSES` samples notify: those asked for, of a slider where one is followed, of a point where one is."""
+    """Which of `RESPONSES` samples record: those requested, of a slider or a point only where one is followed."""
     if not problem.effects.responses:
         return ()
     linkage = problem.linkage
@@ -256,7 +256,7 @@ def outcome_records(
 ) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
-    Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
+    Numbers of failed samples are NaN, and so are those that were not requested: the further responses unless
     `responses` (as of `responses_reported`), sliding work unless `worn`,
     what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """

@@ -43,7 +43,7 @@ class Effects(NamedTuple):
 
     @property
     def latched(self) -> Any:
-        """Whether the normal force's law asks for the impact speed, which is latched."""
+        """Whether the normal force's law requires the impact speed, which is latched."""
         return None if self.contact is None else self.contact.latched
 
     @property
@@ -216,7 +216,7 @@ RATES = WRITTEN.end
 
 
 class Integrated(NamedTuple):
-    """A rate that every stepper integrates over a step: its row, and the effect that asks for it. A gap's absolute value is
+    """A rate that every stepper integrates over a step: its row, and the effect that requires it. A gap's absolute value is
     integrated, and the error of its integral, relative to the clearance times a revolution, counts for the step's."""
 
     rate: int
@@ -441,7 +441,7 @@ class Queue(NamedTuple):
 
 class Method(NamedTuple):
     """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
-    which a stepper asks for what is compiled apart from it (`stepping.special`)."""
+    which a stepper calls what is compiled apart from it (`stepping.special`)."""
 
     settings: Any
     weights: Any

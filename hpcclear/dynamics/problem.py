@@ -200,7 +200,7 @@ def implicit_method(scene: Scene) -> str:
     if method == "auto" and scene.modes:
         mechanism = planar.linkage_of(scene).mechanism
         if max(bending.swings(mechanism)) * float(planar.period_of(mechanism)) > bending.STIFF:
-            return "always"  # there is no stretch of the motion in which they are slow
+            return "always"  # there is no segment of the motion in which they are slow
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
     if scene.films() or scene.bristles:

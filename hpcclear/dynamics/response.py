@@ -85,7 +85,7 @@ def simulate(
     scene : Scene
     objective : Objective, optional
         What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
-        need ``numerics.responses`` where there is no study that asks for them.
+        need ``numerics.responses`` where there is no study that requires them.
     copy : int
         Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
         motion without clearance has no copies.
@@ -102,7 +102,7 @@ def simulate(
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do, or for time series that do not fit into memory.
+        If the scene requires what the kernel cannot do, or time series that do not fit into memory.
     """
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
@@ -156,6 +156,8 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     found = planar_labels(scene, linkage_of(scene).mechanism)
     if scene.modes:
         found["mode"] = scene.mode_labels
+    if scene.guides():
+        found["guide"] = scene.guides()
     if scene.template is None and not coordinate_count(scene):
         found["pin"] = pins_of(scene)
     return found or None
@@ -190,7 +192,7 @@ SPUN_UP, SHOWN = 20, 10
 
 
 def _steady(scene: Scene) -> Records | None:
-    """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
+    """The record (1,) of the steady mean, where the scene names a target error; None: it requires a segment."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
     return evaluate_records(scene, ITSELF)

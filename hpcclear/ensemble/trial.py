@@ -194,7 +194,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
-        """What is asked of the effect screening.
+        """What is required of the effect screening.
 
         Raises
         ------

@@ -29,7 +29,7 @@ from hpcclear.scene.planar import turns_of
 CHUNK = 64
 """Members between two checkpoints."""
 
-LEAST_REVOLUTIONS = 20
+LEAST_REVOLUTIONS = 10
 """Revolutions that a member is averaged over at least: chaos takes some to be seen."""
 
 LARGEST_FAILURE = 0.1

@@ -1,5 +1,7 @@
 """What a file of kind ``identify`` says, in lines for the terminal and the page."""
 
+from pathlib import Path
+
 import numpy as np
 import xarray as xr
 
@@ -21,13 +23,17 @@ def lines(content: xr.Dataset) -> list[Line]:
     return [*found, *_growth(content), *_advice(content)]
 
 
+def _short(name: object) -> str:
+    """A scene path without its first table, so that a terminal has room for what is said of it."""
+    return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
+
+
 def _records(content: xr.Dataset) -> list[Line]:
     found = []
     for k, record in enumerate(content["record"].to_numpy()):
-        several = content.sizes["record"] > 1
+        before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
         for u, name in enumerate(content["unknown"].to_numpy()):
-            label = f"{name}, {record}" if several else str(name)
-            found.append(Line(label, interval(content, k, u)))
+            found.append(Line(_short(name), before + interval(content, k, u)))
     share = content["coverage"].to_numpy()
     shown = " and ".join(f"{one:.0%}" for one in share)
     factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
@@ -63,12 +69,14 @@ def _growth(content: xr.Dataset) -> list[Line]:
     for u, name in enumerate(content["unknown"].to_numpy()):
         unit = str(content["unit"].to_numpy()[u])
         low, middle, high = (quantity(float(one) * DAY, unit, 2) for one in content["rate"][:, u])
-        found.append(Line(f"growth of {name}", f"{middle} per day (95 % interval {low} to {high})"))
+        found.append(
+            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high})")
+        )
         if "limit" in content.attrs:
             days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
-            found.append(Line(f"{name} at {limit} in", text))
+            found.append(Line(f"time to {limit}, {_short(name)}", text))
     return found
 
 
@@ -90,7 +98,7 @@ def _advice(content: xr.Dataset) -> list[Line]:
                 f"{quantity(float(width), unit, 2)} ({count})"
                 for width, count in zip(widths, counts, strict=True)
             )
-            parts.append(f"{unknown} ± {shown}")
+            parts.append(f"{_short(unknown)} ± {shown}")
         found.append(Line(f"by {name}", f"{'; '.join(parts)} revolutions"))
     return found
 

@@ -137,6 +137,7 @@ KINDS = {
     ),
     "chaos": _kind("Sensitivity of the designs to initial conditions", columns.CHAOS),
     "contributions": _kind("Contributions to the scatter of designs", columns.CONTRIBUTIONS),
+    "worst": _kind("Worst case of designs", columns.WORST),
     "claims": _kind("Claims of the paper, tested on these results", columns.CLAIMS),
     "readings": _kind("Designs of the paper under interpretations of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),
@@ -150,7 +151,7 @@ KINDS = {
 
 
 FURTHER_DIMS = {
-    *("body", "point", "pin", "wave", "angle", "mode"),
+    *("body", "point", "pin", "wave", "angle", "mode", "guide"),
     *("record", "particle", "feature", "candidate", "revolutions"),
 }
 """Coordinates that only some files have."""

@@ -14,7 +14,6 @@ from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail
-from hpcclear.statistics.random.replicates import Estimate, student
 
 SMOOTH = 0.1
 """Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
@@ -48,17 +47,13 @@ def goal_value(
         found = replicates.exceedance(values, goal.limit, confidence)
     else:
         mean, deviation = replicates.moments(values)
-        return _symmetric(mean if goal.statistic == "mean" else deviation, confidence)
+        one = mean if goal.statistic == "mean" else deviation
+        return GoalValue(one.value, *replicates.limits(one, confidence), one.shifts)
     return GoalValue(found.value, found.lower, found.upper, found.shifts)
 
 
-def _symmetric(one: Estimate, confidence: float) -> GoalValue:
-    reach = one.error * student(confidence, one.freedom) if one.freedom > 0 else np.nan
-    return GoalValue(one.value, one.value - reach, one.value + reach, one.shifts)
-
-
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
-    """Half-width of its limits that is asked for, and whether it is relative; a formula is known."""
+    """Half-width of its confidence interval that is requested, and whether it is relative; a formula is known."""
     if goal.statistic == "mean":
         return accuracy.mean, True
     if goal.statistic == "deviation":
@@ -71,9 +66,10 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
-    """Whether its limits are as narrow as asked for."""
+def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
+    """Whether its limits are as narrow as asked for, or as a part of that."""
     share, relative = wanted(goal, accuracy)
+    share *= part
     half = (one.upper - one.lower) / 2.0
     return bool(half <= share * (abs(one.value) if relative else 1.0))
 

@@ -57,7 +57,7 @@ def lost(effects, work, par, joint, touch, forces, i, W):
 
 @lane_function
 def store_contact(effects, work, par, joint, touch, forces, direction, i, W):
-    """Write down what effects ask for of a contact; `touch` and `forces` as of `lost`, `direction`: of the normal."""
+    """Write down what effects require of a contact; `touch` and `forces` as of `lost`, `direction`: of the normal."""
     _, rate, sliding = touch
     normal, tangential = forces
     nx, ny = direction
@@ -101,7 +101,7 @@ def force_that_wears(threshold, par, joint, normal, i, W):
 
 @lane_function
 def store_rate(flag, work, row, value, i, W):
-    """Write down a rate that an effect asks for."""
+    """Write down a rate that an effect requires."""
     if flag is not None:
         work[(at.RATE_NOW + row) * W + i] = value
 

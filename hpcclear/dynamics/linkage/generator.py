@@ -207,7 +207,7 @@ class _Generator:
         self.losses.append(loss)
 
     def _frame(self, contact: Contact) -> str:
-        """What a geometry asks for besides: the unit vector from a guide's line to the face, or cosines and sines of the
+        """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
         angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
         if isinstance(contact.joint, Slide):
@@ -451,7 +451,7 @@ class _Generator:
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
     def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
-        """Moment of a drive: what is given, or what the prescribed angle asks for."""
+        """Moment of a drive: what is given, or what the prescribed angle requires."""
         column = Column("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]
