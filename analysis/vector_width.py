@@ -15,9 +15,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from numba import config
-
 from hpcclear.base import width
+from hpcclear.base.code_folder import chosen_folder
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
@@ -66,7 +65,7 @@ def main() -> None:
     if options.serve:
         return serve()
     print(provenance("", "")["processor"])
-    if width.features(Path(config.CACHE_DIR)) is None:
+    if width.features(Path(chosen_folder())) is None:
         print("no vectors of 512 bits here: nothing to choose")
         return None
     print(f"the trial takes {width.faster()} bits")
