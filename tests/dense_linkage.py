@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from dense_mechanism import touching
+from dense_mechanism import Touch, touching
 
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -59,9 +59,17 @@ def turned(vector, angle):
     return [vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c]
 
 
+CORNERS = {
+    "front_left": (1, 1),
+    "front_right": (1, -1),
+    "back_left": (-1, 1),
+    "back_right": (-1, -1),
+}
+
+
 @dataclass
 class Contact:
-    """Laws of one joint with clearance."""
+    """Laws of one contact."""
 
     factor: Any  # 1 + damping as a function of the penetration rate
     friction: Any  # friction over normal force as a function of the sliding speed
@@ -151,22 +159,41 @@ class Dense:
             J[:, k + 2] = -(where[1] - q[k + 1]), where[0] - q[k]
         return J
 
+    def touches(self, joint, q):
+        """Names of a joint's contacts, and where each touches (`Touch`)."""
+        if isinstance(joint, m.Clearance):
+            journal, bearing = (np.array(self.place(q, place), float) for place in joint.places)
+            yield joint.name, touching(joint, journal - bearing, bearing)
+            return
+        middle, on_line = (np.array(self.place(q, place), float) for place in joint.places)
+        line = self.angle(q, joint.line) + joint.angle
+        r, face = joint.corner_radius, 0.5 * joint.height + joint.clearance
+        for name, (ahead, left) in CORNERS.items():
+            arm = (ahead * (0.5 * joint.length - r), left * (0.5 * joint.height - r))
+            corner = middle + np.array(turned(arm, self.angle(q, joint.point)))
+            n = left * np.array(turned((0.0, 1.0), line))  # towards the face
+            gap = (corner - on_line) @ n + r - face
+            depth = max(gap, 0.0)
+            where = corner + (r - 0.5 * depth) * n
+            yield f"{joint.name}.{name}", Touch(gap, depth, n, np.array([-n[1], n[0]]), where)
+
     def contact(self, joint, laws, q, v):
-        """Generalised forces of one contact."""
-        centre_j, speed_j, _ = self.motion_of(q, v, joint.journal)
-        centre_b, speed_b, _ = self.motion_of(q, v, joint.bearing)
-        gap, depth, n, t, where = touching(joint, centre_j - centre_b, centre_b)
-        on_j, on_b = (
-            self.point_on(q, m.split(place)[0], where) for place in (joint.journal, joint.bearing)
+        """Generalised forces of a joint's contacts."""
+        return sum(
+            self.pressed(joint, one, touch, laws, q, v) for one, touch in self.touches(joint, q)
         )
-        rate = (speed_j - speed_b) @ n
+
+    def pressed(self, joint, name, touch, laws, q, v):
+        gap, depth, n, t, where = touch
+        on_j, on_b = (self.point_on(q, m.split(place)[0], where) for place in joint.places)
+        rate = n @ (on_j - on_b) @ v
         sliding = t @ (on_j - on_b) @ v
         elastic = laws.active * joint.stiffness * depth**1.5
         normal = max(elastic * laws.factor(rate), 0.0)
         tangential = normal * laws.friction(sliding)
         force = normal * n + tangential * t  # on the bearing
         loss = (normal - elastic) * rate + tangential * sliding
-        self.seen[joint.name] = {
+        self.seen[name] = {
             "gap": gap, "normal": normal, "rate": rate, "loss": loss, "elastic": elastic * rate,
         }  # fmt: skip
         return (on_b - on_j).T @ force
@@ -245,6 +272,20 @@ class Dense:
         return solution[: self.n]
 
 
+def loose(dense, joint):
+    """Functions of the coordinates: how far a slider is off its line, and its tilt."""
+
+    def offset(q):
+        (x, y), (bx, by) = (dense.place(q, place) for place in joint.places)
+        dx, dy = turned((1.0, 0.0), dense.angle(q, joint.line) + joint.angle)
+        return dx * (y - by) - dy * (x - bx)
+
+    def tilt(q):
+        return dense.angle(q, joint.point) - dense.angle(q, joint.line) - joint.angle
+
+    return offset, tilt
+
+
 def assembled(dense, guess, t, eccentricities):
     """Coordinates near a guess that meet the constraints and put journals where they are asked to be."""
     q = np.array(guess, float)
@@ -257,8 +298,15 @@ def assembled(dense, guess, t, eccentricities):
             (a, _, Ja), (b, _, Jb) = (
                 dense.motion_of(q, np.zeros(dense.n), place) for place in joint.places
             )
-            rows.append(a - b - e)
-            jacobians.append(Ja - Jb)
+            if isinstance(joint, m.Clearance):
+                rows.append(a - b - e)
+                jacobians.append(Ja - Jb)
+                continue
+            # across and tilt, by differences small enough for Newton's method
+            for row, asked in zip(loose(dense, joint), e, strict=True):
+                rows.append([row(q) - asked])
+                slopes = [(row(q + h) - row(q - h)) / 2e-6 for h in 1e-6 * np.eye(dense.n)]
+                jacobians.append([slopes])
         c = np.concatenate(rows)
         if np.abs(c).max() < 1e-15:
             break

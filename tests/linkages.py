@@ -1,6 +1,7 @@
 """Twenty linkages for the tests, as data: engines, four-bars, presses, a shaper, parallel robots."""
 
 import math
+from dataclasses import replace
 
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
@@ -11,11 +12,13 @@ from hpcclear.dynamics.linkage.parts import (
     Force,
     GuideFriction,
     Harmonic,
+    LooseSlide,
     Revolute,
     Slide,
     Spring,
     Torque,
     TorqueDrive,
+    split,
 )
 
 MOTOR = ConstantSpeed("motor", "crank", 40.0)
@@ -228,6 +231,29 @@ def held_frame(*open_pins):
     )
 
 
+def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
+    """A mechanism whose named guides have clearance; what they guide then turns, and needs an inertia."""
+    loose = {
+        j.name: LooseSlide(
+            j.name, j.point, j.line, j.angle, None, 2e-4, length, height, radius, 2e9
+        )
+        for j in mechanism.joints
+        if j.name in names
+    }
+    bodies = []
+    for body in mechanism.bodies:
+        points = dict(body.points)
+        for joint in loose.values():
+            own, point = split(joint.point)
+            if own == body.name:
+                points |= joint.corners(points[point])
+        guided = len(points) > len(body.points)
+        inertia = 3e-5 if guided and not body.inertia else body.inertia
+        bodies.append(replace(body, points=points, inertia=inertia))
+    joints = tuple(loose.get(j.name, j) for j in mechanism.joints)
+    return replace(mechanism, bodies=tuple(bodies), joints=joints)
+
+
 RUB = GuideFriction(0.15, 0.1)
 PUSH = (Force("push", "slider.top", (-30.0, 7.0)), Torque("twist", "rod", 0.3))
 
@@ -255,4 +281,8 @@ LINKAGES = {
     "two stages": two_stage("o23"),
     "turning slide": turning_slide("o2"),
     "held frame": held_frame("o2"),
+    "slider-crank, loose guide": loosened(slider_crank("o23", tilt=0.4, offset=0.01, off=0.003), "guide"),
+    "quick-return, loose slot": loosened(quick_return(), "slot"),
+    "two stages, both loose": loosened(two_stage(), "guide", "feed"),
+    "turning slide, loose": loosened(turning_slide("o2"), "arm"),
 }  # fmt: skip

@@ -15,6 +15,7 @@ from commands import CHEAP, SCENE, overrides, run, sample, warm_command
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.names import designs_in
 from hpcclear.scene import load_scene
 from hpcclear.scene.paths import flatten
 
@@ -390,8 +391,8 @@ def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     _, output = result
     content, timing = output.read_bytes(), output.with_suffix(".timing.nc").read_bytes()
     good = dataset.read(output, "samples")
-    names, records = tuple(dataset.designs(good)), dataset.records(good)
-    values = list(dataset.designs(good).values())
+    names, records = tuple(designs_in(good)), dataset.records(good)
+    values = list(designs_in(good).values())
     dice, path, parts = random.Random(count), tmp_path / "x.nc", tmp_path / "parts"
     key = {"command": "sample"}
     checkpoint = Checkpoint(parts, key, names=names, interval=1e9)

@@ -30,7 +30,7 @@ def check_rates(dense, work, v):
     """Gaps, forces and powers of a text against the dense model's."""
     seen, first = dense.seen, at.RATE_NOW + 1000
     loss = seen["guide_loss"]
-    for k, joint in enumerate(dense.mechanism.clearances):
+    for k, joint in enumerate(dense.mechanism.contacts):
         expected = [seen[joint.name][name] for name in ("gap", "normal", "rate")]
         got = work[FREE + 20 * k : FREE + 20 * k + 3]
         np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-12)
@@ -75,7 +75,7 @@ def test_accelerations_and_rates_equal_the_dense_model(name, cartesian, hoist):
         a, work = lane(states[0], states[1], t)
         np.testing.assert_allclose(a, states[2], rtol=1e-10, atol=1e-10 * np.abs(expected).max())
         check_rates(dense, work, v)
-        touched += any(dense.seen[joint.name]["normal"] > 0 for joint in mechanism.clearances)
+        touched += any(dense.seen[joint.name]["normal"] > 0 for joint in mechanism.contacts)
     assert touched or len(mechanism.clearances) < 2
 
 

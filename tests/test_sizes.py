@@ -198,6 +198,3 @@ def test_lanes_begin_where_a_line_of_the_cache_does():
         lanes = Lanes(problem_of(scene_with()), width)
         assert lanes._block.work.ctypes.data % 64 == 0
         assert (lanes._block.work == 0.0).all()
-
-
-# ---- loops that are written out --------------------------------------------------------------------

@@ -228,8 +228,8 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("hpcclear.results.dataset._versions", lambda: "numba 0.1"),
-        ("hpcclear.results.dataset._processor", lambda: "another one"),
+        ("hpcclear.results.provenance._versions", lambda: "numba 0.1"),
+        ("hpcclear.results.provenance._processor", lambda: "another one"),
     ],
 )
 def test_statistics_go_on_only_with_the_same_versions_and_processor(

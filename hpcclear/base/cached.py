@@ -9,7 +9,6 @@ itself where it compiles.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from types import MethodType
 from typing import Any
 
@@ -44,7 +43,7 @@ def _prepare() -> None:
     asked_width()  # refused if it is none, also where the user names the processor to Numba, and it says nothing
     chosen = config.CPU_FEATURES
     if config.ENABLE_AVX and config.CPU_NAME is None and chosen is None:
-        chosen = features(Path(chosen_folder()))
+        chosen = features()
     with _set("CPU_FEATURES", chosen):
         cpu_target.target_context.codegen()
 

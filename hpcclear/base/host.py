@@ -1,4 +1,4 @@
-"""What only some operating systems offer, with what takes its place elsewhere: the one module that asks for it.
+"""What only some operating systems offer, with what takes its place elsewhere: the one module that requires it.
 
 Linux has all of it, macOS most; native Windows has none of the modules that are loaded here, so each is loaded where it is
 called.

@@ -1,7 +1,8 @@
-"""Short loops written out before they are compiled: ``for k in written_out(ITEMS)`` becomes one copy of its body for each item.
+"""Short loops that a text has written out: ``for k in written_out(ITEMS)`` becomes one copy of its body for each item.
 
 The compiler vectorises neither a loop over coordinates inside a loop over lanes nor a short one of its own (104 ns against
-62 ns for a bank of eight states). `hpcclear.base.one_text` writes the copies; Python runs the loop as it stands.
+62 ns for a bank of eight states), and a loop over rates must test of each whether its effect is on, which is pruned only
+where it is written out (`base.text.statements`).
 """
 
 from collections.abc import Iterable
@@ -11,5 +12,5 @@ Item = TypeVar("Item")
 
 
 def written_out(items: Iterable[Item]) -> Iterable[Item]:
-    """Mark a loop over `items`, an expression of module globals, to be written out."""
+    """Mark a loop over `items`, an expression of module globals or a range of numbers that are known."""
     return items

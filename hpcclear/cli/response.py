@@ -94,8 +94,9 @@ def _between_instants(response: xr.Dataset) -> list[str]:
     if "transient_turns" not in response.attrs:
         return []
     return [
-        f"{one.joint}, at an angle not known; largest stored value of the averaged revolutions "
-        f"{quantity(one.stored, 'N')} at {np.degrees(one.angle):.0f} deg"
+        f"{one.joint}: angle not known; largest stored value of the averaged revolutions "
+        f"{quantity(one.stored, 'N')} at {np.degrees(one.angle):.0f} deg. "
+        "Raise output.instants_per_revolution"
         for one in bearings.bearings(response)
         if one.between_instants
     ]

@@ -1,4 +1,4 @@
-"""Bristles of friction as a scene asks for them: their tolerances, and whether there is room for them."""
+"""Bristles of friction as a scene requires them: their tolerances, and whether there is room for them."""
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at

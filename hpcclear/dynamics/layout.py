@@ -38,13 +38,18 @@ class Effects(NamedTuple):
     journal_waves: Any = None
     threshold: Any = None  # of the pressure, below which nothing wears
     profile: Any = None  # where around these the sliding work is done
-    films: tuple[Any, ...] = (None,) * MAX_JOINTS  # names of laws of oil films, by places of joints
+    films: Any = None  # names of laws of oil films, by places of joints
     objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
     @property
     def latched(self) -> Any:
-        """Whether the normal force's law asks for the impact speed, which is latched."""
+        """Whether the normal force's law requires the impact speed, which is latched."""
         return None if self.contact is None else self.contact.latched
+
+    @property
+    def film_at(self) -> tuple[Any, ...]:
+        """The same, of scenes without oil as well."""
+        return self.films or (None,) * MAX_JOINTS
 
     @property
     def bristled(self) -> Any:
@@ -211,7 +216,7 @@ RATES = WRITTEN.end
 
 
 class Integrated(NamedTuple):
-    """A rate that every stepper integrates over a step: its row, and the effect that asks for it. A gap's absolute value is
+    """A rate that every stepper integrates over a step: its row, and the effect that requires it. A gap's absolute value is
     integrated, and the error of its integral, relative to the clearance times a revolution, counts for the step's."""
 
     rate: int
@@ -436,7 +441,7 @@ class Queue(NamedTuple):
 
 class Method(NamedTuple):
     """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
-    which a stepper asks for what is compiled apart from it (`stepping.special`)."""
+    which a stepper calls what is compiled apart from it (`stepping.special`)."""
 
     settings: Any
     weights: Any

@@ -154,7 +154,7 @@ def coordinate_count(scene: Scene) -> int:
 def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
-    count = len(scene.clearance_joints())
+    count = len(scene.contact_labels())
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
@@ -177,7 +177,7 @@ def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)) if films else None,
     )
 
 
@@ -200,7 +200,7 @@ def implicit_method(scene: Scene) -> str:
     if method == "auto" and scene.modes:
         mechanism = planar.linkage_of(scene).mechanism
         if max(bending.swings(mechanism)) * float(planar.period_of(mechanism)) > bending.STIFF:
-            return "always"  # there is no stretch of the motion in which they are slow
+            return "always"  # there is no segment of the motion in which they are slow
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
     if scene.films() or scene.bristles:

@@ -25,6 +25,7 @@ from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -84,7 +85,7 @@ def simulate(
     scene : Scene
     objective : Objective, optional
         What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
-        need ``numerics.responses`` where there is no study that asks for them.
+        need ``numerics.responses`` where there is no study that requires them.
     copy : int
         Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
         motion without clearance has no copies.
@@ -101,7 +102,7 @@ def simulate(
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do, or for time series that do not fit into memory.
+        If the scene requires what the kernel cannot do, or time series that do not fit into memory.
     """
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
@@ -139,7 +140,7 @@ def simulate(
             **reported,
             **widest_contact(scene, Numbers(scene, None), reported["peak_contact_force"]),
         },
-        dataset.provenance(named.text or named.to_toml(), named.hash, named.references)
+        provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
         | {"transient_turns": scene.numerics.transient_revolutions * _turns(scene)}
@@ -155,6 +156,8 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     found = planar_labels(scene, linkage_of(scene).mechanism)
     if scene.modes:
         found["mode"] = scene.mode_labels
+    if scene.guides():
+        found["guide"] = scene.guides()
     if scene.template is None and not coordinate_count(scene):
         found["pin"] = pins_of(scene)
     return found or None
@@ -189,7 +192,7 @@ SPUN_UP, SHOWN = 20, 10
 
 
 def _steady(scene: Scene) -> Records | None:
-    """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
+    """The record (1,) of the steady mean, where the scene names a target error; None: it requires a segment."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
     return evaluate_records(scene, ITSELF)

@@ -81,7 +81,7 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked of an effect screening."""
+    """What is required of an effect screening."""
 
     effects: int
     tolerance: float

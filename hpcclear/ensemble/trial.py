@@ -194,7 +194,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
-        """What is asked of the effect screening.
+        """What is required of the effect screening.
 
         Raises
         ------
@@ -244,7 +244,7 @@ class Trial:
             self._limit(records)
         scene, labels = self.variant(asked.off).scene, self.scene.joint_labels
         force = np.full((len(records), len(labels)), np.nan)
-        for name in scene.clearance_joints():
+        for name in scene.contact_labels():
             place = scene.joint_labels.index(name)
             force[:, labels.index(name)] = records["peak_contact_force"][:, place]
         shape = (asked.last - asked.first, self.drawn.size)

@@ -41,7 +41,7 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     if spans := _spans(together):
         text += f"; they differ in {spans}"
     same = [
-        f"{labels.words(one)} = {labels.quantity(float(one[0]), str(one.attrs['units']))}"
+        f"{labels.words(one)} = {labels.value(one[0])}"
         for one in labels.design_variables(together)
         if float(one.max()) - float(one.min()) <= SAME * abs(float(one.max()))
     ]

@@ -219,8 +219,8 @@ def _areas_in(text: str) -> dict[str, float]:
     """`_projected_areas` of a scene's text, which is asked for by each table of a page."""
     scene = scene_of_text(text, "scene")
     areas = {}
-    for joint in scene.clearance_joints():
-        one = scene.clearance_joint(joint)
+    for joint in scene.pins():
+        one = scene.pin(joint)
         path = length_path(one)
         if path is not None:
             length: float = attrgetter(path)(one)

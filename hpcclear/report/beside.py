@@ -8,18 +8,17 @@ import xarray as xr
 
 from hpcclear.base.objectives import ENDS
 from hpcclear.report import alike
-from hpcclear.report.answer import (
+from hpcclear.report.answer import bounds, unit_of
+from hpcclear.report.figures import labels
+from hpcclear.report.merit import (
     USUAL,
     VERDICTS,
-    bounds,
     counts,
     goals_of,
     is_plain,
     recommended,
     standing,
-    unit_of,
 )
-from hpcclear.report.figures import labels
 
 BESIDE = ("original", *ENDS[:2])
 """Designs that every case with a baseline has."""

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
 
 HALF_WIDTH = 1.96
@@ -44,6 +45,29 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     )
 
 
+def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+    """Yield the worst case of a design, and where it lies; none where it was not searched."""
+    found, name = files.get("worst"), str(best["design"].item())
+    if found is None or name not in found["design"].to_numpy():
+        return
+    own = found.sel(design=name)
+    value, corner = float(own["worst"]), float(own["worst_corner"])
+    if not np.isfinite(value):
+        return
+    unit = str(own["worst"].attrs["units"])
+    there = zip(*(own[key].to_numpy() for key in ("input", "at", "input_unit")), strict=True)
+    listed = ", ".join(f"{n} = {quantity(float(x), str(u))}" for n, x, u in there if np.isfinite(x))
+    text = f"f reaches at least {quantity(value, unit)} within the bounds of the random inputs, at {listed} "
+    text += f"({int(own['tried'])} simulations"
+    if np.isfinite(corner) and corner < value:
+        text += f"; {quantity(corner, unit)} at their corners"
+    text += "; a search finds a lower limit)"
+    loose = [str(one) for one in own["input"].to_numpy()[own["without_bounds"].to_numpy() != 0]]
+    if loose:
+        text += f". Without bounds, taken within three standard deviations: {', '.join(loose)}"
+    yield Line("worst case", text)
+
+
 def _listed(parts: list[tuple[str, float, float]]) -> str:
     """Names with shares and half-widths, the largest first."""
     ranked = sorted(parts, key=lambda one: -one[1])
@@ -54,4 +78,4 @@ def share(name: str, value: float, half_width: float) -> str:
     """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
     if value > half_width:
         return f"{name} {value:.0%} ± {half_width:.1%}"
-    return f"{name} 0% within {max(half_width, value):.1%}"
+    return f"{name} below {max(half_width, value):.1%}"

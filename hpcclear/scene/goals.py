@@ -3,14 +3,16 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+import numpy as np
+from pydantic import PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
-from hpcclear.scene.formula import FormulaError, names_in
+from hpcclear.scene.formula import FormulaError, names_in, value_of
 from hpcclear.scene.laws import check_objective
 from hpcclear.scene.plugged import PluginName
 
@@ -34,9 +36,9 @@ class ObjectiveName(PluginName):
 class Goal(Table):
     """A statistic of f over the random inputs of a case, or a formula of its design variables."""
 
-    statistic: Literal["mean", "deviation", "quantile", "exceedance"] | None = None
+    statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
     """Of f: its mean, its standard deviation, the value that a share `level` of all machines stays below, or the share of them
-    beyond `limit`."""
+    beyond `limit`. "cost": what the study variables say that the design costs."""
     formula: str | None = None
     """In place of a statistic: numbers, design variables (SI, as designed) and + - * / **, such as "m2 + m3"."""
     level: Level | None = None
@@ -66,6 +68,23 @@ class Goal(Table):
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
         return self
 
+    _priced: tuple[Any, ...] = PrivateAttr(())
+
+    def priced_by(self, variables: tuple[Any, ...]) -> None:
+        """Take the study variables that say what a design costs."""
+        self._priced = variables
+
+    @property
+    def exact(self) -> bool:
+        """Whether the design alone says what it is."""
+        return self.formula is not None or self.statistic == "cost"
+
+    def of_design(self, design: Mapping[str, Any]) -> Array:
+        """Its value for a design, or for designs (n,), SI by name; of what is `exact`."""
+        if self.formula is not None:
+            return value_of(self.formula, design)
+        return np.asarray(sum(one.costs(design[one.name]) for one in self._priced), dtype=float)
+
     @property
     def order(self) -> float:
         """Of a quantile: the share that stays below."""
@@ -86,7 +105,7 @@ class Goal(Table):
             return f"{100 * self.order:g}th percentile of f"
         if self.statistic == "exceedance":
             return f"share with f above {self.limit:g} {unit}"
-        return f"{self.statistic} of f"
+        return "cost" if self.statistic == "cost" else f"{self.statistic} of f"
 
     def unit(self, unit: str) -> str:
         """Its unit, "" for none known, by the `unit` of f."""

@@ -20,6 +20,8 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.fits import with_clearance
+from hpcclear.scene.guides import SliderGuide
+from hpcclear.scene.materials import Material
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
@@ -51,6 +53,8 @@ class Slider(Table):
 
     mass: Mass
     """kg."""
+    inertia: Inertia | None = None
+    """Moment of inertia about its pin, where its mass centre is, kg m2; needed where its guide has clearance."""
 
 
 class Mechanism(Table):
@@ -136,17 +140,10 @@ class TorqueDrive(Table):
 Drive = Annotated[ConstantSpeed | TorqueDrive, Field(discriminator="kind")]
 
 
-class Material(Table):
-    """Elastic constants of one contact partner."""
-
-    youngs_modulus: Annotated[float, Quantity("Pa", above=0)]
-    """Pa."""
-    poisson_ratio: Annotated[float, Quantity("", above=-1, most=0.5)]
-    """Poisson's ratio."""
-
-
 def length_path(joint: Any) -> str | None:
-    """Where a joint with clearance has the length of its bearing: its own entry, or that of its film or wear."""
+    """Where a joint with clearance has its length at right angles to the plane: its own entry, or that of its film or wear."""
+    if joint.corners:
+        return None if joint.width is None else "width"
     if joint.length is not None:
         return "length"
     parts = ("film", "wear")
@@ -169,6 +166,9 @@ def check_journal(joint: Any) -> None:
 
 class ClearanceJoint(Table):
     """A journal that moves freely in a bearing larger than itself by the clearance."""
+
+    geometry: ClassVar[str] = "pin_in_bearing"
+    corners: ClassVar[tuple[str, ...]] = ()
 
     kind: Literal["clearance"]
     clearance: PositiveLength
@@ -229,9 +229,11 @@ Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]
 
 
 class Joints(Table):
-    """The two joints that may have clearance; the joint of crank and frame is ideal."""
+    """The joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
     """O12."""
     rod_slider: Joint
     """O23."""
+    guide: SliderGuide | None = None
+    """The slider's guide; left out, it has no clearance."""

@@ -107,6 +107,11 @@ class StudyRun:
     ) -> None:
         """Write a result file, with what made it; `attributes` where that differs from the study's."""
         content.attrs.update(self.checkpoint.attributes | dict(attributes or {}))
+        for variable in self.study.variables:
+            if variable.rows and variable.name in content:
+                content[variable.name].attrs["options"] = "; ".join(
+                    row.name for row in variable.rows
+                )
         with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, self.directory / name)
 

@@ -15,6 +15,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
+from hpcclear.study import loads as loading
 
 
 class Simulations:
@@ -87,7 +88,7 @@ class Simulations:
                     "a model leaves it out, but the entries that it drives differ in the scene",
                     "Make these entries equal, or give each a variable of its own",
                 )
-            columns.append(np.full(len(values), numbers.pop()))
+            columns.append(np.full(len(values), self.scene.baseline(variable.name)))
         points = Points(
             tuple(variable.name for variable in self._variables),
             np.column_stack(columns),
@@ -97,13 +98,22 @@ class Simulations:
         return points
 
     def records(self, points: Points, stage: str) -> np.ndarray:
-        """Outcome records of designs in all study variables, in their order.
+        """Outcome records of designs in all study variables, in their order; of load cases that which counts.
 
         Raises
         ------
         InputError
             If every single simulation failed.
         """
+        loads = self.scene.required_study.load_cases
+        if loads is not None:
+            cases = len(loads.options or ())
+            return loading.combined(
+                self._records(loading.at_all(loads, points), stage), loads.over, cases
+            )
+        return self._records(points, stage)
+
+    def _records(self, points: Points, stage: str) -> np.ndarray:
         style = self.style if len(points) >= 1000 else "quiet"
         progress = Progress(stage, style=style)
         records = sample_points(

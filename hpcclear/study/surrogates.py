@@ -1,12 +1,14 @@
 """Surrogates of the objective: fitted, checked on fresh points, written and read back."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import Box, box
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
@@ -79,6 +81,7 @@ def fit_all(run: StudyRun) -> Result:
             method=method,
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
+            snap=partial(snapped, run.study, names, model=True),
         )
         result |= _packed(k, model) | _checked(run, k, model)
     return result
@@ -118,7 +121,7 @@ def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
     unit = unit_lhs(_tests(run.study), len(names), rng)
-    points = model.lower + unit * (model.upper - model.lower)
+    points = snapped(run.study, names, model.lower + unit * (model.upper - model.lower), model=True)
     truth = run.simulations.values(names, points, f"{STAGE} check")
     reached = accuracy(truth, model.predict(points))
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}

@@ -1,4 +1,4 @@
-"""Designs through the true dynamics: mean, deviation and 95th percentile with confidence limits."""
+"""Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
 from collections.abc import Sequence
 
@@ -6,11 +6,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
+from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
+from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
@@ -20,7 +21,10 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
+"""Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
+
+CLOSE = 0.25
+"""Of the accuracy asked for: what a constraint that is not decided is known to, unless it is a probability."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
@@ -58,33 +62,40 @@ def _of_design(
     )
 
 
-def simulate(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str = "verification"
-) -> Result:
-    """Moments of designs, by as many simulations as the study asks for.
+def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
+    """The first points of each replicate of designs, (2, replicates, values) each as `doubled` returns them."""
+    made = [np.empty((2, REPLICATES, 0))] * len(choices)
+    length = first_length(run.study.verification)
+    lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
+    return made
 
-    Returns
-    -------
-    dict of arrays over the designs
-        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
-        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
-        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
-        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+
+def made(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    before: Sequence[Array] = (),
+    wanted: MomentAccuracy | None = None,
+) -> list[Array]:
+    """f of designs, by as many simulations as the study asks for, (2, replicates, values) each as `doubled` returns them.
 
     Raises
     ------
     InputError
         If all simulations fail.
     """
-    settings = run.study.verification
+    settings, stage = run.study.verification, "verification"
     if settings.draws is not None:
-        made = _values(run, choices, stage, purpose, settings.draws, None)
-    else:
-        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-        made = contested(run, choices, made, stage, purpose)
-    return results_of(run, choices, made) | explained(run, choices, made, purpose)
+        return drawn(run, choices, stage, stage, settings.draws)
+    length, most = first_length(settings), settings.most_samples
+    found = doubled(run, choices, stage, stage, length, most, before, wanted)
+    return contested(run, choices, found, stage, stage)
+
+
+def drawn(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, count: int
+) -> list[Array]:
+    """f of so many independent draws of designs, (2, draws, 1) each."""
+    return _values(run, choices, stage, purpose, count, None)
 
 
 def explained(
@@ -141,7 +152,7 @@ def doubled(
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
     from."""
     wanted = wanted or run.study.wanted
     made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
@@ -243,18 +254,16 @@ def _values(
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation."""
-    return tuple(
-        one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
-        for one in moments(values)
-    )  # type: ignore[return-value]
+    """Half-widths of the limits of mean and deviation, the larger one where they are not symmetric."""
+    mean, deviation = (limits(one, settings.confidence)[1] - one.value for one in moments(values))
+    return mean, deviation
 
 
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is a probability or
-    quantile that surely keeps or breaks its threshold, as one of `many` designs."""
+    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
+    breaks its threshold, as one of `many` designs. What does neither is known better, so that it may be decided."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))
     reach = _reaches(settings, values)
@@ -262,32 +271,44 @@ def _accurate(
     good &= reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
     if good and not case.plain:
         good = all(
-            goals.accurate(goal, one, wanted)
-            or (goal in case.kept and verdicts.settled(goal, values, choice, settings, many))
+            goals.accurate(goal, one, wanted, 1.0 if goal.statistic == "exceedance" else CLOSE)
+            or verdicts.settled(goal, values, choice, settings, many)
+            if isinstance(goal, Constraint)
+            else goals.accurate(goal, one, wanted)
             for goal, one in zip(
                 (*case.goals, *case.kept), _goals(run, choice, values), strict=True
             )
-            if goal.statistic in ("quantile", "exceedance")
-            and not (goal in case.kept and verdicts.rare(goal, settings))
+            if not goal.exact and not (goal in case.kept and verdicts.rare(goal, settings))
         )
     return bool(good)
 
 
 def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
-    """What a design comes to in all that its case asks."""
+    """What a design comes to in all that its case requires."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
     return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
 def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
-    """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
+    """Mean, standard deviation, percentile and all that the case of a design requires, from values of f (replicates, n)."""
     percentile = quantile(values, QUANTILE, run.study.verification.confidence)
     return [*moments(values), percentile, *_goals(run, choice, values)]
 
 
 def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """Results of designs from their simulations, shape (2, replicates, values) each; as `simulate` returns it."""
+    """All that is told of designs from what was made of them, shape (2, replicates, values) each.
+
+    Returns
+    -------
+    dict of arrays over the designs
+        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
+        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
+        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
+        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+    """
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     held = max(len(case.kept) for case in run.study.cases)

@@ -1,4 +1,4 @@
-"""Whether designs satisfy their constraints: decided by confidence limits that hold for all designs and all looks at once.
+"""Whether designs satisfy their constraints: decided by confidence intervals that hold for all designs and all looks at once.
 
 A design is verified by more and more simulations, and is looked at after each doubling; and the best of those that satisfy a
 constraint is recommended. Both favour luck: of many designs near a threshold some look better than they are. So each verdict
@@ -142,7 +142,7 @@ def usual(goal: Constraint, settings: Verification) -> float:
 
 
 def usual_in(case: Case, settings: Verification) -> int:
-    """Simulations of a design for the rare failures of its case, beside those for mean and deviation."""
+    """Simulations of a design for the rare failures of its case, beside those for mean and standard deviation."""
     return int(sum(usual(one, settings) for one in case.kept if rare(one, settings)))
 
 

@@ -1,4 +1,6 @@
-"""What generated motions call besides the contact law: springs, harmonic drives, loops that fold flat. Plain, of arrays."""
+"""What generated motions call besides the contact law: springs, drives, tables, loops that fold flat. Plain, of arrays."""
+
+import math
 
 import numpy as np
 
@@ -44,3 +46,14 @@ def held_inverse(pivot, scale):
     """
     least = _FLAT * scale
     return 1.0 / (pivot if pivot < least else least)
+
+
+@lane_function
+def table_value(table, first, cells, angle):
+    """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell, from `first` on."""
+    turns = angle * (0.5 / math.pi)
+    x = (turns - math.floor(turns)) * cells
+    cell = min(int(x), cells - 1)
+    s = x - cell
+    k = first + 4 * cell
+    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))

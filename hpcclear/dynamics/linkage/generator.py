@@ -19,7 +19,7 @@ from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
-    Clearance,
+    Contact,
     Drive,
     Force,
     Revolute,
@@ -125,8 +125,8 @@ class _Generator:
         self.load_power = ZERO
 
     def motion(self) -> Motion:
-        for k, joint in enumerate(self.mechanism.clearances):
-            self._contact(k, joint)
+        for k, contact in enumerate(self.mechanism.contacts):
+            self._contact(k, contact)
         for load in self.mechanism.loads:
             self._load(load)
         torques = [self._torque(d) for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
@@ -170,43 +170,53 @@ class _Generator:
         """First line of the text: what is integrated, where the contacts are, what closes loops."""
         parts = {
             "coordinates": [one.name for one in self.forest.coordinates],
-            "joints with clearance": [joint.name for joint in self.mechanism.clearances],
+            "joints with clearance": [contact.name for contact in self.mechanism.contacts],
             "constraints": [row.name for row in self.constraints],
         }
         said = "; ".join(f"{what} {', '.join(names)}" for what, names in parts.items() if names)
         return f'"""Accelerations of lane i: {said}."""'
 
     # ---- forces ---------------------------------------------------------------------------------
-    def _contact(self, k: int, joint: Clearance) -> None:
-        """Call of the contact law: journal relative to bearing, and what the joint exerts on both."""
-        kin, write = self.kinematics, self.writer
-        journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
+    def _contact(self, k: int, contact: Contact) -> None:
+        """Call of a contact's geometry: journal relative to bearing, and what the contact exerts on both."""
+        kin, write, geometry = self.kinematics, self.writer, contact.geometry
+        places = contact.journal, contact.bearing
+        journal, bearing = map(kin.point, places)
         apart = kin.position(journal) - kin.position(bearing)
         moving = kin.velocity(journal) - kin.velocity(bearing)
-        spins = [kin.end_spin(place) for place in joint.places]
+        spins = [kin.end_spin(place) for place in places]
         relative = [write.text(term) for term in (*apart, *moving, *spins)]
         if not (self.on.friction or self.on.waves):  # which are no faster by it
             relative[4:] = ["None" if spin is ZERO else write.text(spin) for spin in spins]
-        turns = self._turns(joint) if self.on.waves else "None"
-        made = [write.fresh(f"{name}_{joint.name}") for name in ("fx", "fy", "mb", "mj", "loss")]
-        call = (
-            f"joint_force(effects, work, par, joints[{k}], ({', '.join(relative)}), {turns}, i, W)"
-        )
+        frame = self._frame(contact)
+        made = [write.fresh(f"{name}_{contact.word}") for name in ("fx", "fy", "mb", "mj", "loss")]
+        given = f"joints[{k}], ({', '.join(relative)}), {frame}"
+        call = f"{geometry.function}(effects, work, par, {given}, i, W)"
         write.line(f"{', '.join(made)} = {call}")
         fx, fy, on_bearing, on_journal, loss = map(named, made)
         force = Vector(fx, fy)
-        self.balance.pulls += [Pull(joint.journal, -force), Pull(joint.bearing, force)]
-        if self.on.friction or self.on.waves:
-            for place, moment in ((joint.journal, on_journal), (joint.bearing, on_bearing)):
-                body, point = split(place)
-                if body != GROUND:
-                    self.balance.twists.append(Twist(body, moment, point))
+        self.balance.pulls += [Pull(contact.journal, -force), Pull(contact.bearing, force)]
+        turning = self.on.friction or self.on.waves
+        for place, moment, turned in (
+            (contact.journal, on_journal, turning),
+            (contact.bearing, on_bearing, turning or geometry.along_a_line),
+        ):
+            body, point = split(place)
+            if turned and body != GROUND:
+                self.balance.twists.append(Twist(body, moment, point))
         self.losses.append(loss)
 
-    def _turns(self, joint: Clearance) -> str:
-        """Cosines and sines of the angles of both bodies of a joint, which waves around its surfaces turn with."""
+    def _frame(self, contact: Contact) -> str:
+        """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
+        angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
-        for place in (joint.bearing, joint.journal):
+        if isinstance(contact.joint, Slide):
+            across = self.closing.direction(contact.joint).across()
+            found = [*(across if contact.side > 0.0 else -across)]
+            return f"({', '.join(self.writer.text(term) for term in found)})"
+        if not self.on.waves:
+            return "None"
+        for place in (contact.bearing, contact.journal):
             body = split(place)[0]
             own = Vector(ONE, ZERO) if body == GROUND else kin.offset(body)
             found += [*kin.rotated(self.forest.frames[body], own)]
@@ -400,7 +410,7 @@ class _Generator:
         terms = (*kin.rotated(frame, kin.offset(body)), kin.spin(frame))
         drive = ", ".join(map(self.writer.text, terms))
         whole = self.on.objective == "whole"
-        for k in range(1 if whole else len(self.mechanism.clearances)):
+        for k in range(1 if whole else len(self.mechanism.contacts)):
             row = self.rows.rates + at.OBJECTIVE_RATES
             joint = "None" if whole else f"joints[{k}]"
             where = f"{row}" if whole else f"({self.rows.rates} + joints[{k}].objective_rate)"
@@ -441,7 +451,7 @@ class _Generator:
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
     def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
-        """Moment of a drive: what is given, or what the prescribed angle asks for."""
+        """Moment of a drive: what is given, or what the prescribed angle requires."""
         column = Column("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]

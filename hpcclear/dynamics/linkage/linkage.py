@@ -42,7 +42,7 @@ class Linkage:
     bristled : bool
         Whether friction in the joints with clearance has bristles, whose coordinates come before the mechanism's.
     places : tuple of int, optional
-        Places of the joints with clearance among the kernel's, one behind the other; from the first on by default.
+        Places of the contacts among the kernel's, one behind the other; from the first on by default.
 
     Raises
     ------
@@ -55,9 +55,9 @@ class Linkage:
         objective: str = "", bristled: bool = False, waves: bool = False, places: tuple[int, ...] | None = None,
     ) -> None:  # fmt: skip
         self.mechanism = mechanism
-        self._bristles = len(mechanism.clearances) if bristled else 0
+        self._bristles = len(mechanism.contacts) if bristled else 0
         self.cartesian, self.follow = cartesian, follow
-        self.places = tuple(range(len(mechanism.clearances))) if places is None else places
+        self.places = tuple(range(len(mechanism.contacts))) if places is None else places
         self._on = On(
             friction=friction, gravity=gravity, follow=follow, objective=objective, waves=waves
         )
@@ -167,7 +167,7 @@ class Linkage:
     def energies(
         self, par: Array, q: Array, v: Array, time: Array | float, gravity: Array | float
     ) -> tuple[Array, Array, Array]:
-        """Kinetic energy and that of gravity and of bending (m,), J, and eccentricities (joints, 2, m).
+        """Kinetic energy and that of gravity and of bending (m,), J, and eccentricities (contacts, 2, m).
 
         Arguments as of `Poses.at`.
         """

@@ -229,7 +229,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
-    """The status of a scene whose own linkage cannot turn, and what to say; None of one that can, or is not to be judged.
+    """The status of a scene whose own linkage cannot turn, and what to say; None for one that can, or is not to be judged.
 
     Raises
     ------

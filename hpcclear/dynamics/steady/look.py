@@ -11,7 +11,7 @@ from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import effort as given
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import PERTURBATION, perturbed, separation
-from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
 from hpcclear.dynamics.views import Outcome, Start
 
 SHARE = 0.1
@@ -78,7 +78,7 @@ def _growth(apart: list[float]) -> float:
         return float(np.log(distance[far] / distance[0]) / far)
 
 
-def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mean | float, float]]:
+def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mean | float, float]]:
     """Four copies, revolution by revolution: a regular motion's mean, or the tolerance at which it turned out irregular."""
     sample = effort.sample
     rtol = min((SHARE_LATCHED if sample.latched else SHARE) * target, LOOSEST)
@@ -102,7 +102,7 @@ def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mea
         step = _judge(history, sample, target, rtol)
         if isinstance(step, _Found) and (step.final or spent):
             return effort.mean(
-                regime=step.regime, limit=step.limit, outcomes=step.outcomes, stretch=1, rtol=rtol,
+                regime=step.regime, limit=step.limit, outcomes=step.outcomes, segment=1, rtol=rtol,
                 met=step.met, period=step.period, growth=growth,
             ), growth  # fmt: skip
         if step == "irregular" or spent:

@@ -32,7 +32,7 @@ def count_up(count, flag):
 
 @lane_function
 def choose_step(work, par, free, W):
-    """Take the step asked for, or what is left of the revolution (prescribed speed)."""
+    """Take the step requested, or what is left of the revolution (prescribed speed)."""
     if free:
         for i in range(W):
             work[at.STEP * W + i] = work[at.NEXT_STEP * W + i]

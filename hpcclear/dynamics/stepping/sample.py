@@ -127,7 +127,7 @@ def finish(lane, W, n, status, block, queue, settings):
 
 @lane_event
 def finish_averages(lane, W, work, book, out, slot, settings):
-    """Means, peak and deviation over the averaged revolutions; those of rates that no effect asked for mean nothing."""
+    """Means, peak and deviation over the averaged revolutions; those of rates that no effect requested mean nothing."""
     time = book[at.TIME_SUM * W + lane]
     if time > 0.0:
         for r in range(RATES + int(settings[PROFILED])):

@@ -90,7 +90,7 @@ def stop_at_impacts(rules, lane, W, work, settings):
 
 @lane_event
 def cut(lane, W, work, fraction):
-    """Reject the step and ask for a part of it; all of it where an impact stands at its start."""
+    """Reject the step and request a part of it; all of it where an impact stands at its start."""
     h = work[at.STEP * W + lane]
     work[at.ACCEPT * W + lane] = 0.0
     work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h

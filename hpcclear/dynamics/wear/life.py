@@ -1,7 +1,7 @@
 """One life: dynamics at a state of wear, a jump of many revolutions at the rate found there, dynamics again.
 
 The state is the sliding work that each worn joint has done, w; a revolution adds E(w) to it, which copies of a
-simulation tell with Student's limits. A jump of n revolutions is taken twice: at once, w + n E(w), and in two halves, w + n/2
+simulation tell with Student's confidence intervals. A jump of n revolutions is taken twice: at once, w + n E(w), and in two halves, w + n/2
 E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). What is gone on from is twice the one less the other, w + n E_half,
 whose error is an order smaller, so the difference is a bound and no estimate of it. f is judged at the same states:
 how far it is, half-way, from the middle between both ends. What limits of E and f leave open is not held against a jump.

@@ -7,10 +7,11 @@ import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike, beside
-from hpcclear.report.answer import constraints, is_plain
+from hpcclear.report.answer import constraints
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
+from hpcclear.report.merit import is_plain
 
 _SIMULATED = (
     ("mean_true", "mean of f"),

@@ -52,7 +52,7 @@ def rank_correlation(first: Array, second: Array) -> float:
 
 
 def order_interval(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
-    """95 % confidence limits of a quantile of independent values, by their order alone; NaN where too few values are known.
+    """95 % confidence intervals of a quantile of independent values, by their order alone; NaN where too few values are known.
 
     Parameters
     ----------

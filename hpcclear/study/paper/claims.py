@@ -237,7 +237,7 @@ class ResponseEvidence:
 
 
 def _reach(values: Array) -> float:
-    """Half-width of the limits of a mean over copies and their intervals, (copies, intervals): Student's t of the copies
+    """Half-width of the confidence interval of a mean over copies and their intervals, (copies, intervals): Student's t of the copies
     where they disagree, of the intervals where motion is regular and copies are one."""
     reaches = [
         student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x))

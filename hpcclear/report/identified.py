@@ -1,0 +1,122 @@
+"""What a file of kind ``identify`` says, in lines for the terminal and the page."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures.labels import quantity
+from hpcclear.report.spread import Line
+
+NARROWED = 0.8
+"""Share of the bounds' range above which an interval says next to nothing."""
+
+TOGETHER = 0.9
+"""Correlation of two unknowns from which on the signal gives their combination only."""
+
+DAY = 86400.0
+
+
+def lines(content: xr.Dataset) -> list[Line]:
+    """Return what was identified: unknowns by record, fit, growth, and what to measure."""
+    found = _records(content) if "interval" in content else []
+    return [*found, *_growth(content), *_advice(content)]
+
+
+def _short(name: object) -> str:
+    """A scene path without its first table, so that a terminal has room for what is said of it."""
+    return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
+
+
+def _records(content: xr.Dataset) -> list[Line]:
+    found = []
+    for k, record in enumerate(content["record"].to_numpy()):
+        before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
+        for u, name in enumerate(content["unknown"].to_numpy()):
+            found.append(Line(_short(name), before + interval(content, k, u)))
+    share = content["coverage"].to_numpy()
+    shown = " and ".join(f"{one:.0%}" for one in share)
+    factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
+    text = f"{shown} of simulated machines lie in their 95 % interval; widened by {factor}"
+    return [*found, Line("calibration", text)]
+
+
+def interval(content: xr.Dataset, record: int, unknown: int) -> str:
+    """Return the median and interval of an unknown, no more digits than the interval allows; a bound where it is cut off."""
+    unit = str(content["unit"].to_numpy()[unknown])
+    if not int(content["explained"][record]):
+        return "not identified: the model does not explain this signal"
+    low, middle, high = (float(one) for one in content["interval"][record, unknown])
+    least, most = (float(content[f"prior_{end}"][unknown]) for end in ("lower", "upper"))
+    span = most - least
+    if high - low > NARROWED * span:
+        return (
+            f"not determined: 95 % interval {quantity(low, unit, 2)} to {quantity(high, unit, 2)}"
+        )
+    digits = 2 if high - low > 0.05 * abs(middle) else 3
+    ends = f"{quantity(low, unit, digits)} to {quantity(high, unit, digits)}"
+    if low - least < 0.02 * span:
+        return f"at most {quantity(high, unit, digits)} (95 % interval {ends}; the lower bound cuts it off)"
+    if most - high < 0.02 * span:
+        return f"at least {quantity(low, unit, digits)} (95 % interval {ends}; the upper bound cuts it off)"
+    return f"{quantity(middle, unit, digits)} (95 % interval {ends})"
+
+
+def _growth(content: xr.Dataset) -> list[Line]:
+    if "rate" not in content:
+        return []
+    found = []
+    for u, name in enumerate(content["unknown"].to_numpy()):
+        unit = str(content["unit"].to_numpy()[u])
+        low, middle, high = (quantity(float(one) * DAY, unit, 2) for one in content["rate"][:, u])
+        found.append(
+            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high})")
+        )
+        if "limit" in content.attrs:
+            days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
+            limit = quantity(float(content.attrs["limit"]), unit)
+            text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
+            found.append(Line(f"time to {limit}, {_short(name)}", text))
+    return found
+
+
+def _days(seconds: float) -> str:
+    return f"{seconds / DAY:.2g} days" if np.isfinite(seconds) else "never"
+
+
+def _advice(content: xr.Dataset) -> list[Line]:
+    if "expected_half_width" not in content:
+        return []
+    found = []
+    counts = content["revolutions"].to_numpy()
+    for k, name in enumerate(content["candidate"].to_numpy()):
+        parts = []
+        for u, unknown in enumerate(content["unknown"].to_numpy()):
+            unit = str(content["unit"].to_numpy()[u])
+            widths = content["expected_half_width"][k, :, u].to_numpy()
+            shown = ", ".join(
+                f"{quantity(float(width), unit, 2)} ({count})"
+                for width, count in zip(widths, counts, strict=True)
+            )
+            parts.append(f"{_short(unknown)} ± {shown}")
+        found.append(Line(f"by {name}", f"{'; '.join(parts)} revolutions"))
+    return found
+
+
+def warnings(content: xr.Dataset) -> list[str]:
+    """Return what makes a result doubtful."""
+    found = []
+    for k, record in enumerate(content["record"].to_numpy() if "record" in content else ()):
+        doubt = float(content["doubt"][k])
+        worst = str(content["feature"].to_numpy()[int(content["worst_feature"][k])])
+        if not int(content["explained"][k]):
+            found.append(
+                f"this model does not explain the signal {record} (standard score {doubt:.1f}); the feature that fits "
+                f"least is the {worst}. Check the scene, the sensor and the bounds"
+            )
+        related = float(content["correlation"][k])
+        if abs(related) > TOGETHER:
+            found.append(
+                f"the first two unknowns are not identified separately from {record}: their correlation is {related:.2f}"
+            )
+    return found
