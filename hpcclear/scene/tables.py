@@ -272,8 +272,13 @@ class SceneTables(Table):
         return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
 
     def responses_asked(self) -> bool:
-        """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        return self.numerics.responses or self.objective.needs_responses
+        """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or what the study asks of it."""
+        further = () if self.study is None else self.study.further
+        return (
+            self.numerics.responses
+            or self.objective.needs_responses
+            or any(self.objective_named(name).needs_responses for name in further)
+        )
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""

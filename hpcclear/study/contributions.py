@@ -50,7 +50,8 @@ def of_designs(
     names = inputs_of(run)
     result: Result = {name: np.full((len(choices), len(names)), np.nan) for name in _NAMES}
     result["unexplained"], result["unexplained_error"] = np.full((2, len(choices)), np.nan)
-    for row, (choice, (f, _)) in enumerate(zip(choices, made, strict=True)):
+    for row, (choice, one) in enumerate(zip(choices, made, strict=True)):
+        f = one[0]
         random = run.study.case(choice.case).random
         points = drawn(choice, f)
         own = [points.names.index(name) for name in random]

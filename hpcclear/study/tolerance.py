@@ -119,14 +119,14 @@ def _taken(
     scene, left = stricter(run.scene)
     wanted = run.study.wanted
     asked = HIDDEN * np.array([wanted.mean, wanted.deviation])
-    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
+    strict = [truth.nothing(run)] * len(designs)
     tight, open_, length = run.of(scene), list(rows), _first(min(made[k].shape[2] for k in rows))
     found: dict[int, Taken] = {}
     while open_:
         more = length - strict[open_[0]].shape[2]
         truth.lengthen(tight, designs, strict, open_, "pairs", "verification", more)
         for k in open_:
-            bias, error = _apart(run, designs[k], made[k][0][:, :length], strict[k][0])
+            bias, error = _apart(run, designs[k], made[k][:, :, :length], strict[k])
             bias, error = bias / (1.0 - left), error / (1.0 - left)
             # a bias that chance may have made counts for nothing
             found[k] = np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0))), error
@@ -137,7 +137,7 @@ def _taken(
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (k, replicates, n), and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
     one, other = (
         truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
