@@ -192,9 +192,17 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
         ("objective", f"{study.objective}: {scene.objective.words}"),
     ]
     for variable in study.variables:
-        if variable.range is not None:
+        loads = "" if variable.over is None else f" (load cases, {_over(variable.over)})"
+        if variable.rows:
+            named = ", ".join(row.name for row in variable.rows)
+            rows.append((variable.name, f"{named}: {variable.words}{loads}"))
+        elif variable.values is not None:
+            listed = ", ".join(turning(one, variable.unit) for one in variable.values)
+            rows.append((variable.name, f"{listed}: {variable.words}{loads}"))
+        elif variable.range is not None:
             lower, upper = (turning(end, variable.unit) for end in variable.range)
-            rows.append((variable.name, f"{lower} to {upper}: {variable.words}"))
+            step = "" if variable.step is None else f" by {turning(variable.step, variable.unit)}"
+            rows.append((variable.name, f"{lower} to {upper}{step}: {variable.words}"))
         elif variable.ratio is not None:
             rows.append(
                 (
@@ -222,6 +230,12 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
         text += f"simulated first (about {lives.simulations(scene)} simulations)"
         rows.append((f"{row.name} random", text))
     return rows
+
+
+def _over(over: str | tuple[float, ...]) -> str:
+    """How load cases make one f, in words."""
+    weights = "" if over == "worst" else ", ".join(f"{float(one):g}" for one in over)
+    return f"weights {weights}" if weights else "f of the worst"
 
 
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:

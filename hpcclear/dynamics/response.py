@@ -1,5 +1,7 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -149,7 +151,7 @@ def simulate(
         | _reason(scene),
         objective,
         labels,
-        (_dimensions(scene) or {}) | counted,
+        {**(_dimensions(scene) or {}), **counted},
     )
 
 
@@ -256,7 +258,7 @@ def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Ar
 
 def _measured(
     scene: Scene, recording: Recording, turns: Turns, data: dict[str, Array]
-) -> dict[str, Array]:
+) -> dict[str, Any]:
     """Measures of impact and noise of the averaged revolutions, and the coordinates that go with them."""
     problem = recording.problem
     periods, integrals = turns.averaged(problem.transient)

@@ -36,7 +36,9 @@ class GoalValue:
 def goal_value(
     goal: Goal, values: Array, design: Mapping[str, float], confidence: float
 ) -> GoalValue:
-    """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
+    """A goal from values of f, (replicates, values), NaN where failed, and the design in SI; or from those of all responses,
+    (k, replicates, values), of which it takes its own."""
+    values = values[goal.place] if values.ndim == 3 else values
     if goal.exact:
         value = float(goal.of_design(design))
         return GoalValue(value, value, value, np.zeros(len(values)))
@@ -94,14 +96,15 @@ def shortfall(goal: Goal, most: float, values: Array) -> Array:
 def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, float]) -> float:
     """What steers a search to the constraints, from values of f of a design, NaN where failed: as `excess`, but of
     probabilities the shortfall of their index, which is smooth where counts of exceedances are 0 or jump."""
-    known = values[np.isfinite(values)]
-    if kept and len(known) < replicates.FEWEST:
+    values = values if values.ndim == 3 else values[None]
+    known = [own[np.isfinite(own)] for own in (values[one.place] for one in kept)]
+    if any(len(own) < replicates.FEWEST for own in known):
         return np.nan
     found = [
-        float(shortfall(one, one.most, known[None])[0])
+        float(shortfall(one, one.most, own[None])[0])
         if one.statistic == "exceedance"
         else float(excess([one], np.array([[goal_value(one, values, design, 0.95).value]]))[0])
-        for one in kept
+        for one, own in zip(kept, known, strict=True)
     ]
     return max(found, default=-np.inf)
 

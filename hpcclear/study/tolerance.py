@@ -146,9 +146,9 @@ def _sequences(
     made: Sequence[Array],
     rows: Sequence[int],
 ) -> dict[int, Array]:
-    """Points of each scrambling of some designs at the stricter tolerance, (2, replicates, values) each."""
+    """Points of each replicate of some designs at the stricter tolerance, (k, replicates, values) each."""
     asked = HIDDEN * np.array([run.study.wanted.mean, run.study.wanted.deviation])
-    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
+    strict = [truth.nothing(run)] * len(designs)
     open_, length = list(rows), _first(min(made[k].shape[2] for k in rows))
     _, left = stricter(run.scene)
     most = np.inf if run.study.paired else COST * run.simulations.next
@@ -167,16 +167,16 @@ def _sequences(
 
 
 def _known(run: StudyRun, choice: Choice, made: Array, strict: Array, left: float) -> Taken:
-    """What the tolerance takes of a design, from values (2, replicates, n) and the first of them at the stricter one."""
+    """What the tolerance takes of a design, from values (k, replicates, n) and the first of them at the stricter one."""
     _, replicates, length = strict.shape
-    bias, error = _apart(run, choice, made[0][:replicates, :length], strict[0])
+    bias, error = _apart(run, choice, made[:, :replicates, :length], strict)
     bias, error = bias / (1.0 - left), error / (1.0 - left)
     # a bias that chance may have made counts for nothing
     return np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0))), error
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (k, replicates, n), and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
     one, other = (
         truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
