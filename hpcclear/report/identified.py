@@ -35,7 +35,7 @@ def lines(content: xr.Dataset) -> list[Line]:
 
 
 def _short(name: object) -> str:
-    """A scene path without its first table, so that a terminal has room for what is said of it."""
+    """A scene path without its first table, to leave space on a terminal."""
     return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
 
 
