@@ -1,7 +1,7 @@
 """Compiled functions that come from the cache on disk without what only compiling needs.
 
 Before Numba loads machine code it imports its own library for compiled programs: arrays, strings, random numbers, linear
-algebra. That took a third of the start of a command, and code that is compiled already calls none of it. Numba imports it
+algebra. That took a third of the start of a command, and code that is compiled already calls nothing of it. Numba imports it
 itself where it compiles.
 """
 

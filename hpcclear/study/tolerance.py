@@ -2,7 +2,7 @@
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
-tolerance does. That is part of all limits of the case, and the samples have to meet what it leaves of the accuracy.
+tolerance does. All confidence intervals of the case include that, and the samples have to meet what it leaves of the accuracy.
 
 Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
 variance of paired samples).
@@ -39,7 +39,7 @@ ROOM = 0.75
 """Share of an accuracy from which on the tolerance dominates: the samples then have to meet the accuracy by themselves."""
 
 NOTHING = 1e-9
-"""Share of the mean below which a deviation is round-off."""
+"""Share of the mean below which a standard deviation is round-off."""
 
 Taken = tuple[Array, Array]
 """Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
@@ -66,13 +66,13 @@ def stricter(scene: Scene) -> tuple[Scene, float]:
 
 
 def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """What `truth.simulate` returns, with what the tolerance takes in all limits.
+    """What `truth.simulate` returns, with what the tolerance takes in all intervals.
 
     Returns
     -------
     dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and standard deviation of the designs of
-        its case, at worst, relative; and to what standard error that is known.
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): largest relative error of mean and standard deviation by the
+        tolerance, of the designs of its case; and its standard error.
     """
     settings, everything = run.study.verification, range(len(designs))
     made = [np.empty((2, REPLICATES, 0))] * len(designs)
@@ -161,7 +161,7 @@ def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
 def _widened(
     run: StudyRun, designs: Sequence[Choice], true: Result, taken: dict[int, Taken]
 ) -> Result:
-    """All limits with what the tolerance takes, the worst of the ends of a case for all its designs."""
+    """All intervals with what the tolerance takes, the worst of the ends of a case for all its designs."""
     true["tolerance"], true["tolerance_error"] = np.zeros((2, len(designs), 2))
     for k, choice in enumerate(designs):
         ends = [one for row, one in taken.items() if designs[row].case == choice.case]

@@ -67,8 +67,8 @@ def simulate(
     -------
     dict of arrays over the designs
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
-        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
+        interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): what the case makes small,
         then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
         and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
         `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
@@ -112,8 +112,8 @@ def first_length(settings: Verification) -> int:
 
 
 def expected(study: Study) -> int:
-    """Simulations of a design, on average: what the deviation of the paper's designs took, whose limits were 1.4 % of it after
-    512 and fell as the power 0.6 of the simulations."""
+    """Simulations of a design, on average: those for the standard deviation of the paper's designs, whose half-width was
+    1.4 % after 512 and fell as the power 0.6 of their number."""
     settings = study.verification
     if settings.draws is not None:
         return settings.draws
@@ -141,8 +141,7 @@ def doubled(
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
-    from."""
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; `before` is continued."""
     wanted = wanted or run.study.wanted
     made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
     many = verdicts.rivals(choices)
@@ -253,7 +252,7 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all intervals are as narrow as requested; a standard deviation that is round-off only is, and so is a probability or
+    """Whether all intervals are as narrow as requested. A standard deviation of round-off is, and so is a probability or
     quantile that significantly keeps or breaks its threshold, as one of `many` designs."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values))

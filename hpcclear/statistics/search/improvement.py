@@ -1,15 +1,15 @@
 """Where to evaluate next, by expected improvement: for objectives that are costly and known with errors.
 
-Where f is rough, no model of f over designs and random inputs together holds, but the roughness averages out in a statistic of f.
+Where f is rough, no model of f over designs and random inputs holds, but the roughness averages out in a statistic of f.
 So each objective gets one Kriging model over designs, with the kernel of Matern and a noise variance near that of the known
 errors: a model that is free to fit noise as ripples finds what flatters it. The next designs are those that are expected
-to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs at a
-time each takes those before it for evaluated, at the value that is expected (Kriging believer).
+to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs
+each takes the earlier ones for evaluated at their expected value (Kriging believer).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
-kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; the sum
-over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
+kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; sum over
+strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
 optimization" (2016), doi:10.1007/978-3-319-29975-4_12; random scalarisations J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10
 (2006), doi:10.1109/TEVC.2005.851274.
 """
@@ -262,8 +262,7 @@ def gain(least: float, mean: Array, deviation: Array) -> Array:
 
 
 def volume(front: Array, mean: Array, deviation: Array) -> Array:
-    """Expected area that independent normal numbers, (n, 2), add to that of points, (k, 2); scaled to the extent of these, up to
-    1.1 times that."""
+    """Expected area that normal numbers, (n, 2), add to that of points, (k, 2), scaled to 1.1 times their extent."""
     points = front[moocore.is_nondominated(front)]
     points = points[np.argsort(points[:, 0])]
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
