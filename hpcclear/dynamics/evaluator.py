@@ -89,8 +89,8 @@ TIGHTEST = 1e-14
 
 COVERAGE = 1.7
 """Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
-holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: intervals that hold as often were
-up to 12 times the error there."""
+holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: equally reliable
+intervals were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this

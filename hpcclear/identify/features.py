@@ -1,4 +1,4 @@
-"""Features of a signal: harmonics, third octaves and their scatter between revolutions; and their most informative combinations.
+"""Features of a signal: harmonics, third octaves, their scatter between revolutions, and the most informative combinations.
 
 A revolution of a chaotic motion does not repeat, so no instant of it is a feature. Means over revolutions are, and the variance
 between revolutions says how well they are known.
