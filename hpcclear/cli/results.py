@@ -33,7 +33,7 @@ UNITS = click.option(
     "units",
     multiple=True,
     metavar="UNIT",
-    help='Unit for all quantities of its kind, such as kN for forces. Repeatable. "SI" gives SI units. Default: those of the scene.',
+    help='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
 )
 
 

@@ -77,7 +77,7 @@ class Problem:
         return snapped(self.scene.required_study, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, objectives); with constraints, how much it breaks them, (n,), besides."""
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
         if self.case.plain:
             return self.objective(designs)
         drawn = self.objective.sampled(designs, self.draws(designs))

@@ -68,8 +68,8 @@ def simulate(
     dict of arrays over the designs
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
+        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
         and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
         `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
 

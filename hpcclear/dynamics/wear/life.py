@@ -3,7 +3,7 @@
 The state is the sliding work that each worn joint has done, w; a revolution adds E(w) to it, which copies of a
 simulation estimate with Student's intervals. A jump of n revolutions is taken twice: at once, w + n E(w), and in two halves,
 w + n/2 E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). The next state is twice the one less the other,
-w + n E_half, whose error is an order smaller, so the difference is a bound and no estimate of it. f is judged at the same states:
+w + n E_half, whose error is an order smaller, so the difference bounds it. f is judged at the same states:
 how far it is, half-way, from the middle between both ends. What the intervals of E and f leave open is not held against a jump.
 
 Where profiles are followed (`relief`), the moments of the work go with it: of what is done in a jump they have the share

@@ -8,8 +8,8 @@ each takes the earlier ones for evaluated at their expected value (Kriging belie
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
-kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; sum over
-strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
+kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; sum
+over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
 optimization" (2016), doi:10.1007/978-3-319-29975-4_12; random scalarisations J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10
 (2006), doi:10.1109/TEVC.2005.851274.
 """
