@@ -16,7 +16,7 @@ from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail
 
 SMOOTH = 0.1
-"""Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
+"""Standard deviations over which an exceedance is smoothed in the search on the surrogate, so that it has a slope near 0."""
 
 
 SHARE_OF_MOST = 0.02
@@ -25,7 +25,7 @@ SHARE_OF_MOST = 0.02
 
 @dataclass(frozen=True)
 class GoalValue:
-    """A goal of a design by direct simulation: value, limits, and what each replicate shifts (r,)."""
+    """An objective or constraint of a design by simulation: value, interval, and what each replicate shifts (r,)."""
 
     value: float
     lower: float
@@ -77,7 +77,7 @@ def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float =
 
 
 def excess(kept: Sequence[Constraint], values: Array) -> Array:
-    """By how much constraints are broken, relative to their limits, the worst of them; (n, constraints) to (n,).
+    """By how much constraints are broken, relative to their thresholds, the worst of them; (n, constraints) to (n,).
 
     At most 0 where all are kept, NaN where one is not known, -inf without any.
     """
@@ -110,7 +110,7 @@ def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, floa
 
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
-    """A goal of designs by the surrogate: f at draws of the random inputs (n, s), design variables (n,) each; to (n,)."""
+    """An objective or constraint by the surrogate, (n,): f at draws of the random inputs (n, s), design variables (n,) each."""
     if goal.exact:
         return np.broadcast_to(goal.of_design(designs), len(drawn))
     if goal.statistic == "mean":
@@ -139,7 +139,7 @@ def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
 
 
 def names_of(case: Case, unit: str) -> tuple[str, ...]:
-    """The goals of a case in words, by the unit of f."""
+    """Objectives and constraints of a case in words, by the unit of f."""
     return tuple(goal.words(unit) for goal in case.goals)
 
 

@@ -1,4 +1,4 @@
-"""Robust optimisation of each case: fronts of mean and standard deviation, or of what it makes small, and their ends (eqs. 19 to 23)."""
+"""Robust optimisation of each case: fronts of mean and standard deviation or others, and their ends (eqs. 19 to 23)."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -82,7 +82,7 @@ class Problem:
         return snapped(self.scene.required_study, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, goals); with constraints, how much it breaks them, (n,), besides."""
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
         if self.case.plain:
             return self.objective(designs)
         draws = self.draws(designs)
@@ -250,7 +250,7 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
     Returns
     -------
     dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + goals): design coordinates, and what the case makes
+        For case number k ``front_k`` (runs, solutions, d + objectives): design coordinates, and what the case makes
         small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
     """
     result: Result = {}
@@ -321,7 +321,7 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
         return problem.searched(problem.physical(coordinates))
 
     def nearest(coordinates: Array) -> Array:
-        """Where no design keeps the constraints: how much it breaks them, and the first goal."""
+        """Where no design keeps the constraints: how much it breaks them, and the first objective."""
         values, broken = function(coordinates)
         return np.column_stack([broken, values[:, 0]])
 

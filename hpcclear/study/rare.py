@@ -79,7 +79,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
-    """Limits by weighted samples in place of those by plain ones; both together where they do not meet."""
+    """Intervals by weighted samples in place of those by plain ones; both together where they do not meet."""
     lower, upper = (true[name][row, column] for name in names)
     apart = one.lower > upper or one.upper < lower
     ends = (min(one.lower, lower), max(one.upper, upper)) if apart else (one.lower, one.upper)

@@ -2,7 +2,7 @@
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
-tolerance does. That is added to all limits of the case. Where a study asks for an accuracy (`study.accuracy`), the samples have
+tolerance does. That is added to all confidence intervals of the case. Where a study requires an accuracy (`study.accuracy`), the samples have
 to meet what it leaves; elsewhere pairs take no more than `COST` of the study.
 
 Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
@@ -46,7 +46,7 @@ DRAWS = 16
 """Of independent draws pairs are made of one in so many, and of so many at least."""
 
 NOTHING = 1e-9
-"""Share of the mean below which a deviation is round-off."""
+"""Share of the mean below which a standard deviation is round-off."""
 
 Taken = tuple[Array, Array]
 """Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
@@ -78,13 +78,13 @@ def stricter(scene: Scene) -> tuple[Scene, float]:
 
 
 def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """What `truth.results_of` returns, with what the tolerance takes in all limits.
+    """What `truth.results_of` returns, with what the tolerance takes in all confidence intervals.
 
     Returns
     -------
     dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and standard deviation of the designs of
-        its case, at worst, relative; and to what standard error that is known.
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): largest relative error of mean and standard deviation by the
+        tolerance, of the designs of its case; and its standard error.
     """
     made = truth.begun(run, designs) if run.study.paired else truth.made(run, designs)
     taken: dict[int, Taken] = {}
@@ -200,7 +200,7 @@ def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
 def _widened(
     run: StudyRun, designs: Sequence[Choice], true: Result, taken: dict[int, Taken]
 ) -> Result:
-    """All limits with what the tolerance takes, the worst of the ends of a case for all its designs."""
+    """All intervals with what the tolerance takes, the worst of the ends of a case for all its designs."""
     true["tolerance"], true["tolerance_error"] = np.zeros((2, len(designs), 2))
     for k, choice in enumerate(designs):
         ends = [one for row, one in taken.items() if designs[row].case == choice.case]

@@ -123,8 +123,8 @@ def first_length(settings: Verification) -> int:
 
 
 def expected(study: Study) -> int:
-    """Simulations of a design, on average: what the deviation of the paper's designs took, whose limits were 1.4 % of it after
-    512 and fell as the power 0.6 of the simulations."""
+    """Simulations of a design, on average: those for the standard deviation of the paper's designs, whose half-width was
+    1.4 % after 512 and fell as the power 0.6 of their number."""
     settings = study.verification
     if settings.draws is not None:
         return settings.draws
@@ -263,7 +263,7 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
+    """Whether all confidence intervals are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
     breaks its threshold, as one of `many` designs. What does neither is known better, so that it may be decided."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values[0]))
