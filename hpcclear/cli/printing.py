@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -259,12 +260,15 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         ("run time per sample", f"{each * 1e3:.3g} ms on one core ({DEFAULT_LANES} per batch)"),
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
     ]
-    if scene.study is not None:
-        rows.append(("hpcclear sample", _all(scene.study.samples, each)))
-    if scene.study is not None and scene.study.cases:
-        from hpcclear.study.extent import samples_of
+    if scene.study is None:
+        return rows
+    whole = 0
+    if scene.study.cases:
+        from hpcclear.study.forecast import expected
 
-        whole = sum(samples_of(scene).values())
+        whole, each = expected(scene, partial(evaluate_records, scene), each)
+    rows.append(("hpcclear sample", _all(scene.study.samples, each)))
+    if whole:
         rows.append(("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear plan"))
     return rows
 
