@@ -19,8 +19,8 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.scene import Scene
 
 LARGEST_STEP = 1.0 / 64.0

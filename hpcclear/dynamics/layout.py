@@ -1,6 +1,6 @@
 """Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
 
-Rows are numbered as they are declared (`hpcclear.dynamics.rows`). They are module constants, so the compiler sees every
+Rows are numbered as they are declared (`hpcclear.base.numbered`). They are module constants, so the compiler sees every
 distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
 """
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.numbered import Rows
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
-from hpcclear.dynamics.rows import Rows
 
 TURN = 6.283185307179586  # rad
 
