@@ -172,7 +172,7 @@ def solve_turn(
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
     here, start, period = one.anew(), one.start.copy(), float(one.named.period)
     effects = one.problem.effects
-    joints = [j for j, on in enumerate(at.open_of(effects)) if on is not None]
+    joints = list(at.places_of(effects))
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
     end = np.inf if one.free else period
     limit = 20.0 * period if one.free else end

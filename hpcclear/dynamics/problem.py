@@ -206,10 +206,10 @@ def implicit_method(scene: Scene) -> str:
     if scene.films() or scene.bristles:
         return "stiff"  # a film's damping grows beyond all bounds as it gets thin; bristles give way within a micrometre
     par = Parameters(parameters(scene)[0])
-    is_open = np.array([flag is not None for flag in at.open_of(effects_of(scene))])
+    there = list(at.places_of(effects_of(scene)))
     ramp = par.steepness * (scene.effects.friction.law != "none")
     stiff = (ramp >= STIFF_RAMP) | (par.damping >= STIFF_DAMPING)
-    return "stiff" if (stiff & is_open).any() else "never"
+    return "stiff" if stiff[there].any() else "never"
 
 
 def _cells_of_curves(
