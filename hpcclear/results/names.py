@@ -152,7 +152,7 @@ KINDS = {
 
 FURTHER_DIMS = {
     *("body", "point", "pin", "wave", "angle", "mode", "guide"),
-    *("record", "particle", "feature", "candidate", "revolutions"),
+    *("revolution", "order", "band", "record", "particle", "feature", "candidate", "revolutions"),
 }
 """Coordinates that only some files have."""
 

@@ -162,9 +162,12 @@ class SceneTables(Table):
         if contact is not None and contact.has_length:
             for name in clearance:
                 if length_path(self.clearance_joint(name)) is None:
+                    entry, part = (
+                        ("width", "slider") if name in self.guides() else ("length", "bearing")
+                    )
                     raise invalid(
-                        f'the contact geometry "{contact.geometry}" needs the length of the bearing',
-                        'Add length = "20 mm" or so to the joint', f"{self.joint_key(name)}.length", None,
+                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
+                        f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
                     )  # fmt: skip
         if clearance and self.effects.contact is None:
             raise invalid(
@@ -273,7 +276,12 @@ class SceneTables(Table):
 
     def responses_asked(self) -> bool:
         """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        return self.numerics.responses or self.objective.needs_responses
+        asked = self.numerics.responses or self.objective.needs_responses
+        return asked or self.impacts_asked()
+
+    def impacts_asked(self) -> bool:
+        """Whether each sample records measures of impact and noise: ``numerics.impacts``, or the study's objective."""
+        return self.numerics.impacts or self.objective.needs_impacts
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""

@@ -59,6 +59,8 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         "contact_force": seen.rates.force[:, joints],
         "friction_force": seen.rates.friction[:, joints],
     }
+    frame = {"frame_force_x": seen.rates.frame_x, "frame_force_y": seen.rates.frame_y}
+    frame = frame if joints and not scene.modes else {}
     held = {}
     if linkage.cartesian:
         held["constraint_violation"] = violation(linkage, seen.q.T, seen.v.T, seen.turn_time)
@@ -66,6 +68,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         **moved(scene, mechanism, places, phase, acceleration),
         **{name: at_places(scene, columns) for name, columns in of_joints.items()},
         "crank_moment": seen.rates.drive_moment,
+        **frame,
         **balance_series(stored, seen.works),
         **mode_series(scene.modes, seen.q, seen.v, strain),
         **guide_series(mechanism, pose),
