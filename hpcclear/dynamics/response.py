@@ -266,7 +266,7 @@ def _measured(
     joints = len(scene.joint_labels)
     first = problem.transient + 1
     return {
-        "revolution": np.arange(first, first + len(periods)),
+        "revolution": np.arange(float(first), first + len(periods)),
         **measured(periods, integrals, cycle, joints, rigid=not scene.modes),
         **spectral(data, periods, scene.output.instants_per_revolution),
     }
