@@ -6,6 +6,7 @@ Public names are loaded when they are first used, so that importing the package 
 - `simulate`: one response as an xarray Dataset
 - `evaluate`: many designs as an xarray Dataset, in this process
 - `map`, `bifurcation`, `wear`, `effects`: what the commands of these names make, as xarray Datasets
+- `identify`: unknown clearances of a machine from a measured signal
 - `grid`: a map of a file, its entries as coordinates
 - `plan`: what a run will cost
 - `run_study`, also as `study`: the whole study, on as many processes as are wanted
@@ -18,6 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import hpcclear.identify as identify
     import hpcclear.study as study
     from hpcclear.accuracy.plan import plan
     from hpcclear.base.objectives import Objective
@@ -43,6 +45,7 @@ __all__ = [
     "effects",
     "evaluate",
     "grid",
+    "identify",
     "load_scene",
     "map",
     "plan",
@@ -65,6 +68,7 @@ _HOME = {
     "effects": "study.api",
     "evaluate": "ensemble.api",
     "grid": "results.grids",
+    "identify": "identify",
     "map": "ensemble.functions",
     "plan": "accuracy.plan",
     "study": "study",

@@ -269,7 +269,7 @@ def _company(
 
 
 def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -> None:
-    """Simulate points over and over until asked to stop."""
+    """Simulate points over and over until stopped."""
     evaluator = Evaluator(
         load_scene(content, trust=True).with_({"numerics.target_error": None}), points
     )

@@ -21,7 +21,7 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import cite, ensembles, laws, results, scenes, studies
+from hpcclear.cli import cite, ensembles, identify, laws, results, scenes, studies
 from hpcclear.cli.options import is_root, say
 from hpcclear.ranks.launcher import end_job, is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
@@ -48,6 +48,7 @@ _ON_RANKS = (
     ensembles.bifurcation,
     ensembles.wear,
     ensembles.effects,
+    identify.identify,
     studies.run,
     studies.accuracy,
     studies.plan,
@@ -60,7 +61,7 @@ def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
     Input files (scenes) are TOML; results are NetCDF files that open in xarray. To use more than one
-    core, start sample, run, wear, map, effects, accuracy or plan under mpiexec:
+    core, start sample, run, wear, map, bifurcation, effects, identify, accuracy or plan under mpiexec:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """

@@ -4,9 +4,11 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
+from hpcclear.results.identified import IDENTIFY
 from hpcclear.results.rows import Column, Columns
 
 
@@ -83,6 +85,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
     "together": _meanings("independent", "correlated"),
+    "explained": _meanings("not_explained", "explained"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
 FURTHER |= {FORMER[name]: FURTHER[name] for name in FORMER if name in FURTHER}
@@ -134,12 +137,34 @@ KINDS = {
     ),
     "chaos": _kind("Sensitivity of the designs to initial conditions", columns.CHAOS),
     "contributions": _kind("Contributions to the scatter of designs", columns.CONTRIBUTIONS),
+    "worst": _kind("Worst case of designs", columns.WORST),
     "claims": _kind("Claims of the paper, tested on these results", columns.CLAIMS),
     "readings": _kind("Designs of the paper under interpretations of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),
     "wear": _kind("Service lives of a mechanism with wear", columns.WEAR, ("life",)),
     "effects": _kind("Effect screening: effects that can be neglected", columns.EFFECTS),
+    "identify": _kind("Unknowns of a machine from measured signals", IDENTIFY),
     "timing": _kind("Run time of the ranks", columns.TIMING),
     "accuracy": _kind("Accuracy against run time", columns.ACCURACY),
 }
 """Every result file by its kind."""
+
+
+FURTHER_DIMS = {
+    *("body", "point", "pin", "wave", "angle", "mode", "guide"),
+    *("revolution", "order", "band", "record", "particle", "feature", "candidate", "revolutions"),
+}
+"""Coordinates that only some files have."""
+
+ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
+
+LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
+
+
+def designs_in(samples: xr.Dataset) -> dict[str, np.ndarray]:
+    """The design variables in a dataset, each of the shape of its dimensions, by their names or scene paths."""
+    return {
+        str(variable.attrs["scene_path"]): variable.to_numpy()
+        for variable in samples.data_vars.values()
+        if variable.attrs.get("role") == ROLE
+    }

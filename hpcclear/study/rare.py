@@ -79,7 +79,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
-    """Limits by weighted samples in place of those by plain ones; both together where they do not meet."""
+    """Intervals by weighted samples in place of those by plain ones; both together where they do not meet."""
     lower, upper = (true[name][row, column] for name in names)
     apart = one.lower > upper or one.upper < lower
     ends = (min(one.lower, lower), max(one.upper, upper)) if apart else (one.lower, one.upper)
@@ -166,22 +166,23 @@ def _together(
     going: Sequence[Generator[Array, Array, None]],
     stage: str,
 ) -> None:
-    """Answer procedures of several designs by f, all they ask for at a time in one batch."""
+    """Answer procedures of several designs by f, all that they request at a time in one batch."""
     wanted = {k: next(one) for k, one in enumerate(going)}
     while wanted:
-        parts = _simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
+        parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
         fresh = {}
         for k, part in zip(wanted, parts, strict=True):
             try:
-                fresh[k] = going[k].send(part)
+                fresh[k] = going[k].send(part[max(asked[k].goal.place - 1, 0)])
             except StopIteration:
                 continue
         wanted = fresh
 
 
-def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
-    """f of designs at standard normals, (n,) each; NaN where it failed, or where inputs so far out make no mechanism."""
-    rows = [_rows(run, choice, u) for choice, u in where]
+def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
+    """Responses of designs at standard normals, (k, n) each: f, and `Study.further`; NaN where it failed, or where inputs so
+    far out make no mechanism."""
+    rows = [rows_of(run, choice, u) for choice, u in where]
     makes = [_valid(run, names, values) for names, values in rows]
     batches = [
         run.simulations.filled(names, values[good])
@@ -189,14 +190,14 @@ def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str)
     ]
     values = np.concatenate([one.values for one in batches])
     points = Points(batches[0].names, values, batches[0].paths)
-    f = np.empty(0)
+    f = np.empty((1 + len(run.study.further), 0))
     if len(values):
-        f = run.simulations.objective(run.simulations.records(points, stage))
-    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1])
+        f = run.simulations.judged(points, stage)[1]
+    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1], axis=1)
     found = []
     for good, part in zip(makes, parts, strict=True):
-        whole = np.full(len(good), np.nan)
-        whole[good] = part
+        whole = np.full((len(f), len(good)), np.nan)
+        whole[:, good] = part
         found.append(whole)
     return found
 
@@ -214,11 +215,12 @@ def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
     return np.ones(len(values), bool)
 
 
-def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
+def rows_of(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
     """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
     random = run.study.case(choice.case).random
-    moved = offsets(run.scene, random, list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T))
     design = dict(choice.design)
+    chances = list(np.clip(ndtr(u), _LEAST, 1.0 - 2.0 * _LEAST).T)
+    moved = offsets(run.scene, random, chances, choice.design)
     for name, values in moved.items():
         row = run.study.random_input(name)
         centre = design.get(name, run.scene.number(row.paths[0]))

@@ -30,6 +30,7 @@ from hpcclear.study import (
     truth,
     verdicts,
     verification,
+    worst,
 )
 from hpcclear.study.certificate import Extent
 from hpcclear.study.goals import ends_in_all
@@ -48,8 +49,8 @@ class Stage:
     run: Callable[..., Any]
     """Does it, from the run and the results of `needs`; what it returns is its result."""
     needs: tuple[str, ...] = ()
-    """Stages, all of them earlier, whose results it takes: None of one that does not apply. Beside them
-    there are "scene", as it was written, and "extent", which counts what the certificate of effects may take."""
+    """Stages, all of them earlier, whose results it takes: None for one that does not apply. Beside them
+    there are "scene", as it was written, and "extent", which counts what the effect screening may take."""
     applies: Callable[[Scene], bool] = lambda scene: True
     """Whether a study of this scene has it."""
     words: Mapping[str, str] = field(default_factory=dict)
@@ -136,6 +137,11 @@ def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result 
     verification.write(
         run, table, true, models.searched, verified.remarks, printed, over_life or {}
     )
+
+
+def _worst(run: StudyRun, verified: Verified) -> None:
+    choices = verified.table.choices
+    worst.write(run, choices, run.stage("worst", worst.of_designs, choices))
 
 
 def _chaos(run: StudyRun, verified: Verified) -> None:
@@ -230,7 +236,7 @@ STAGES = (
             "optimisation": "search on the surrogate",
             "check": "simulation of its designs",
             "infill": "adaptive refinement of the Pareto front",
-            "edge": "search along constraints on rare failures",
+            "edge": "search along constraints",
         },
         files=("front.nc",), samples=_of_search,
     ),
@@ -248,6 +254,11 @@ STAGES = (
     Stage(
         "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
         needs=("verification",), files=("contributions.nc",),
+    ),
+    Stage(
+        "worst", _worst, needs=("verification",), applies=lambda scene: scene.required_study.worst_case,
+        words={"worst": "worst case of the best designs"}, files=("worst.nc",),
+        samples=lambda scene: {"worst": worst.simulations(scene) if scene.required_study.worst_case else 0},
     ),
     Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
     Stage(
@@ -285,7 +296,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
     run : StudyRun
         Of the scene as written.
     extent : function
-        How much the certificate of effects simulates (`hpcclear.study.extent.certificate_extent`).
+        How much the effect screening simulates (`hpcclear.study.extent.certificate_extent`).
     """
     results: dict[str, Any] = {"scene": run.scene, "extent": extent}
     for stage in stages_of(run.scene):
@@ -294,7 +305,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
 
 
 class Announcer:
-    """Tells each stage of a study of this scene as it begins, on standard error."""
+    """Reports each stage of a study of this scene as it begins, on standard error."""
 
     def __init__(self, scene: Scene) -> None:
         self._counted = [stage.words for stage in stages_of(scene) if stage.words]

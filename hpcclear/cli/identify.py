@@ -1,0 +1,141 @@
+"""The command `identify` and what it prints: unknowns with their intervals, the fit, growth, and what to measure."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+import xarray as xr
+
+from hpcclear.cli.options import (
+    PATH,
+    Amount,
+    How,
+    Written,
+    flag,
+    on_ranks,
+    output_option,
+    place_of,
+    with_how,
+    with_scene,
+)
+from hpcclear.ranks.stopping import Exit
+
+if TYPE_CHECKING:
+    from hpcclear.ensemble.session import Finished
+    from hpcclear.identify.signals import Sensor
+    from hpcclear.ranks.team import Ranks
+
+
+@click.command(short_help="Identify clearances from a measured signal.")
+@with_scene
+@output_option("NetCDF file to write.")
+@click.option(
+    "--unknown", "unknowns", multiple=True, required=True, metavar="PATH=LO:HI",
+    help="Entry to identify and its bounds. Repeatable.",
+)  # fmt: skip
+@click.option(
+    "--signal", "signals", multiple=True, type=PATH,
+    help="Measured table: time or crank angle, then signals. Repeatable, one for each date.",
+)  # fmt: skip
+@click.option(
+    "--of", "names", multiple=True, default=("crank_moment",), show_default=True, metavar="SIGNAL",
+    help="Signal to use: a series of a response, frame_force_x, acceleration_x BODY.POINT, impacts JOINT. Repeatable.",
+)  # fmt: skip
+@click.option(
+    "--date",
+    "dates",
+    multiple=True,
+    metavar="YYYY-MM-DD",
+    help="Date of each signal, in their order.",
+)
+@click.option(
+    "--limit", metavar="VALUE", help="Value of the unknowns whose time of reaching is printed."
+)
+@click.option("--band", metavar="LO:HI", help="Frequencies that the sensor passes, in Hz.")
+@click.option(
+    "--resonance", metavar="HZ[:Q]", help="Mounting resonance of the sensor and its quality factor."
+)
+@click.option(
+    "--gain-error", type=Amount(min=0.0), default=0.0, metavar="SHARE",
+    help="Standard deviation of the sensor's calibration factor, relative.",
+)  # fmt: skip
+@click.option(
+    "--angle-error", default="0 deg", metavar="ANGLE",
+    help="Standard deviation of the crank-angle reference.",
+)  # fmt: skip
+@click.option(
+    "--noise", type=Amount(min=0.0, min_open=True), metavar="SHARE",
+    help="Noise of a sample over the RMS of the signal. With it the scatter between revolutions is used too.",
+)  # fmt: skip
+@click.option(
+    "--pressure", default="", metavar="COLUMN=AREA",
+    help="Measured pressure on the slider as a known load: a column of the first table and the piston's area.",
+)  # fmt: skip
+@flag("--advise", "Compare signals: half-widths to expect, by number of revolutions.")
+@click.option(
+    "--members", type=click.IntRange(min=32), metavar="N",
+    help="Simulations, rounded up to a power of two. By default 256, doubled by each further unknown.",
+)  # fmt: skip
+@with_how
+def identify(
+    written: Written, output: Path, unknowns: tuple[str, ...], signals: tuple[Path, ...], names: tuple[str, ...],
+    dates: tuple[str, ...], limit: str | None, band: str | None, resonance: str | None, gain_error: float,
+    angle_error: str, noise: float | None, pressure: str, advise: bool, members: int | None, how: How,
+) -> int:  # fmt: skip
+    """Identify unknown clearances from a measured signal, with calibrated intervals.
+
+    Random inputs of the scene's study are unknown too, within their distributions. Exit code 4 if the model does not
+    explain a signal; the file is written all the same.
+
+    Example: mpiexec -n 2 hpcclear identify jobs/identify.toml --signal measured.csv
+    --unknown joints.crank_rod.clearance=10um:150um -o results/identify.nc
+    """
+
+    def program(ranks: "Ranks") -> int:
+        from hpcclear.ensemble.maps import number_of
+        from hpcclear.identify.answer import Wanted, run_identify
+        from hpcclear.identify.inputs import Unknown
+
+        scene = written.scene()
+        sensor = _sensor(band, resonance, gain_error, angle_error)
+        unit = Unknown.of(scene, unknowns[0]).unit
+        most = None if limit is None else number_of("--limit", limit, unit)
+        wanted = Wanted(
+            unknowns, signals, tuple(names), dates, most, sensor, noise, pressure, advise, members
+        )
+        return describe(run_identify(scene, place_of(output), ranks, wanted, how.options()))
+
+    return on_ranks(program, how.time_limit)
+
+
+def _sensor(band: str | None, resonance: str | None, gain: float, angle: str) -> "Sensor":
+    """The sensor of the command's words; raises InputError where they are no numbers."""
+    from hpcclear.ensemble.maps import number_of
+    from hpcclear.identify.signals import Sensor
+
+    low, high = (band or "0:1e12").partition(":")[::2]
+    ends = number_of("--band", low, "Hz"), number_of("--band", high or "1e12", "Hz")
+    place, quality = (resonance or "1e12").partition(":")[::2]
+    return Sensor(
+        ends, number_of("--resonance", place, "Hz"), number_of("--resonance", quality or "10", "1"),
+        gain, number_of("--angle-error", angle, "rad"),
+    )  # fmt: skip
+
+
+def describe(found: "Finished") -> int:
+    """Print what was identified; the exit code."""
+    from hpcclear.cli.printing import _load, console, fitting, remark, table
+    from hpcclear.report import identified
+
+    out, content = console(), found.content
+    rows = [(line.label, fitting(line.text)) for line in identified.lines(content)]
+    out.print(table("Identified", rows + _load(found)))
+    for text in identified.warnings(content):
+        out.print(remark("warning", fitting(text)))
+    out.print(f"written  {found.output}")
+    return Exit.DONE if _explained(content) else Exit.TARGET_MISSED
+
+
+def _explained(content: xr.Dataset) -> bool:
+    return "explained" not in content or bool(np.all(content["explained"].to_numpy() == 1))

@@ -1,0 +1,111 @@
+"""What to measure: how well each candidate signal would identify the unknowns, before a sensor is bought.
+
+Members of the ensemble are measured with made noise, and the unknowns predicted from the combinations of features by quadratic
+ridge regression. The errors of members that the regression was not fitted to give the half-width to expect; the posterior
+itself is as a rule narrower.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.identify.features import Choice, Layout
+from hpcclear.identify.judgement import members_of, predictable
+from hpcclear.identify.measured import Measured
+from hpcclear.identify.posterior import FOLDS
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum
+from hpcclear.identify.training import Ensemble
+
+REVOLUTIONS = (5, 20, 100)
+"""Numbers of revolutions that are compared."""
+
+NOISE = 0.1
+"""Noise of a sample over the RMS of the signal, where none is given."""
+
+PENALTIES = (0.1, 1.0, 10.0, 100.0)
+"""Of the regression; that with the least error is taken."""
+
+SAMPLES = 512
+"""Samples of a revolution."""
+
+
+class Advice(NamedTuple):
+    """Expected half-widths (signals, revolutions, unknowns), SI, and the largest correlation of errors of two unknowns
+    (signals, revolutions); NaN with one unknown."""
+
+    names: tuple[str, ...]
+    half_width: Array
+    correlation: Array
+
+
+def noise_of(spectrum: Spectrum, share: float, samples: float) -> Array:
+    """Return the variances (orders,) of harmonics for noise of a sample that is a share of the RMS of a signal."""
+    power = 0.5 * (np.abs(np.atleast_2d(spectrum.mean)[:, 1:]) ** 2).sum(axis=1).mean()
+    variance = np.full(spectrum.mean.shape[-1], 4.0 * share**2 * power / samples)
+    variance[0] *= 0.25
+    return variance
+
+
+def advice(
+    ensemble: Ensemble,
+    names: Sequence[str],
+    sensor: Sensor,
+    frequency: float,
+    share: float,
+    seed: int,
+) -> Advice:
+    """Return what each signal would give; `share`: its noise over its RMS."""
+    width, related = [], []
+    for name in names:
+        rows = [
+            _expected(ensemble, name, sensor, frequency, share, count, seed)
+            for count in REVOLUTIONS
+        ]
+        width.append([one for one, _ in rows])
+        related.append([one for _, one in rows])
+    narrowest = np.minimum.accumulate(np.array(width), axis=1)  # more revolutions are no worse
+    return Advice(tuple(names), narrowest, np.array(related))
+
+
+def _expected(
+    ensemble: Ensemble, name: str, sensor: Sensor, frequency: float, share: float, count: int, seed: int
+) -> tuple[Array, float]:  # fmt: skip
+    """Half-widths (unknowns,) and the largest correlation."""
+    seen = ensemble.spectrum(name)
+    variance = noise_of(seen, share, SAMPLES) + seen.variance.mean(axis=0)
+    typical = Spectrum(seen.mean.mean(axis=0), variance, count)
+    measured = Measured(name, typical, True, frequency, ORDERS)
+    layout = Layout.of(measured, sensor)
+    features, _ = members_of(ensemble, [layout], sensor, frequency)
+    noise = layout.values(typical, measured=True)[1]
+    rng = np.random.default_rng([seed, 0x6164])
+    choice = Choice.of(features, noise)
+    seen_features = features + rng.standard_normal(features.shape) * np.sqrt(noise)
+    kept = predictable(ensemble.places, choice.scores(seen_features), rng)
+    choice = choice.only(kept)
+    scores = choice.scores(seen_features) / np.sqrt(choice.information)
+    unknowns = ensemble.inputs.unknowns
+    truth = ensemble.places[:, : len(unknowns)]
+    errors = [truth - _cross_validated(scores, truth, penalty) for penalty in PENALTIES]
+    error = min(errors, key=lambda one: float((one**2).sum()))
+    ranges = np.array([one.upper - one.lower for one in unknowns])
+    related: Array = np.atleast_2d(np.corrcoef(error.T))
+    away = related[~np.eye(len(unknowns), dtype=bool)]
+    most = float(away[np.argmax(np.abs(away))]) if away.size else np.nan
+    return np.quantile(np.abs(error), 0.95, axis=0) * ranges, most
+
+
+def _cross_validated(scores: Array, truth: Array, penalty: float) -> Array:
+    """Unknowns (n, u) predicted by regressions that were fitted without each, bounded to the unit cube."""
+    upper = np.triu_indices(min(scores.shape[1], 8))
+    squares = (scores[:, upper[0]] * scores[:, upper[1]]).reshape(len(scores), -1)
+    terms = np.column_stack([np.ones(len(scores)), scores, squares])
+    found = np.empty_like(truth)
+    groups = np.arange(len(scores)) % FOLDS
+    for k in range(FOLDS):
+        own, others = terms[groups == k], terms[groups != k]
+        matrix = others.T @ others + penalty * np.eye(terms.shape[1])
+        found[groups == k] = own @ np.linalg.solve(matrix, others.T @ truth[groups != k])
+    return np.clip(found, 0.0, 1.0)

@@ -1,0 +1,205 @@
+"""Features of a signal: harmonics, third octaves, their scatter between revolutions, and the most informative combinations.
+
+A revolution of a chaotic motion does not repeat, so no instant of it is a feature. Means over revolutions are, and the variance
+between revolutions says how well they are known.
+
+The combinations are principal components of the features over an ensemble, each feature in units of its own noise. Their
+variance is signal to noise: for small changes of the inputs that is the Fisher information averaged over the prior.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.identify.measured import Measured
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum
+
+SINGLE = 24
+"""Harmonics up to this order are features of their own; third octaves hold those beyond."""
+
+COMPONENTS = 14
+"""Combinations of features at most."""
+
+LEAST_INFORMATION = 2.0
+"""Variance over the ensemble, in units of the noise, of a combination that is kept."""
+
+FLOOR = 3e-3
+"""Least noise of a feature, in units of its standard deviation over the ensemble: a model is not better than that."""
+
+SUMS = ("acceleration", "frame_force")
+"""Signals without a mean: it is zero over whole revolutions, and sensors do not pass it."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which features a signal has.
+
+    Attributes
+    ----------
+    name : str
+        The signal.
+    orders : tuple of int
+        Harmonics of their own.
+    bands : tuple of (int, int)
+        First and last order of each third octave beyond.
+    synchronised : bool
+        Whether harmonics have phases.
+    noise : float, optional
+        Standard deviation of the sensor's noise in a single harmonic; with it the scatter between revolutions is a feature.
+    """
+
+    name: str
+    orders: tuple[int, ...]
+    bands: tuple[tuple[int, int], ...]
+    synchronised: bool = True
+    noise: float | None = None
+
+    @classmethod
+    def of(cls, measured: Measured, sensor: Sensor, noise: float | None = None) -> "Layout":
+        """Return that of a measured signal; raises InputError where its band holds no harmonic."""
+        frequency, name = measured.frequency, measured.name
+        bare = any(word in name for word in SUMS)
+        lowest = max(int(bare), int(np.ceil(sensor.band[0] / frequency - 1e-9)))
+        highest = min(measured.highest, int(min(sensor.band[1] / frequency, ORDERS)))
+        if highest <= max(lowest, 1):
+            reason = f"no harmonic of {frequency:.4g} Hz passes"
+            raise InputError("--band", name, reason, "Widen the band, or sample faster")
+        orders = tuple(range(lowest, min(highest, SINGLE) + 1))
+        return cls(name, orders, _thirds(SINGLE + 1, highest), measured.synchronised, noise)
+
+    @cached_property
+    def scattered(self) -> tuple[tuple[int, int], ...]:
+        """Bands whose scatter is a feature."""
+        last = self.bands[-1][1] if self.bands else self.orders[-1]
+        return () if self.noise is None else _thirds(1, last)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the features."""
+        parts = ("cosine", "sine") if self.synchronised else ("amplitude",)
+        own = [
+            f"mean of {self.name}" if k == 0 else f"{part} of harmonic {k} of {self.name}"
+            for k in self.orders
+            for part in (parts if k else parts[:1])
+        ]
+        own += [f"harmonics {a} to {b} of {self.name}" for a, b in self.bands]
+        return (
+            *own,
+            *(f"scatter of harmonics {a} to {b} of {self.name}" for a, b in self.scattered),
+        )
+
+    def values(self, seen: Spectrum, measured: bool = False) -> tuple[Array, Array]:
+        """Return the features (..., p) of a spectrum and their variances (..., p).
+
+        A `measured` one has the sensor's noise, and its variances are those of few revolutions.
+        """
+        mean, between = seen.mean, np.nan_to_num(seen.variance)
+        own = (known_scatter(seen).variance if measured else between) / seen.revolutions
+        noise = float(self.noise or 0.0) if measured else 0.0
+        power = np.maximum(np.abs(mean) ** 2 - own, 0.0)
+        found: list[Array] = []
+        spread: list[Array] = []
+        for k in self.orders:
+            if k == 0 or not self.synchronised:
+                found.append(mean[..., 0].real if k == 0 else np.sqrt(power[..., k]))
+                spread.append(own[..., k] if k == 0 else 0.5 * own[..., k])
+            else:
+                found += [mean[..., k].real, -mean[..., k].imag]
+                spread += 2 * [0.5 * own[..., k]]
+        for a, b in self.bands:
+            total = power[..., a : b + 1].sum(-1)
+            weight = (power * own)[..., a : b + 1].sum(-1)
+            floor = own[..., a : b + 1].sum(-1)
+            found.append(np.sqrt(total))
+            spread.append(0.5 * weight / np.maximum(total, 1e-300) + 0.5 * floor / (b + 1 - a))
+        freedom = max(seen.revolutions - 1, 1)
+        for a, b in self.scattered:
+            width, total = b + 1 - a, between[..., a : b + 1].sum(-1)
+            found.append(np.sqrt(np.maximum(total - width * noise**2, 0.0)))
+            spread.append(0.5 * total / (freedom * width))
+        return np.stack(found, -1), np.stack(spread, -1)
+
+
+def _thirds(first: int, last: int) -> tuple[tuple[int, int], ...]:
+    """Third octaves from one order to another, both included."""
+    found, begin = [], first
+    while begin <= last:
+        end = min(max(begin, int(begin * 2.0 ** (1.0 / 3.0))), last)
+        found.append((begin, end))
+        begin = end + 1
+    return tuple(found)
+
+
+def sensed(seen: Spectrum, sensor: Sensor, frequency: float, gain: Array, angle: Array) -> Spectrum:
+    """Return simulated spectra (n, orders) as a sensor has them; `gain` and `angle` (n,): its own errors, relative and rad."""
+    order = np.arange(float(seen.mean.shape[-1]))
+    passed = sensor.response(order * frequency) * (1.0 + gain[:, None])
+    mean = seen.mean * passed * np.exp(1j * order * angle[:, None])
+    return replace(seen, mean=mean, variance=seen.variance * np.abs(passed) ** 2)
+
+
+def known_scatter(seen: Spectrum) -> Spectrum:
+    """Return a measured spectrum whose variances are smoothed over neighbouring orders, and enlarged for few revolutions."""
+    own = seen.variance
+    width = min(3, len(own) // 2)
+    padded = np.pad(own[1:], width, mode="reflect") if len(own) > 2 * width + 1 else own[1:]
+    kernel = np.full(2 * width + 1, 1.0 / (2 * width + 1))
+    near = np.convolve(padded, kernel, mode="valid") if len(padded) > len(own) - 1 else own[1:]
+    few = (seen.revolutions - 1) / max(seen.revolutions - 3, 1)
+    smooth = np.concatenate([own[:1], 0.5 * (own[1:] + near)])
+    return replace(seen, variance=few * smooth)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The most informative combinations of features.
+
+    Attributes
+    ----------
+    centre, unit : ndarray, shape (p,)
+        Mean of the features over the ensemble, and their noise.
+    basis : ndarray, shape (p, q)
+        Combinations, orthonormal in units of the noise.
+    information : ndarray, shape (q,)
+        Variance of each over the ensemble, over that of the noise.
+    """
+
+    centre: Array
+    unit: Array
+    basis: Array
+    information: Array
+
+    @classmethod
+    def of(cls, features: Array, noise: Array) -> "Choice":
+        """Return those of an ensemble's features (n, p), and the variances (p,) of their noise."""
+        centre, spread = features.mean(axis=0), features.std(axis=0)
+        size = np.maximum(spread, 1e-12 * np.abs(centre).max(initial=1e-300))
+        unit = np.sqrt(noise + (FLOOR * size) ** 2)
+        _, singular, rows = np.linalg.svd((features - centre) / unit, full_matrices=False)
+        information = singular**2 / len(features)
+        count = max(1, min(COMPONENTS, int((information > LEAST_INFORMATION).sum())))
+        signs = np.sign(rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)])
+        return cls(centre, unit, (rows * signs[:, None])[:count].T, information[:count])
+
+    def only(self, kept: Array) -> "Choice":
+        """Return that with some of the combinations (q,)."""
+        return replace(self, basis=self.basis[:, kept], information=self.information[kept])
+
+    def scores(self, features: Array) -> Array:
+        """Return the combinations (..., q) of features (..., p)."""
+        found: Array = ((features - self.centre) / self.unit) @ self.basis
+        return found
+
+    def rest(self, features: Array) -> Array:
+        """Return what the combinations leave of features (..., p), in units of the noise."""
+        whole = (features - self.centre) / self.unit
+        left: Array = whole - (whole @ self.basis) @ self.basis.T
+        return left
+
+    def noise_of(self, variance: Array) -> Array:
+        """Return the covariance (q, q) of the combinations for noise with variances (p,)."""
+        found: Array = self.basis.T @ ((variance / self.unit**2)[:, None] * self.basis)
+        return found

@@ -1,0 +1,81 @@
+"""Clearance over several dates: rate of growth and time to a limit, with intervals."""
+
+from datetime import date
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+
+DAY = 86400.0
+
+
+class History(NamedTuple):
+    """Lower end of the 95 % interval, median and upper end (3, unknowns): rate, unit of the unknown per second, and time from
+    the last date to the limit, s; infinite where it is not reached."""
+
+    rate: Array
+    time: Array
+
+
+def seconds_of(dates: tuple[str, ...], count: int) -> Array:
+    """Return the times (count,) of measurements, s after the first; 0, 1 day, ... without dates.
+
+    Raises
+    ------
+    InputError
+        A date is none, there are too few, or they do not rise.
+    """
+    if not dates:
+        return DAY * np.arange(float(count))
+    if len(dates) != count:
+        reason = f"there are {count} signals and {len(dates)} dates"
+        raise InputError("--date", ", ".join(dates), reason, "Give one date for each signal")
+    try:
+        days = np.array([float(date.fromisoformat(one).toordinal()) for one in dates])
+    except ValueError:
+        remedy = "Write dates as 2026-11-27"
+        raise InputError("--date", ", ".join(dates), "is not a date", remedy) from None
+    if (np.diff(days) <= 0.0).any():
+        raise InputError(
+            "--date", ", ".join(dates), "dates do not rise", "Sort the signals by date"
+        )
+    return DAY * (days - days[0])
+
+
+def history(
+    times: Array, particles: Array, limit: float | None, rng: np.random.Generator
+) -> History | None:
+    """Return the rate of growth, by least squares through posteriors of several dates; None for fewer than two dates.
+
+    Parameters
+    ----------
+    times : ndarray, shape (m,)
+        s.
+    particles : ndarray, shape (m, n, unknowns)
+        Posteriors at each date. They are paired by chance: what the dates have in common makes the interval wider than need be.
+    limit : float, optional
+        SI; without it times are NaN.
+    rng : Generator
+    """
+    if len(times) < 2:
+        return None
+    drawn = np.stack([rng.permuted(one, axis=0) for one in particles])
+    spread = np.maximum(particles.var(axis=1), 1e-300)  # (m, unknowns)
+    weight = 1.0 / spread
+    total = weight.sum(axis=0)
+    centre = (weight * times[:, None]).sum(axis=0) / total
+    arm = weight * (times[:, None] - centre)
+    rate = (arm[:, None] * drawn).sum(axis=0) / (arm * times[:, None]).sum(axis=0)
+    level = (weight[:, None] * drawn).sum(axis=0) / total
+    left = np.full_like(rate, np.nan)
+    if limit is not None:
+        now = level + rate * (times[-1] - centre)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.where(now >= limit, 0.0, np.where(rate > 0.0, (limit - now) / rate, np.inf))
+    levels = (0.025, 0.5, 0.975)
+    ends = np.quantile(
+        left, levels, axis=0, method="higher"
+    )  # infinite ones are no numbers to average
+    return History(np.quantile(rate, levels, axis=0), ends)

@@ -1,0 +1,170 @@
+"""What is not known of a machine: unknowns within bounds, and nuisance inputs with distributions, as places in a unit cube."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.base.quantiles import Quantiles
+from hpcclear.ensemble.api import paths_of
+from hpcclear.ensemble.maps import number_of
+from hpcclear.identify.signals import Sensor
+from hpcclear.scene import Scene
+from hpcclear.scene.correlation import Correlation
+from hpcclear.scene.paths import quantities
+from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.sampling import generator, sobol
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """An entry of the scene to identify, uniform within bounds before anything is measured; SI."""
+
+    name: str
+    paths: tuple[str, ...]
+    lower: float
+    upper: float
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+        return str(quantities()[self.paths[0]].unit) or "1"
+
+    @classmethod
+    def of(cls, scene: Scene, words: str) -> "Unknown":
+        """Return that of ``PATH=LO:HI``; raises InputError where the words are another thing."""
+        name, _, rest = words.partition("=")
+        ends = rest.split(":")
+        if not name or len(ends) != 2:
+            remedy = "For example joints.crank_rod.clearance=10um:150um"
+            raise InputError("--unknown", words, "is not PATH=LO:HI", remedy)
+        paths = paths_of(scene, name)
+        unit = quantities()[paths[0]].unit
+        lower, upper = (number_of("--unknown", end, unit) for end in ends)
+        if not lower < upper:
+            raise InputError("--unknown", words, "its bounds do not rise", "Swap them")
+        return cls(name, paths, lower, upper)
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A random input of the scene that is not known either."""
+
+    name: str
+    paths: tuple[str, ...]
+    law: Quantiles
+    centre: float
+    """What its law is added to; 0 where it gives values."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """All that is not known: coordinates of a point of the unit cube are probabilities.
+
+    The last two are calibration errors of the sensor, where it has some.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    nuisances: tuple[Nuisance, ...] = ()
+    correlation: Correlation | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, scene: Scene, unknowns: Sequence[str]) -> "Inputs":
+        """Return the unknowns, and the random inputs of the scene's study that drive other entries.
+
+        Raises
+        ------
+        InputError
+            There is no unknown, or two drive the same entry, or a bound makes no mechanism.
+        """
+        if not unknowns:
+            remedy = "Give --unknown joints.crank_rod.clearance=10um:150um, say"
+            raise InputError("--unknown", "", "nothing is to be identified", remedy)
+        own = tuple(Unknown.of(scene, words) for words in unknowns)
+        taken = [path for one in own for path in one.paths]
+        if len(set(taken)) < len(taken):
+            raise InputError(
+                "--unknown", ", ".join(unknowns), "two drive the same entry", "Drop one"
+            )
+        study = scene.study
+        rows = () if study is None else study.random
+        kept = tuple(
+            Nuisance(
+                row.name, row.paths, row.law, 0.0 if row.absolute else scene.number(row.paths[0])
+            )
+            for row in rows
+            if not set(row.paths) & set(taken)
+        )
+        made = cls(own, kept, None if study is None else study.correlation)
+        plain = scene.with_({"study": None})
+        corners = np.vstack([np.full(made.size, 0.5), *_bounds(len(own), made.size)])
+        check_points(plain, made.points(corners), lambda row: "--unknown")
+        return made
+
+    @property
+    def size(self) -> int:
+        """Number of inputs of the mechanism."""
+        return len(self.unknowns) + len(self.nuisances)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return (*(one.name for one in self.unknowns), *(one.name for one in self.nuisances))
+
+    def values(self, places: Array) -> Array:
+        """Return the inputs (n, size), SI, at places (n, size or more) of the unit cube."""
+        count = len(self.unknowns)
+        lower, upper = (
+            np.array([getattr(one, end) for one in self.unknowns]) for end in ("lower", "upper")
+        )
+        own = lower + places[:, :count] * (upper - lower)
+        chances = [np.clip(column, 1e-9, 1.0 - 1e-9) for column in places[:, count : self.size].T]
+        if self.correlation is not None:
+            chances = self.correlation.together([one.name for one in self.nuisances], chances)
+        rest = [
+            one.centre + one.law(column)
+            for one, column in zip(self.nuisances, chances, strict=True)
+        ]
+        return np.column_stack([own, *rest])
+
+    def points(self, places: Array) -> Points:
+        """Return the designs at places (n, size or more)."""
+        paths = (*(one.paths for one in self.unknowns), *(one.paths for one in self.nuisances))
+        return Points(self.names, self.values(places), paths)
+
+    def variants(self, places: Array) -> list[dict[str, Any]]:
+        """Return the entries of the scene at each of the places (n, size or more)."""
+        points = self.points(places)
+        return [
+            {
+                path: float(value)
+                for value, paths in zip(row, points.paths, strict=True)
+                for path in paths
+            }
+            for row in points.values
+        ]
+
+    def sensor_errors(self, places: Array, sensor: Sensor) -> tuple[Array, Array]:
+        """Return gain and angle errors (n,) of a sensor at places (n, size + 2)."""
+        from scipy.special import ndtri
+
+        drawn = ndtri(np.clip(places[:, self.size : self.size + 2], 1e-9, 1.0 - 1e-9))
+        return sensor.gain_error * drawn[:, 0], sensor.angle_error * drawn[:, 1]
+
+
+def _bounds(unknowns: int, size: int) -> list[Array]:
+    """Places at the lower and the upper bounds of all unknowns, the other inputs at their medians."""
+    found = []
+    for end in (0.0, 1.0):
+        place = np.full(size, 0.5)
+        place[:unknowns] = end
+        found.append(place)
+    return found
+
+
+def design(seed: int, inputs: Inputs, members: int) -> Array:
+    """Return the places (members, size + 2) of an ensemble over the prior: a randomised Sobol sequence."""
+    return sobol(inputs.size + 2, generator(seed, "identify"), 0, members)

@@ -1,0 +1,187 @@
+"""What was measured: a table of one or more signals, as harmonics of the crank."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.ensemble.maps import number_of
+from hpcclear.identify.signals import IMPACTS, ORDERS, Spectrum, harmonics
+from hpcclear.report.compare import Column, read_columns
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
+
+FEWEST = 4
+"""Whole revolutions that a table needs: their scatter is the measure of its noise."""
+
+NYQUIST = 0.4
+"""Share of the sampling rate up to which harmonics are used: anti-aliasing filters take what is left."""
+
+DRIFT = 0.03
+"""Relative difference of the crank's speed from the scene's that the search for its period covers."""
+
+PAIRS = 180
+"""Pairs of the curve of a measured pressure."""
+
+ANGLES = ("crank_angle", "crank angle", "angle", "phi")
+TIMES = ("time", "t")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One signal of one table.
+
+    Attributes
+    ----------
+    name : str
+    spectrum : Spectrum
+    synchronised : bool
+        Whether the crank angle was recorded, so that phases are known.
+    frequency : float
+        Of the crank, Hz; NaN where the table has no time.
+    highest : int
+        Highest order below the sampling rate's.
+    samples : float
+        Samples of a revolution.
+    """
+
+    name: str
+    spectrum: Spectrum
+    synchronised: bool
+    frequency: float
+    highest: int
+    samples: float = 1024.0
+
+
+def read_measured(
+    path: Path, name: str, unit: str, frequency: float, turns: int = 1, sense: int = 1
+) -> Measured:
+    """Read a signal from a table.
+
+    Parameters
+    ----------
+    path : Path
+        Columns with a heading each: ``time [s]`` or ``crank_angle [deg]`` first, the signals by their names.
+    name, unit : str
+        Signal and its SI unit.
+    frequency : float
+        Of a revolution of the drive in the scene, Hz.
+    turns, sense : int
+        Turns of the crank in a revolution of the drive, and -1 where the crank turns clockwise.
+
+    Raises
+    ------
+    InputError
+        The table cannot be read, lacks the signal, or has too few revolutions.
+    """
+    columns = read_columns(path)
+    plain = [one.name.strip().lower() for one in columns]
+    angle = next((one for one, word in zip(columns, plain, strict=True) if word in ANGLES), None)
+    time = next((one for one, word in zip(columns, plain, strict=True) if word in TIMES), None)
+    column = _column(columns, name, path)
+    values = column.si(unit)
+    seconds = None if time is None else time.si("s")
+    count = name.startswith(IMPACTS)
+    if angle is not None:
+        place = np.unwrap(sense * angle.si("rad")) / (2.0 * np.pi * turns)
+    elif seconds is not None:
+        place = (seconds - seconds[0]) * _frequency(seconds, values, frequency)
+    else:
+        remedy = 'Call the first column "time [s]" or "crank_angle [deg]"'
+        raise InputError("--signal", str(path), "has neither time nor crank angle", remedy)
+    if (np.diff(place) <= 0.0).any():
+        raise InputError(
+            "--signal", str(path), "time or crank angle does not rise", "Sort its rows"
+        )
+    if not np.isfinite(values).all():
+        raise InputError("--signal", str(path), "has cells without a number", "Remove these rows")
+    found = harmonics(place, values, count) if place[-1] - place[0] >= 1.0 else np.empty((0, 1))
+    if len(found) < FEWEST:
+        reason = f"holds {len(found)} whole revolutions"
+        raise InputError(
+            "--signal", str(path), reason, f"Record {FEWEST} or more: their scatter is its noise"
+        )
+    rate = len(place) / float(place[-1] - place[0])
+    known = frequency
+    if seconds is not None:
+        known = float((place[-1] - place[0]) / (seconds[-1] - seconds[0]))
+    highest = min(ORDERS, int(NYQUIST * rate))
+    return Measured(name, Spectrum.of(found), angle is not None, known, highest, rate)
+
+
+def loaded(scene: Scene, path: Path, words: str) -> Scene:
+    """Return a scene whose slider bears a measured pressure: its mean over the revolutions, by the crank angle.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a slider-crank.
+    path : Path
+        Table with the crank angle.
+    words : str
+        ``COLUMN=AREA``: the pressure pushes the piston towards the crank.
+
+    Raises
+    ------
+    InputError
+        The words are another thing, the table lacks the angle or the column, or the scene is of another mechanism.
+    """
+    name, _, size = words.partition("=")
+    if not size:
+        raise InputError("--pressure", words, "is not COLUMN=AREA", 'For example pressure="12 cm2"')
+    if scene.template is None:
+        remedy = "Write the load of a linkage as a curve in its scene"
+        raise InputError("--pressure", words, "only a slider-crank has a piston", remedy)
+    area = number_of("--pressure", size, "m^2")
+    found = read_measured(path, name, "Pa", np.nan, turns_of(scene.linkage))
+    if not found.synchronised:
+        remedy = 'Add a column "crank_angle [deg]"'
+        raise InputError("--pressure", str(path), "has no crank angle", remedy)
+    share = np.arange(PAIRS) / PAIRS
+    order = np.arange(float(found.highest + 1))
+    mean = found.spectrum.mean[: found.highest + 1]
+    pressure = (mean * np.exp(2j * np.pi * order * share[:, None])).real.sum(axis=1)
+    angle = 2.0 * np.pi * turns_of(scene.linkage) * share
+    pairs = [[float(a), float(-area * p)] for a, p in zip(angle, pressure, strict=True)]
+    return scene.with_({"effects.slider_load": pairs})
+
+
+def _column(columns: list[Column], name: str, path: Path) -> Column:
+    """The column of a signal; a table of one signal may call it as it likes."""
+    for one in columns:
+        if one.name.strip() == name:
+            return one
+    axes = (*ANGLES, *TIMES)
+    rest = [one for one in columns if one.name.strip().lower() not in axes]
+    if len(rest) == 1:
+        return rest[0]
+    listed = ", ".join(one.heading for one in rest)
+    raise InputError(
+        "--signal", str(path), f"has no column {name!r}", f"Call one so. It has: {listed}"
+    )
+
+
+def _frequency(time: Array, values: Array, nominal: float) -> float:
+    """Frequency of the crank, Hz: the one near the nominal at which the revolutions are most alike."""
+    span = float(time[-1] - time[0])
+    if span * nominal < FEWEST:
+        return nominal
+    own = values - values.mean()
+    orders = np.arange(1, 13)
+
+    def power(frequency: float) -> float:
+        wave = np.exp(-2j * np.pi * frequency * time)
+        total, phasor = 0.0, np.ones_like(wave)
+        for _ in orders:
+            phasor = phasor * wave
+            total += abs(own @ phasor) ** 2
+        return total
+
+    step = 1.0 / (4.0 * span * len(orders))
+    count = int(DRIFT * nominal / step)
+    tried = nominal + step * np.arange(-count, count + 1)
+    best = float(tried[np.argmax([power(float(one)) for one in tried])])
+    fine = best + step * np.linspace(-1.0, 1.0, 41)
+    return float(fine[np.argmax([power(float(one)) for one in fine])])

@@ -1,0 +1,216 @@
+"""Signals by name, as harmonics of the crank: of a simulated response and of a table that was measured.
+
+A signal is a series of the response (``crank_moment``, ``slider_acceleration``), or derived here: ``frame_force_x``,
+``acceleration_x BODY.POINT``, ``impacts JOINT``. Each revolution is resampled over the crank angle, so that order k is k cycles
+per revolution whatever the speed does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import make_interp_spline
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.report.figures import motion
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
+
+ORDERS = 64
+"""Highest harmonic of a revolution that is kept."""
+
+INSTANTS = 1024
+"""Instants of a revolution: simulated contact forces have content beyond the highest harmonic, which must not alias into it."""
+
+FORCES, POINTS, IMPACTS = "frame_force_", "acceleration_", "impacts "
+PARTS = 3
+"""Numbers kept of a harmonic: real and imaginary part of its mean over revolutions, variance between revolutions."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What a sensor makes of a signal.
+
+    Parameters
+    ----------
+    band : (float, float)
+        Frequencies that pass, Hz; the upper one is that of the anti-aliasing filter.
+    resonance, quality : float
+        Mounting resonance, Hz, and its quality factor.
+    gain_error, angle_error : float
+        Standard deviations of the calibration factor (relative) and of the crank-angle reference (rad).
+    """
+
+    band: tuple[float, float] = (0.0, np.inf)
+    resonance: float = np.inf
+    quality: float = 10.0
+    gain_error: float = 0.0
+    angle_error: float = 0.0
+
+    def response(self, frequency: Array) -> Array:
+        """Return the complex response of the mounting at frequencies, Hz."""
+        ratio = frequency / self.resonance
+        return 1.0 / (1.0 - ratio**2 + 1j * ratio / self.quality)
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Harmonics of one or more signals.
+
+    Parameters
+    ----------
+    mean : ndarray of complex, shape (..., orders)
+        Mean over the revolutions, from order 0 on.
+    variance : ndarray, shape (..., orders)
+        Variance between revolutions, real and imaginary part together.
+    revolutions : int
+    """
+
+    mean: Array
+    variance: Array
+    revolutions: int
+
+    @classmethod
+    def of(cls, turns: Array) -> "Spectrum":
+        """Return that of the harmonics (revolutions, ..., orders) of single revolutions."""
+        count = len(turns)
+        variance = np.var(turns, axis=0, ddof=1) if count > 1 else np.full(turns.shape[1:], np.nan)
+        return cls(turns.mean(axis=0), variance, count)
+
+    def packed(self) -> Array:
+        """Return it as real numbers (..., PARTS, orders)."""
+        return np.stack([self.mean.real, self.mean.imag, self.variance], axis=-2)
+
+    @classmethod
+    def unpacked(cls, rows: Array, revolutions: int) -> "Spectrum":
+        """Return that of the numbers of `packed`."""
+        return cls(rows[..., 0, :] + 1j * rows[..., 1, :], rows[..., 2, :], revolutions)
+
+
+def names_of(response: xr.Dataset) -> list[str]:
+    """Return the signals that a mechanism has, those that people measure first."""
+    known = motion.series(response)
+    usual = (
+        "crank_moment",
+        "slider_acceleration",
+        "followed_acceleration_x",
+        "followed_acceleration_y",
+    )
+    speeds = response["crank_speed"].to_numpy() if "crank_speed" in known else np.zeros(1)
+    free = ["crank_speed"] if np.ptp(speeds) > 1e-9 * abs(float(speeds[0])) else []
+    return [*(one for one in usual if one in known), *free, f"{FORCES}x", f"{FORCES}y"]
+
+
+def check_name(response: xr.Dataset, name: str) -> None:
+    """Raise InputError where a mechanism has no signal of this name."""
+    known = set(motion.series(response))
+    points = [str(one) for one in response["point"].to_numpy()] if "point" in response else []
+    joints = [str(one) for one in response["joint"].to_numpy()]
+    derived = [f"{FORCES}{axis}" for axis in "xy"] + [f"{IMPACTS}{one}" for one in joints]
+    derived += [f"{POINTS}{axis} {point}" for axis in "xy" for point in points]
+    if name not in known and name not in derived:
+        remedy = nearest(name, [*sorted(known), *derived])
+        raise InputError("--signal", name, "the mechanism has no such signal", remedy)
+
+
+def unit_of(response: xr.Dataset, name: str) -> str:
+    """Return the SI unit of a signal."""
+    if name.startswith(FORCES):
+        return "N"
+    if name.startswith(IMPACTS):
+        return "1"
+    known = motion.series(response)
+    return str(known[name].attrs["units"]) if name in known else "m/s^2"
+
+
+def series_of(scene: Scene, response: xr.Dataset, name: str) -> Array:
+    """Return a signal of a response (t,), SI."""
+    known = motion.series(response)
+    if name in known:
+        return known[name].to_numpy()
+    time = response["time"].to_numpy()
+    if name.startswith(IMPACTS):
+        touching = response["penetration"].sel(joint=name.removeprefix(IMPACTS)).to_numpy() > 0.0
+        return np.concatenate([[0.0], np.diff(touching.astype(float)) > 0.0])
+    if name.startswith(FORCES):
+        return -_derived(time, _moment(scene, response, name[-1]))
+    axis, _, point = name.removeprefix(POINTS).partition(" ")
+    return _derived(time, response[f"point_{axis}"].sel(point=point).to_numpy())
+
+
+def _derived(time: Array, values: Array) -> Array:
+    """Second derivative (t,) with respect to time."""
+    found: Array = make_interp_spline(time, values, k=5).derivative(2)(time)
+    return found
+
+
+def _moment(scene: Scene, response: xr.Dataset, axis: str) -> Array:
+    """Sum of masses times positions along an axis (t,), kg m: the force on the frame is minus its second derivative."""
+    bodies = linkage_of(scene).mechanism.bodies
+    if "body" in response:
+        masses = np.array([body.mass for body in bodies])
+        return np.asarray(response[f"body_{axis}"].to_numpy() @ masses)
+    mass = {body.name: body.mass for body in bodies}
+    arm = next(body.center[0] for body in bodies if body.name == "crank")
+    turn = np.cos if axis == "x" else np.sin
+    total = mass["crank"] * arm * turn(response["crank_angle"].to_numpy())
+    total = total + mass["rod"] * response[f"rod_{axis}"].to_numpy()
+    if axis == "x":
+        total = total + mass["slider"] * response["slider_position"].to_numpy()
+    return np.asarray(total)
+
+
+def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
+    """Return the harmonics of each whole revolution.
+
+    Parameters
+    ----------
+    turns : ndarray, shape (t,)
+        Revolutions of the crank, rising; whole numbers are at angle 0.
+    values : ndarray, shape (t,)
+    count : bool
+        Whether the values are events to be counted.
+
+    Returns
+    -------
+    ndarray of complex, shape (revolutions, ORDERS + 1)
+        Order k > 0 with the amplitude of its cosine and sine.
+    """
+    slack = 2.0 * float(np.median(np.diff(turns)))
+    first, last = int(np.ceil(turns[0] - slack)), int(np.floor(turns[-1] + slack))
+    if count:
+        edges = first + np.arange((last - first) * INSTANTS + 1) / INSTANTS
+        grid = np.diff(np.interp(edges, turns, np.cumsum(values))) * INSTANTS
+    else:
+        places = first + np.arange((last - first) * INSTANTS) / INSTANTS
+        grid = make_interp_spline(turns, values, k=3)(np.clip(places, turns[0], turns[-1]))
+    found = np.fft.rfft(grid.reshape(-1, INSTANTS), axis=1)[:, : ORDERS + 1] / INSTANTS
+    found[:, 1:] *= 2.0
+    return np.asarray(found)
+
+
+def revolutions_of(scene: Scene, response: xr.Dataset) -> Array:
+    """Return the crank angle of a response in revolutions of its drive (t,), rising."""
+    angle, _ = motion.crank_angle(response)
+    return angle / (2.0 * np.pi * turns_of(scene.linkage))
+
+
+def spectra(scene: Scene, response: xr.Dataset, names: Sequence[str]) -> Array:
+    """Return the packed harmonics of signals of one response, shape (signals, PARTS, ORDERS + 1); NaN if it failed."""
+    shape = (len(names), PARTS, ORDERS + 1)
+    if not Status(int(response["status"])).valid:
+        return np.full(shape, np.nan)
+    turns = revolutions_of(scene, response)
+    cycle = turns_of(scene.linkage)
+    begin = turns[0] + float(response.attrs["transient_turns"]) / cycle - 1e-6
+    kept = turns >= begin - 2.0 / INSTANTS
+    found = []
+    for name in names:
+        values = series_of(scene, response, name)[kept]
+        each = harmonics(turns[kept], values, name.startswith(IMPACTS))
+        found.append(Spectrum.of(each).packed())
+    return np.array(found)

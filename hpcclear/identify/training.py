@@ -1,0 +1,142 @@
+"""The ensemble over the prior: machines as they may be, each simulated once, with the spectra of all signals."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.response import simulate
+from hpcclear.ensemble.single import responses_of
+from hpcclear.identify.inputs import Inputs, design
+from hpcclear.identify.signals import (
+    INSTANTS,
+    ORDERS,
+    PARTS,
+    Spectrum,
+    check_name,
+    spectra,
+    unit_of,
+)
+from hpcclear.ranks.team import Ranks
+from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
+
+CHUNK = 64
+"""Members between two checkpoints."""
+
+LEAST_REVOLUTIONS = 10
+"""Revolutions that a member is averaged over at least: chaos takes some to be seen."""
+
+LARGEST_FAILURE = 0.1
+"""Share of members that may fail."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Members that were simulated.
+
+    Attributes
+    ----------
+    inputs : Inputs
+    places : ndarray, shape (n, size + 2)
+        In the unit cube; the last two columns are those of the sensor's own errors.
+    names : tuple of str
+        Signals.
+    spectra : ndarray, shape (n, signals, PARTS, orders)
+    revolutions : int
+    failed : int
+        Members that were left out.
+    """
+
+    inputs: Inputs
+    places: Array
+    names: tuple[str, ...]
+    spectra: Array
+    revolutions: int
+    failed: int = 0
+
+    def spectrum(self, name: str) -> Spectrum:
+        """Return the spectra (n, orders) of a signal."""
+        return Spectrum.unpacked(self.spectra[:, self.names.index(name)], self.revolutions)
+
+
+def prepared_scene(scene: Scene) -> Scene:
+    """Return the scene as its members are simulated: without a study, with enough instants and revolutions."""
+    numerics = scene.numerics
+    return scene.with_(
+        {
+            "study": None,
+            "numerics.target_error": None,
+            "numerics.averaged_revolutions": max(numerics.averaged_revolutions, LEAST_REVOLUTIONS),
+            "output.instants_per_revolution": INSTANTS * turns_of(scene.linkage),
+        }
+    )
+
+
+def units_of(scene: Scene, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the units of signals; raises InputError where the mechanism lacks one."""
+    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
+    response = simulate(scene.with_(short), checked=False)
+    for name in names:
+        check_name(response, name)
+    return tuple(unit_of(response, name) for name in names)
+
+
+def simulated(
+    scene: Scene, inputs: Inputs, names: Sequence[str], members: int, seed: int, ranks: Ranks,
+    checkpoint: Checkpoint | None = None, quiet: bool = True,
+) -> Ensemble:  # fmt: skip
+    """Simulate an ensemble on all ranks; on root.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of `prepared_scene`.
+    inputs : Inputs
+    names : sequence of str
+    members : int
+        A power of two.
+    seed : int
+    ranks : Ranks
+    checkpoint : Checkpoint, optional
+        Keeps every `CHUNK` members.
+    quiet : bool
+        Whether nothing is printed meanwhile.
+
+    Raises
+    ------
+    InputError
+        More than `LARGEST_FAILURE` of the members fail.
+    Stopped, RankFailed, StorageError
+    """
+    places = design(seed, inputs, members)
+    variants = inputs.variants(places)
+    shape = (len(names), PARTS, ORDERS + 1)
+    parts = []
+    for first in range(0, members, CHUNK):
+        stage = f"ensemble-{first:06d}"
+        known = None if checkpoint is None else checkpoint.load_stage(stage)
+        if known is None:
+            rows = variants[first : first + CHUNK]
+            reduced = partial(spectra, names=tuple(names))
+            found = responses_of(scene, rows, reduced, shape, ranks, "ensemble")[:, 0]
+            known = {"spectra": found}
+            if checkpoint is not None:
+                checkpoint.save_stage(stage, known)
+        parts.append(known["spectra"])
+        if not quiet:
+            done = first + len(parts[-1])
+            print(f"ensemble: {done} of {members} members", file=sys.stderr, flush=True)
+    whole = np.concatenate(parts)
+    good = np.isfinite(whole[:, :, 0]).all(axis=(1, 2))
+    if good.mean() < 1.0 - LARGEST_FAILURE:
+        reason = f"{int((~good).sum())} of {members} simulations over the bounds failed"
+        raise InputError("--unknown", members, reason, "Narrow the bounds, or run hpcclear check")
+    count = scene.numerics.averaged_revolutions
+    made = Ensemble(inputs, places, tuple(names), whole, count, int((~good).sum()))
+    return replace(made, places=places[good], spectra=whole[good])

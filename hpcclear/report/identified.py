@@ -1,0 +1,131 @@
+"""What a file of kind ``identify`` says, in lines for the terminal and the page."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.report.figures import labels
+from hpcclear.report.figures.labels import quantity
+from hpcclear.report.spread import Line
+
+NARROWED = 0.8
+"""Share of the bounds' range above which an interval says next to nothing."""
+
+TOGETHER = 0.9
+"""Correlation of two unknowns from which on the signal gives their combination only."""
+
+DAY = 86400.0
+
+
+def rounded(value: float, unit: str, digits: int = 2) -> str:
+    """Return a number to some digits in a unit of a readable size, without an exponent."""
+    if not np.isfinite(value):
+        return quantity(value, unit)
+    scale = labels.scale(unit, value)
+    shown = float(f"{value * scale.factor:.{digits}g}")
+    text = f"{shown:.0f}" if abs(shown) >= 10 ** (digits - 1) else f"{shown:.{digits}g}"
+    return f"{text} {scale.unit}" if scale.unit != "–" else text
+
+
+def lines(content: xr.Dataset) -> list[Line]:
+    """Return what was identified: unknowns by record, fit, growth, and what to measure."""
+    found = _records(content) if "interval" in content else []
+    return [*found, *_growth(content), *_advice(content)]
+
+
+def _short(name: object) -> str:
+    """A scene path without its first table, to leave space on a terminal."""
+    return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
+
+
+def _records(content: xr.Dataset) -> list[Line]:
+    found = []
+    for k, record in enumerate(content["record"].to_numpy()):
+        before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
+        for u, name in enumerate(content["unknown"].to_numpy()):
+            found.append(Line(_short(name), before + interval(content, k, u)))
+    share = content["coverage"].to_numpy()
+    shown = " and ".join(f"{one:.0%}" for one in share)
+    factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
+    text = f"{shown} of simulated machines lie in their 95 % interval; widened by {factor}"
+    return [*found, Line("calibration", text)]
+
+
+def interval(content: xr.Dataset, record: int, unknown: int) -> str:
+    """Return the median and interval of an unknown, no more digits than the interval allows; a bound where it is cut off."""
+    unit = str(content["unit"].to_numpy()[unknown])
+    if not int(content["explained"][record]):
+        return "not identified: the model does not explain this signal"
+    low, middle, high = (float(one) for one in content["interval"][record, unknown])
+    least, most = (float(content[f"prior_{end}"][unknown]) for end in ("lower", "upper"))
+    span = most - least
+    if high - low > NARROWED * span:
+        return f"not determined: 95 % interval {rounded(low, unit)} to {rounded(high, unit)}"
+    digits = 2 if high - low > 0.05 * abs(middle) else 3
+    ends = f"{rounded(low, unit, digits)} to {rounded(high, unit, digits)}"
+    if low - least < 0.02 * span:
+        return f"at most {rounded(high, unit, digits)} (95 % interval {ends}; the lower bound cuts it off)"
+    if most - high < 0.02 * span:
+        return f"at least {rounded(low, unit, digits)} (95 % interval {ends}; the upper bound cuts it off)"
+    return f"{rounded(middle, unit, digits)} (95 % interval {ends})"
+
+
+def _growth(content: xr.Dataset) -> list[Line]:
+    if "rate" not in content:
+        return []
+    found = []
+    for u, name in enumerate(content["unknown"].to_numpy()):
+        unit = str(content["unit"].to_numpy()[u])
+        low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
+        found.append(
+            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high})")
+        )
+        if "limit" in content.attrs:
+            days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
+            limit = quantity(float(content.attrs["limit"]), unit)
+            text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
+            found.append(Line(f"time to {limit}, {_short(name)}", text))
+    return found
+
+
+def _days(seconds: float) -> str:
+    return f"{rounded(seconds / DAY, '1')} days" if np.isfinite(seconds) else "never"
+
+
+def _advice(content: xr.Dataset) -> list[Line]:
+    if "expected_half_width" not in content:
+        return []
+    found = []
+    counts = content["revolutions"].to_numpy()
+    for k, name in enumerate(content["candidate"].to_numpy()):
+        parts = []
+        for u, unknown in enumerate(content["unknown"].to_numpy()):
+            unit = str(content["unit"].to_numpy()[u])
+            widths = content["expected_half_width"][k, :, u].to_numpy()
+            shown = ", ".join(
+                f"{rounded(float(width), unit)} ({count})"
+                for width, count in zip(widths, counts, strict=True)
+            )
+            parts.append(f"{_short(unknown)} ± {shown}")
+        found.append(Line(f"by {name}", f"{'; '.join(parts)} revolutions"))
+    return found
+
+
+def warnings(content: xr.Dataset) -> list[str]:
+    """Return what makes a result doubtful."""
+    found = []
+    for k, record in enumerate(content["record"].to_numpy() if "record" in content else ()):
+        doubt = float(content["doubt"][k])
+        worst = str(content["feature"].to_numpy()[int(content["worst_feature"][k])])
+        if not int(content["explained"][k]):
+            found.append(
+                f"this model does not explain the signal {record} (standard score {doubt:.1f}); the feature that fits "
+                f"least is the {worst}. Check the scene, the sensor and the bounds"
+            )
+        related = float(content["correlation"][k])
+        if abs(related) > TOGETHER:
+            found.append(
+                f"the first two unknowns are not identified separately from {record}: their correlation is {related:.2f}"
+            )
+    return found
