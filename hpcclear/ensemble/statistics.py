@@ -262,7 +262,7 @@ class _Streaming:
 
     def _run_samples(self, left: Remaining) -> float:
         """Let ranks send samples: those of the first block, which decides the histograms, of blocks that an earlier run left
-        with samples, of one that tells what a sample costs; or all, if root keeps them. Returns seconds of a rank for one."""
+        with samples, of one that measures their cost; or all, if root keeps them. Returns seconds of a rank for one."""
         if len(left) == 0:
             return 0.0
 

@@ -100,4 +100,4 @@ def share(name: str, value: float, half_width: float) -> str:
     """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
     if value > half_width:
         return f"{name} {value:.0%} ± {half_width:.1%}"
-    return f"{name} 0% within {max(half_width, value):.1%}"
+    return f"{name} below {max(half_width, value):.1%}"

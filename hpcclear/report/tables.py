@@ -37,6 +37,7 @@ ROWS: dict[str, tuple[str, ...]] = {
     "statistics": ("bin",),
     "wear": ("life", "cycle"),
     "effects": ("variant",),
+    "identify": ("unknown",),
     "timing": ("rank", "stage"),
     "accuracy": ("integrator", "rung"),
 }

@@ -46,7 +46,7 @@ def of_designs(
     -------
     dict of arrays
         ``contribution``, ``halved`` and their ``_error``, (n, inputs), as `hpcclear.statistics.sensitivity.contributions` has
-        them, NaN for inputs that are none of a design's case; ``unexplained`` and ``unexplained_error``, (n,).
+        them, NaN for inputs that do not belong to a design's case; ``unexplained`` and ``unexplained_error``, (n,).
     """
     names = inputs_of(run)
     result: Result = {name: np.full((len(choices), len(names)), np.nan) for name in _NAMES}

@@ -36,7 +36,7 @@ AIM, LESS = 0.8, 0.75
 a design that could not be decided."""
 
 NEAR = 0.65
-"""Of the allowed probability: a design that surely keeps it and has more is near enough."""
+"""Of the allowed probability: a design that significantly keeps it and has more is near enough."""
 
 SMALL = 0.02
 """Of the same for other statistics than probabilities: 0.4 % below the threshold is sought, then 0.8 % and more."""
@@ -70,13 +70,13 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
     ----------
     run : StudyRun
     known : mapping of case to arrays
-        Sampling coordinates (n, d), what the case makes small (n, goals), what steers to its constraints (n,).
+        Sampling coordinates (n, d), what the case makes small (n, objectives), what steers to its constraints (n,).
 
     Returns
     -------
     dict of arrays
-        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that surely
-        break a constraint left out.
+        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is not the case's), without
+        those that significantly break a constraint.
     """
     found: list[Choice] = []
     for case in cases_of(run.study):

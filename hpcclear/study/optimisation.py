@@ -1,4 +1,4 @@
-"""Robust optimisation of each case: fronts of mean and deviation, or of what it makes small, and their ends (eqs. 19 to 23)."""
+"""Robust optimisation of each case: fronts of mean and standard deviation or others, and their ends (eqs. 19 to 23)."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -42,7 +42,7 @@ PROBES = 64
 
 TOGETHER = 256
 """Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a kernel that is no product of
-them, and for all that is not mean and deviation."""
+them, and for all that is not mean and standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Problem:
     region : Box
         Their bounds in sampling coordinates.
     objective : RobustObjective
-        Mean and deviation of designs in SI.
+        Mean and standard deviation of designs in SI.
     scene : Scene
     case : Case
     draws : callable
@@ -82,7 +82,7 @@ class Problem:
         return snapped(self.scene.required_study, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, goals); with constraints, how much it breaks them, (n,), besides."""
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
         if self.case.plain:
             return self.objective(designs)
         draws = self.draws(designs)
@@ -104,7 +104,7 @@ class Problem:
         return found, np.maximum(np.max(broken, axis=0), 0.0)
 
     def moments(self, designs: Array) -> Array:
-        """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
+        """Mean and standard deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
         found = np.full((len(designs), 2), np.nan)
         for row, design in enumerate(designs):
             try:
@@ -250,7 +250,7 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
     Returns
     -------
     dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + goals): design coordinates, and what the case makes
+        For case number k ``front_k`` (runs, solutions, d + objectives): design coordinates, and what the case makes
         small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
     """
     result: Result = {}
@@ -278,7 +278,7 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
 
 
 def check(scene: Scene) -> None:
-    """That the surrogate and the search a study asks for can be had, before anything is simulated.
+    """That the surrogate and the search a study requires can be had, before anything is simulated.
 
     Raises
     ------
@@ -321,7 +321,7 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
         return problem.searched(problem.physical(coordinates))
 
     def nearest(coordinates: Array) -> Array:
-        """Where no design keeps the constraints: how much it breaks them, and the first goal."""
+        """Where no design keeps the constraints: how much it breaks them, and the first objective."""
         values, broken = function(coordinates)
         return np.column_stack([broken, values[:, 0]])
 
@@ -356,7 +356,7 @@ class Choice:
     place : (int, int) or None
         Run of the swarm and solution, for one that stands on a front.
     origin : str
-        "search", or "given": the original, and what a publication prints.
+        "search", or "given": the baseline design, and what a publication prints.
     """
 
     name: str
@@ -372,7 +372,7 @@ def chosen_in_all(study: Study) -> tuple[int, int]:
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of least deviation.
+    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of lowest standard deviation.
 
     Averaged over the runs, as the paper makes its alpha and beta, in sampling coordinates, so that the
     average keeps the bounds; and the best single ones.

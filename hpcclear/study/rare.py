@@ -2,7 +2,8 @@
 
 Of a probability of 1e-4 a hundred thousand samples show ten. Where a constraint allows less than `RARE`, designs that plain
 samples do not decide are sampled where they fail (`hpcclear.statistics.random.importance`), for all of them at once; longer and
-longer while a verdict is open and `most_samples` allows. Where plain and weighted samples contradict each other, both count.
+longer while a verdict is open and `most_samples` allows. A few of their draws are taken again at a stricter tolerance, and what
+that changes is part of the limits. Where plain and weighted samples contradict each other, both count.
 """
 
 from collections.abc import Generator, Sequence
@@ -18,7 +19,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
-from hpcclear.study import goals, verdicts
+from hpcclear.study import goals, tolerance, verdicts
 from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
@@ -51,7 +52,7 @@ class Found(NamedTuple):
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
-    """What is known of verified designs (`hpcclear.study.truth.simulate`), rare failures that are open in it decided as far as
+    """What is known of verified designs (`hpcclear.study.tolerance.verified`), rare failures that are open decided as far as
     they can be; besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     where = [
@@ -78,7 +79,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
-    """Limits by weighted samples in place of those by plain ones; both together where they do not meet."""
+    """Intervals by weighted samples in place of those by plain ones; both together where they do not meet."""
     lower, upper = (true[name][row, column] for name in names)
     apart = one.lower > upper or one.upper < lower
     ends = (min(one.lower, lower), max(one.upper, upper)) if apart else (one.lower, one.upper)
@@ -110,6 +111,7 @@ def probabilities(
             k for k in open_
             if rates[k].begun_anew() or not _enough(run, asked[k], rates[k], many[k])
         ]  # fmt: skip
+    _pair(run, asked, rates)
     return [
         Found(
             one.interval(run.study.verification.confidence),
@@ -119,6 +121,14 @@ def probabilities(
         )
         for one, number in zip(rates, many, strict=True)
     ]
+
+
+def _pair(run: StudyRun, asked: Sequence[Failing], rates: Sequence[Rare]) -> None:
+    """Take a few draws of each probability that is known again at a stricter tolerance."""
+    scene, left = tolerance.stricter(run.scene)
+    tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known]
+    _together(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
+    run.simulations.next = tight.simulations.next
 
 
 def _limit(one: Failing) -> float:
@@ -156,7 +166,7 @@ def _together(
     going: Sequence[Generator[Array, Array, None]],
     stage: str,
 ) -> None:
-    """Answer procedures of several designs by f, all they ask for at a time in one batch."""
+    """Answer procedures of several designs by f, all that they request at a time in one batch."""
     wanted = {k: next(one) for k, one in enumerate(going)}
     while wanted:
         parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)

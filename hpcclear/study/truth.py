@@ -1,4 +1,4 @@
-"""Designs through the true dynamics: mean, deviation and 95th percentile with confidence limits."""
+"""Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
+from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
@@ -21,7 +21,7 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
+"""Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
 
 CLOSE = 0.25
 """Of the accuracy asked for: what a constraint that is not decided is known to, unless it is a probability."""
@@ -62,33 +62,40 @@ def _of_design(
     )
 
 
-def simulate(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str = "verification"
-) -> Result:
-    """Moments of designs, by as many simulations as the study asks for.
+def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
+    """The first points of each replicate of designs, (k, replicates, values) each as `doubled` returns them."""
+    made = [nothing(run)] * len(choices)
+    length = first_length(run.study.verification)
+    lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
+    return made
 
-    Returns
-    -------
-    dict of arrays over the designs
-        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
-        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
-        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
-        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+
+def made(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    before: Sequence[Array] = (),
+    wanted: MomentAccuracy | None = None,
+) -> list[Array]:
+    """f of designs, by as many simulations as the study asks for, (2, replicates, values) each as `doubled` returns them.
 
     Raises
     ------
     InputError
         If all simulations fail.
     """
-    settings = run.study.verification
+    settings, stage = run.study.verification, "verification"
     if settings.draws is not None:
-        made = _values(run, choices, stage, purpose, settings.draws, None)
-    else:
-        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-        made = contested(run, choices, made, stage, purpose)
-    return results_of(run, choices, made) | explained(run, choices, made, purpose)
+        return drawn(run, choices, stage, stage, settings.draws)
+    length, most = first_length(settings), settings.most_samples
+    found = doubled(run, choices, stage, stage, length, most, before, wanted)
+    return contested(run, choices, found, stage, stage)
+
+
+def drawn(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, count: int
+) -> list[Array]:
+    """f of so many independent draws of designs, (2, draws, 1) each."""
+    return _values(run, choices, stage, purpose, count, None)
 
 
 def explained(
@@ -116,8 +123,8 @@ def first_length(settings: Verification) -> int:
 
 
 def expected(study: Study) -> int:
-    """Simulations of a design, on average: what the deviation of the paper's designs took, whose limits were 1.4 % of it after
-    512 and fell as the power 0.6 of the simulations."""
+    """Simulations of a design, on average: those for the standard deviation of the paper's designs, whose half-width was
+    1.4 % after 512 and fell as the power 0.6 of their number."""
     settings = study.verification
     if settings.draws is not None:
         return settings.draws
@@ -145,7 +152,7 @@ def doubled(
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (k, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
     from."""
     wanted = wanted or run.study.wanted
     made = list(before) or [nothing(run)] * len(choices)
@@ -248,17 +255,15 @@ def _values(
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation."""
-    return tuple(
-        one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
-        for one in moments(values)
-    )  # type: ignore[return-value]
+    """Half-widths of the limits of mean and deviation, the larger one where they are not symmetric."""
+    mean, deviation = (limits(one, settings.confidence)[1] - one.value for one in moments(values))
+    return mean, deviation
 
 
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
+    """Whether all confidence intervals are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
     breaks its threshold, as one of `many` designs. What does neither is known better, so that it may be decided."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values[0]))
@@ -280,14 +285,14 @@ def _accurate(
 
 
 def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
-    """What a design comes to in all that its case asks."""
+    """What a design comes to in all that its case requires."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
     return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
 def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
-    """Mean, deviation, percentile and all that the case of a design asks, from what was simulated (k, replicates, n)."""
+    """Mean, standard deviation, percentile and all that the case of a design requires, from what was simulated (k, replicates, n)."""
     percentile = quantile(values[0], QUANTILE, run.study.verification.confidence)
     return [*moments(values[0]), percentile, *_goals(run, choice, values)]
 
@@ -298,7 +303,18 @@ def nothing(run: StudyRun) -> Array:
 
 
 def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """Results of designs from their simulations, shape (2, replicates, values) each; as `simulate` returns it."""
+    """All that is told of designs from what was made of them, shape (2, replicates, values) each.
+
+    Returns
+    -------
+    dict of arrays over the designs
+        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
+        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
+        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
+        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+    """
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     held = max(len(case.kept) for case in run.study.cases)
