@@ -14,12 +14,14 @@ import argparse
 import json
 import tomllib
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from directly import run_of
 
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.report.answer import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
@@ -29,7 +31,7 @@ from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known
-from hpcclear.study import refinement, run_study, simulations, truth
+from hpcclear.study import forecast, refinement, run_study, simulations, truth
 from hpcclear.study.optimisation import Choice
 
 HERE = Path(__file__).parent
@@ -239,6 +241,9 @@ def measured(place: Path, label: str, scene: Scene) -> None:
         models = dataset.read(directory / "kriging.nc", "kriging")
         text = f"{(values[row] - values[least]) / scale:.2f} % ± {error / scale:.2f} %"
         text += " (breaks a constraint)" if broken[row] else ""
+        changed = scene.with_({"study.surrogate.of": of})
+        said, _ = forecast.expected(changed, partial(evaluate_records, changed), 1e-3)
+        text += f"; forecast {said / count:.2f} of its simulations"
         print(f"{label:24} {of:12} {float(models.r2[-1]):8.2f} {count:12} {text}", flush=True)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from commands import overrides, run
 from doc_pages import ROOT
 
 import hpcclear
@@ -225,6 +226,24 @@ def test_advice_ranks_more_revolutions_and_less_noise(made):
     assert quiet[0] == pytest.approx(0.25 * quiet[1])
 
 
+def test_amplitudes_and_scatter_have_no_bias_from_noise():
+    """Without a crank angle harmonics have amplitudes only; what noise adds to them and to the scatter is taken off."""
+    rng = np.random.default_rng(4)
+    noise = rng.standard_normal((400, 30, ORDERS + 1, 2)) @ np.array([1.0, 1.0j]) * 0.5**0.5
+    true = np.full(ORDERS + 1, 0.4)
+    found = []
+    for own in noise:
+        measured = Measured("crank_moment", Spectrum.of(true + own), False, SPEED, ORDERS)
+        layout = Layout.of(measured, Sensor(), noise=1.0)
+        found.append(features_of([measured], [layout])[0])
+    means = dict(zip(layout.labels, np.mean(found, axis=0), strict=True))
+    assert means["amplitude of harmonic 5 of crank_moment"] == pytest.approx(0.4, abs=0.03)
+    assert means["harmonics 41 to 51 of crank_moment"] == pytest.approx(0.4 * 11**0.5, rel=0.03)
+    scatter = [value for name, value in means.items() if name.startswith("scatter")]
+    assert max(scatter) < 0.6  # of 1.0 a harmonic before the noise is taken off
+    assert layout.values(Spectrum(true, np.ones(ORDERS + 1), 30))[0][-1] == pytest.approx(5**0.5)  # fmt: skip
+
+
 def test_few_revolutions_enlarge_their_scatter():
     few, many = (Spectrum(np.zeros(65), np.ones(65), count) for count in (4, 100))
     np.testing.assert_allclose(known_scatter(few).variance, 3.0)
@@ -352,6 +371,22 @@ def test_it_resumes_and_ends_with_the_same_bytes(measured, tmp_path, monkeypatch
     xr.testing.assert_identical(first, again)
     with pytest.raises(InputError, match="another run"):
         hpcclear.identify(*words, members=64, output=place)
+
+
+@pytest.mark.mpi
+@pytest.mark.full
+def test_ranks_and_a_kill_change_no_byte(measured, tmp_path):
+    """`pytest -m full tests/test_identify.py`."""
+    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "--signal", str(measured[0]), "--members", "64"]  # fmt: skip
+    words += overrides(*SHORT)
+    files = []
+    for ranks in (0, 2):
+        out = tmp_path / str(ranks) / "identify.nc"
+        out.parent.mkdir()
+        code, printed = run([*words, "-o", str(out)], ranks)
+        assert code in (0, 4), printed
+        files.append(out.read_bytes())
+    assert files[0] == files[1]
 
 
 def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, scene):

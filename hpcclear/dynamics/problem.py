@@ -70,7 +70,7 @@ class Problem:
     atol: tuple[float, ...]
     """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
     impact_floor: float
-    """Least latched impact speed, m/s."""
+    """Least `latched` impact speed, m/s."""
     transient: int
     averaged: int
     max_steps: int
@@ -130,7 +130,7 @@ class Problem:
 
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
         """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
-        their starts (m), or were torn through."""
+        their starts (m), or were penetrated too deep."""
         p, failed = Parameters(par), start.failed
         outcome.status[failed != Status.OK] = failed[failed != Status.OK]
         torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)
@@ -151,7 +151,9 @@ def coordinate_count(scene: Scene) -> int:
     return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
 
 
-def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
+def effects_of(
+    scene: Scene, *, series: bool = False, energies: bool | None = None, impacts: bool | None = None
+) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
     count = len(scene.contact_labels())
@@ -170,7 +172,8 @@ def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
-        responses=_flag(scene.responses_asked()),
+        responses=_flag(scene.responses_asked() or bool(impacts)),
+        impacts=_flag(bool(count) and (scene.impacts_asked() if impacts is None else impacts)),
         wear=_flag(bool(scene.worn_joints())),
         waves=_flag(any(waves.values())),
         bearing_waves=waves["bearing"] or None,

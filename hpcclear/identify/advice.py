@@ -79,7 +79,7 @@ def _expected(
     measured = Measured(name, typical, True, frequency, ORDERS)
     layout = Layout.of(measured, sensor)
     features, _ = members_of(ensemble, [layout], sensor, frequency)
-    noise = layout.values(typical)[1]
+    noise = layout.values(typical, measured=True)[1]
     rng = np.random.default_rng([seed, 0x6164])
     choice = Choice.of(features, noise)
     seen_features = features + rng.standard_normal(features.shape) * np.sqrt(noise)

@@ -203,7 +203,7 @@ def identified(
     ensemble: Ensemble, found: Found | None, times: Array, gains: Advice | None, wanted: Wanted, seed: int,
     attributes: Mapping[str, object],
 ) -> xr.Dataset:  # fmt: skip
-    """Return the dataset of kind ``identify``."""
+    """Return the dataset of kind ``identify``; `times` (records,), s."""
     inputs = ensemble.inputs
     units = [one.unit for one in inputs.unknowns]
     coords: dict[str, Any] = {
@@ -242,11 +242,11 @@ def identified(
     if gains is not None:
         coords |= {"candidate": np.array(gains.names, str), "revolutions": np.array(REVOLUTIONS)}
         data |= {"expected_half_width": gains.half_width, "expected_correlation": gains.correlation}
-    told = {
+    further = {
         **attributes, "members": len(ensemble.places), "failed_members": ensemble.failed,
         **({} if wanted.limit is None else {"limit": wanted.limit}),
     }  # fmt: skip
-    return with_units(dataset.dataset("identify", coords, data, told), units)
+    return with_units(dataset.dataset("identify", coords, data, further), units)
 
 
 def _of_verdicts(verdicts: Sequence[Verdict], particles: Array, unknowns: int) -> dict[str, Any]:

@@ -304,7 +304,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
 
 
 class Announcer:
-    """Tells each stage of a study of this scene as it begins, on standard error."""
+    """Reports each stage of a study of this scene as it begins, on standard error."""
 
     def __init__(self, scene: Scene) -> None:
         self._counted = [stage.words for stage in stages_of(scene) if stage.words]
