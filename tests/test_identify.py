@@ -23,7 +23,7 @@ from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.posterior import sequential
-from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
@@ -116,6 +116,36 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
         Inputs.of(scene, [UNKNOWN, UNKNOWN])
     with pytest.raises(InputError, match="no harmonic"):
         Layout.of(Measured("a", Spectrum(np.zeros(9), np.zeros(9), 5), True, SPEED, 9), Sensor((0.0, 40.0)))  # fmt: skip
+
+
+def without_clearance(name: str, *joints: str, **tables: dict[str, str]):
+    """A shipped scene whose joints are ideal, over one revolution."""
+    scene = hpcclear.load_scene(ROOT / "jobs" / name).with_({"study": None})
+    changes = {joint: tables.get(joint.rpartition(".")[2], {"kind": "ideal"}) for joint in joints}
+    return scene.with_({**changes, "effects": {}, "numerics.averaged_revolutions": 1})
+
+
+def test_the_frame_force_is_the_reaction_of_all_masses():
+    rigid = without_clearance("slider_crank.toml", "joints.crank_rod", "joints.rod_slider")
+    response = hpcclear.simulate(rigid)
+    reaction = {"x": response["bearing_x"], "y": response["bearing_y"] + response["guide_force"]}
+    for axis in "xy":
+        size = float(np.abs(reaction[axis]).max())
+        found = series_of(rigid, response, f"frame_force_{axis}")
+        np.testing.assert_allclose(found, -reaction[axis], atol=1e-3 * size)
+
+
+def test_a_point_of_a_linkage_has_an_acceleration():
+    pins = {
+        "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+        "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "rocker.b"},
+    }
+    joints = ("mechanism.joints.o2", "mechanism.joints.o3")
+    rigid = without_clearance("linkages/crank_rocker.toml", *joints, **pins)
+    response = hpcclear.simulate(rigid)
+    found = series_of(rigid, response, "acceleration_x crank.b")
+    expected = -((2.0 * np.pi * 15.0) ** 2) * response["point_x"].sel(point="crank.b")
+    np.testing.assert_allclose(found, expected, atol=1e-3 * float(np.abs(expected).max()))
 
 
 def test_a_sensor_has_a_band_and_a_resonance():

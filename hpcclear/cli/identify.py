@@ -102,7 +102,16 @@ def identify(
         unit = Unknown.of(scene, unknowns[0]).unit
         most = None if limit is None else number_of("--limit", limit, unit)
         wanted = Wanted(
-            unknowns, signals, tuple(names), dates, most, sensor, noise, pressure, advise, members
+            unknowns,
+            signals,
+            tuple(dict.fromkeys(names)),
+            dates,
+            most,
+            sensor,
+            noise,
+            pressure,
+            advise,
+            members,
         )
         return describe(run_identify(scene, place_of(output), ranks, wanted, how.options()))
 
