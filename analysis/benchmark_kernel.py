@@ -28,7 +28,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.views import Outcome
-from hpcclear.results.dataset import provenance
+from hpcclear.results.provenance import provenance
 
 WIDTHS = (1, 16, 32)
 YARDSTICK = "plain loop"

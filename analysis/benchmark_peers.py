@@ -28,7 +28,7 @@ from drawing import by_code, error_panels
 from matplotlib.axes import Axes
 from scenes import LAWS, Setup, ensemble, scene, single
 
-from hpcclear.results.dataset import provenance
+from hpcclear.results.provenance import provenance
 
 MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
 OWN = "hpcclear"

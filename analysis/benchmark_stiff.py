@@ -36,7 +36,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.views import Parameters, Start
-from hpcclear.results.dataset import provenance
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import load_scene
 
 SCENES = {

@@ -24,6 +24,7 @@ from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
@@ -208,7 +209,7 @@ def table(options: argparse.Namespace) -> xr.Dataset:
     for name in ("samples", "revolutions", "lanes", "pairs"):
         content.attrs[name] = getattr(options, name)
     text = JOB.read_text()
-    content.attrs |= dataset.provenance(text, load_scene(JOB).hash)
+    content.attrs |= provenance(text, load_scene(JOB).hash)
     return content
 
 

@@ -38,7 +38,7 @@ from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.parts import part_length
 from hpcclear.ensemble.statistics import SHARED_FROM
 from hpcclear.ranks.schedule import HandOut, Need
-from hpcclear.results.dataset import provenance
+from hpcclear.results.provenance import provenance
 
 LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)

@@ -1,4 +1,4 @@
-"""What vectors of 512 bits save beside 256 on this processor, and what the trial chose: an ensemble, a response, stiff samples.
+"""What vectors of 512 bits save beside 256 on this processor: an ensemble, a response, stiff samples.
 
     python analysis/vector_width.py            # about two minutes, most of it compilation
 
@@ -15,13 +15,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from numba import config
-
 from hpcclear.base import width
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
-from hpcclear.results.dataset import provenance
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube
 
@@ -66,10 +64,9 @@ def main() -> None:
     if options.serve:
         return serve()
     print(provenance("", "")["processor"])
-    if width.features(Path(config.CACHE_DIR)) is None:
+    if width.features() is None:
         print("no vectors of 512 bits here: nothing to choose")
         return None
-    print(f"the trial takes {width.faster()} bits")
     servers = {
         bits: subprocess.Popen(
             [sys.executable, __file__, "--serve"], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from dense_mechanism import touching
+from dense_mechanism import Touch, touching
 
 from hpcclear.dynamics.linkage import parts as m
+from hpcclear.dynamics.linkage.loads import Cylinder, Drag, TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 
 
@@ -59,9 +60,17 @@ def turned(vector, angle):
     return [vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c]
 
 
+CORNERS = {
+    "front_left": (1, 1),
+    "front_right": (1, -1),
+    "back_left": (-1, 1),
+    "back_right": (-1, -1),
+}
+
+
 @dataclass
 class Contact:
-    """Laws of one joint with clearance."""
+    """Laws of one contact."""
 
     factor: Any  # 1 + damping as a function of the penetration rate
     friction: Any  # friction over normal force as a function of the sliding speed
@@ -151,22 +160,41 @@ class Dense:
             J[:, k + 2] = -(where[1] - q[k + 1]), where[0] - q[k]
         return J
 
+    def touches(self, joint, q):
+        """Names of a joint's contacts, and where each touches (`Touch`)."""
+        if isinstance(joint, m.Clearance):
+            journal, bearing = (np.array(self.place(q, place), float) for place in joint.places)
+            yield joint.name, touching(joint, journal - bearing, bearing)
+            return
+        middle, on_line = (np.array(self.place(q, place), float) for place in joint.places)
+        line = self.angle(q, joint.line) + joint.angle
+        r, face = joint.corner_radius, 0.5 * joint.height + joint.clearance
+        for name, (ahead, left) in CORNERS.items():
+            arm = (ahead * (0.5 * joint.length - r), left * (0.5 * joint.height - r))
+            corner = middle + np.array(turned(arm, self.angle(q, joint.point)))
+            n = left * np.array(turned((0.0, 1.0), line))  # towards the face
+            gap = (corner - on_line) @ n + r - face
+            depth = max(gap, 0.0)
+            where = corner + (r - 0.5 * depth) * n
+            yield f"{joint.name}.{name}", Touch(gap, depth, n, np.array([-n[1], n[0]]), where)
+
     def contact(self, joint, laws, q, v):
-        """Generalised forces of one contact."""
-        centre_j, speed_j, _ = self.motion_of(q, v, joint.journal)
-        centre_b, speed_b, _ = self.motion_of(q, v, joint.bearing)
-        gap, depth, n, t, where = touching(joint, centre_j - centre_b, centre_b)
-        on_j, on_b = (
-            self.point_on(q, m.split(place)[0], where) for place in (joint.journal, joint.bearing)
+        """Generalised forces of a joint's contacts."""
+        return sum(
+            self.pressed(joint, one, touch, laws, q, v) for one, touch in self.touches(joint, q)
         )
-        rate = (speed_j - speed_b) @ n
+
+    def pressed(self, joint, name, touch, laws, q, v):
+        gap, depth, n, t, where = touch
+        on_j, on_b = (self.point_on(q, m.split(place)[0], where) for place in joint.places)
+        rate = n @ (on_j - on_b) @ v
         sliding = t @ (on_j - on_b) @ v
         elastic = laws.active * joint.stiffness * depth**1.5
         normal = max(elastic * laws.factor(rate), 0.0)
         tangential = normal * laws.friction(sliding)
         force = normal * n + tangential * t  # on the bearing
         loss = (normal - elastic) * rate + tangential * sliding
-        self.seen[joint.name] = {
+        self.seen[name] = {
             "gap": gap, "normal": normal, "rate": rate, "loss": loss, "elastic": elastic * rate,
         }  # fmt: skip
         return (on_b - on_j).T @ force
@@ -176,7 +204,25 @@ class Dense:
         for load in self.mechanism.loads:
             own = np.zeros(self.n)
             if isinstance(load, m.Force):
-                own = self.motion_of(q, v, load.place)[2].T @ np.array(load.force)
+                force = np.array(load.force)
+                if load.follows:
+                    force = np.array(turned(force, self.angle(q, load.place)))
+                own = self.motion_of(q, v, load.place)[2].T @ force
+            elif isinstance(load, TorsionSpring):
+                signs = np.zeros(self.n)
+                signs[self.first[load.body] + 2] = 1.0
+                if load.other is not None:
+                    signs[self.first[load.other] + 2] = -1.0
+                angle, rate = signs @ q, signs @ v
+                moment = load.stiffness * (load.angle - angle) - load.damping * rate
+                if load.upper is not None and angle > load.upper:
+                    moment += load.stop_stiffness * (load.upper - angle)
+                if load.lower is not None and angle < load.lower:
+                    moment += load.stop_stiffness * (load.lower - angle)
+                own = signs * moment
+            elif isinstance(load, Drag):
+                k = self.first[load.body] + 2
+                own[k] = -load.linear * v[k] - load.quadratic * v[k] * abs(v[k])
             elif isinstance(load, m.Torque):
                 own[self.first[load.body] + 2] = load.torque
             else:
@@ -185,7 +231,16 @@ class Dense:
                 )
                 length = np.linalg.norm(a - b)
                 n = (a - b) / length
-                pull = load.stiffness * (length - load.length) + load.damping * (va - vb) @ n
+                rate = (va - vb) @ n
+                if isinstance(load, Cylinder):
+                    rows = load.force if isinstance(load.force, tuple) else ((0.0, load.force),)
+                    pull = load.damping * rate - np.interp(length, *np.transpose(rows))
+                else:
+                    pull = load.stiffness * (length - load.length) + load.damping * rate
+                    if load.side and (
+                        load.side * (length - load.length) <= 0 or load.side * pull <= 0
+                    ):
+                        pull = 0.0
                 own = (Jb - Ja).T @ (n * pull)
             if getattr(load, "table", False):
                 own = own * self.curve
@@ -210,7 +265,12 @@ class Dense:
         Q[1::3] -= self.masses()[1::3] * self.gravity
         for drive in self.mechanism.drives:
             if not drive.prescribed:
-                Q[self.first[drive.body] + 2] += drive.torque * (self.curve if drive.table else 1.0)
+                k = self.first[drive.body] + 2
+                torque = drive.torque * (self.curve if drive.table else 1.0)
+                if drive.by_speed is not None:
+                    torque = np.interp(v[k], *np.transpose(drive.by_speed))
+                self.seen.setdefault("torques", {})[drive.name] = torque
+                Q[k] += torque
         for joint, laws in zip(self.mechanism.clearances, self.contacts, strict=True):
             Q += self.contact(joint, laws, q, v)
         J = self.jacobian(q, t)
@@ -245,6 +305,20 @@ class Dense:
         return solution[: self.n]
 
 
+def loose(dense, joint):
+    """Functions of the coordinates: how far a slider is off its line, and its tilt."""
+
+    def offset(q):
+        (x, y), (bx, by) = (dense.place(q, place) for place in joint.places)
+        dx, dy = turned((1.0, 0.0), dense.angle(q, joint.line) + joint.angle)
+        return dx * (y - by) - dy * (x - bx)
+
+    def tilt(q):
+        return dense.angle(q, joint.point) - dense.angle(q, joint.line) - joint.angle
+
+    return offset, tilt
+
+
 def assembled(dense, guess, t, eccentricities):
     """Coordinates near a guess that meet the constraints and put journals where they are asked to be."""
     q = np.array(guess, float)
@@ -257,8 +331,15 @@ def assembled(dense, guess, t, eccentricities):
             (a, _, Ja), (b, _, Jb) = (
                 dense.motion_of(q, np.zeros(dense.n), place) for place in joint.places
             )
-            rows.append(a - b - e)
-            jacobians.append(Ja - Jb)
+            if isinstance(joint, m.Clearance):
+                rows.append(a - b - e)
+                jacobians.append(Ja - Jb)
+                continue
+            # across and tilt, by differences small enough for Newton's method
+            for row, asked in zip(loose(dense, joint), e, strict=True):
+                rows.append([row(q) - asked])
+                slopes = [(row(q + h) - row(q - h)) / 2e-6 for h in 1e-6 * np.eye(dense.n)]
+                jacobians.append([slopes])
         c = np.concatenate(rows)
         if np.abs(c).max() < 1e-15:
             break

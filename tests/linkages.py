@@ -1,7 +1,9 @@
 """Twenty linkages for the tests, as data: engines, four-bars, presses, a shaper, parallel robots."""
 
 import math
+from dataclasses import replace
 
+from hpcclear.dynamics.linkage.loads import Cylinder, Drag, TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Body,
@@ -11,11 +13,13 @@ from hpcclear.dynamics.linkage.parts import (
     Force,
     GuideFriction,
     Harmonic,
+    LooseSlide,
     Revolute,
     Slide,
     Spring,
     Torque,
     TorqueDrive,
+    split,
 )
 
 MOTOR = ConstantSpeed("motor", "crank", 40.0)
@@ -228,7 +232,43 @@ def held_frame(*open_pins):
     )
 
 
+def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
+    """A mechanism whose named guides have clearance; what they guide then turns, and needs an inertia."""
+    loose = {
+        j.name: LooseSlide(
+            j.name, j.point, j.line, j.angle, None, 2e-4, length, height, radius, 2e9
+        )
+        for j in mechanism.joints
+        if j.name in names
+    }
+    bodies = []
+    for body in mechanism.bodies:
+        points = dict(body.points)
+        for joint in loose.values():
+            own, point = split(joint.point)
+            if own == body.name:
+                points |= joint.corners(points[point])
+        guided = len(points) > len(body.points)
+        inertia = 3e-5 if guided and not body.inertia else body.inertia
+        bodies.append(replace(body, points=points, inertia=inertia))
+    joints = tuple(loose.get(j.name, j) for j in mechanism.joints)
+    return replace(mechanism, bodies=tuple(bodies), joints=joints)
+
+
 RUB = GuideFriction(0.15, 0.1)
+BLOWER = replace(ENGINE, by_speed=((0.0, 3.0), (12.0, 5.0), (25.0, 1.0), (40.0, -0.5)))
+HELD = (
+    TorsionSpring("coil", "rocker", None, 4.0, 0.3, 0.2, 1.0, 1.4, 30.0),
+    TorsionSpring("between", "rocker", "coupler", 1.5, -0.2, 0.1),
+    Spring("buffer", "coupler.tip", "ground.o", 400.0, 0.09, 3.0, -1),
+    Spring("rope", "coupler.tip", "ground.p", 250.0, 0.05, 1.0, 1),
+)
+MOVED = (
+    Cylinder("ram", "coupler.tip", "ground.p", ((0.03, 20.0), (0.08, 5.0), (0.12, -9.0)), 2.0),
+    Cylinder("jack", "coupler.tip", "ground.o", 12.0),
+    Drag("fan", "rocker", 0.02, 0.003),
+    Force("jet", "coupler.tip", (3.0, -8.0), follows=True),
+)
 PUSH = (Force("push", "slider.top", (-30.0, 7.0)), Torque("twist", "rod", 0.3))
 
 LINKAGES = {
@@ -239,6 +279,8 @@ LINKAGES = {
     "slider-crank, ideal": slider_crank(friction=RUB),
     "slider-crank, ideal, torque": slider_crank(drive=ENGINE, friction=RUB, off=0.002, loads=PUSH),
     "four-bar, none": four_bar(loads=(Force("tip", "coupler.tip", (4.0, -9.0)),)),
+    "four-bar, springs": four_bar("o3", loads=HELD),
+    "four-bar, cylinders": four_bar("o2", "o3", drive=BLOWER, loads=MOVED),
     "four-bar, one": four_bar("o3", off=0.006),
     "four-bar, two": four_bar("o2", "o3", drive=ENGINE),
     "four-bar, four": four_bar("o1", "o2", "o3", "o4"),
@@ -255,4 +297,8 @@ LINKAGES = {
     "two stages": two_stage("o23"),
     "turning slide": turning_slide("o2"),
     "held frame": held_frame("o2"),
+    "slider-crank, loose guide": loosened(slider_crank("o23", tilt=0.4, offset=0.01, off=0.003), "guide"),
+    "quick-return, loose slot": loosened(quick_return(), "slot"),
+    "two stages, both loose": loosened(two_stage(), "guide", "feed"),
+    "turning slide, loose": loosened(turning_slide("o2"), "arm"),
 }  # fmt: skip

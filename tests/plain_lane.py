@@ -2,6 +2,7 @@
 
 import math
 import types
+from functools import partial
 
 import numpy as np
 from dense_linkage import Contact, Jet, admissible, assembled, turned
@@ -10,7 +11,8 @@ from some_laws import row as row_of_law
 
 from hpcclear.base import bits
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage import elements, motion
+from hpcclear.dynamics.contacts import guide, pin_in_bearing
+from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, split
@@ -18,7 +20,7 @@ from hpcclear.dynamics.physics import angles, friction
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
 GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
-EVERYTHING = On(friction=True, gravity=True, energies=True, series=True)
+EVERYTHING = On(friction=True, gravity=True, energies=True, series=True, impacts=True)
 CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
 FREE = 500  # rows of what the joints write
 BLOCKS = 700  # of their parameters
@@ -60,9 +62,9 @@ def joints_of(mechanism):
     """Rows of the joints in `work` and `par`."""
     return tuple(
         at.Joint(k, BLOCKS + at.JOINT_ROWS * k, 0,
-                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 14))),
+                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 16))),
                  FREE + 20 * k + 8, FREE + 20 * k + 9)
-        for k, _ in enumerate(mechanism.clearances)
+        for k, _ in enumerate(mechanism.contacts)
     )  # fmt: skip
 
 
@@ -76,14 +78,22 @@ class Lane:
         rows = Rows(0, 100, 200, at.RATE_NOW + 1000, 400, free=100, curves=curves)
         self.text = generate(mechanism, on, rows, **options)
         names = {
-            "joint_force": plain(motion.joint_force),
+            "joint_force": plain(pin_in_bearing.joint_force),
+            "corner_force": plain(guide.corner_force),
             "sincos": plain(angles.sincos),
             "saturated": plain(friction.saturated),
-            "spring_force": plain(elements.spring_force),
-            "held_inverse": plain(elements.held_inverse),
-            "harmonic": plain(elements.harmonic),
-            "sign_of": plain(elements.sign_of),
         }
+        for name in (
+            "spring_force",
+            "one_sided",
+            "along",
+            "hinge",
+            "drag",
+            "held_inverse",
+            "harmonic",
+            "sign_of",
+        ):
+            names[name] = plain(getattr(elements, name))
         exec(self.text.source, names)
         self.run = names["lane"]
         base = values(
@@ -92,14 +102,16 @@ class Lane:
         self.par = np.zeros(1000)
         for row, value in row_of(self.text, base).items():
             self.par[row] = value
-        for k, joint in enumerate(mechanism.clearances):
+        for k, contact in enumerate(mechanism.contacts):
+            joint = contact.joint
             first = BLOCKS + at.JOINT_ROWS * k
             block = self.par[first : first + at.JOINT_ROWS]
-            block[at.CLEARANCE] = joint.clearance
+            shape = contact.geometry.shape(partial(getattr, joint))
+            block[at.CLEARANCE] = shape.clearance
             block[row_of_law("contact", "hunt-crossley", "stiffness")] = joint.stiffness
             block[row_of_law("contact", "hunt-crossley", "damping")] = CHI
-            block[at.BEARING_RADIUS] = joint.bearing_radius
-            block[at.JOURNAL_RADIUS] = joint.bearing_radius - joint.clearance
+            block[at.BEARING_RADIUS] = shape.bearing_radius
+            block[at.JOURNAL_RADIUS] = shape.journal_radius
             block[row_of_law("friction", "coulomb", "coefficient")] = MU
             block[row_of_law("friction", "coulomb", "inverse_ramp")] = 1 / RAMP
 
@@ -149,7 +161,10 @@ def random_states(dense, rng, count):
     for _ in range(count):
         t = rng.uniform(0, 0.01)
         offsets = [
-            joint.clearance * rng.uniform(0.7, 1.3) * np.array([math.cos(a), math.sin(a)])
+            joint.clearance
+            * rng.uniform(0.7, 1.3)
+            * np.array([math.cos(a), math.sin(a)])
+            / (1.0, 0.5 * getattr(joint, "length", 2.0))
             for joint, a in zip(mechanism.clearances, rng.uniform(0, 6, 9), strict=False)
         ]
         q = assembled(

@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
 from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 NAMES = ("m2", "m3", "u2", "I2", "C")
@@ -18,7 +19,7 @@ name = "</pre><b onclick=alert(1)>&amp;"
 "<u>contact" = "<img src=y onerror=alert(1)>"
 """
 CASES = ("deterministic", "robust")
-ATTRIBUTES = dataset.provenance(SCENE, "0" * 64)
+ATTRIBUTES = provenance(SCENE, "0" * 64)
 
 
 def objective(points: np.ndarray) -> np.ndarray:

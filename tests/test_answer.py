@@ -15,10 +15,11 @@ from hpcclear.base.objectives import OURS
 from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import beside
-from hpcclear.report.answer import answer, recommended
+from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
 from hpcclear.report.figures import style
 from hpcclear.report.html.page import write_report
+from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.study import run_study
 
@@ -98,7 +99,7 @@ def test_the_same_design_under_other_names_is_no_choice():
     [
         ((0.59, 2e-4, 0.4), 1e-4, "m2 59% ± 0.0%, m3 40% ± 0.0%", "C"),
         ((2e-4, 2e-4, 1.0), 1e-4, "m3 100% ± 0.0%", "m2, C"),
-        ((0.59, 2e-4, 0.4), 0.01, "m2 59% ± 2.0%, m3 40% ± 2.0%, C 0% within 2.0%", None),
+        ((0.59, 2e-4, 0.4), 0.01, "m2 59% ± 2.0%, m3 40% ± 2.0%, C below 2.0%", None),
         ((0.59, np.nan, 0.4), 0.01, None, None),
     ],
 )

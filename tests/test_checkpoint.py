@@ -26,6 +26,7 @@ from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
 from hpcclear.results.lock import Holder, Lock
 from hpcclear.results.places import fresh_sibling
+from hpcclear.results.provenance import provenance
 
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
 
@@ -148,7 +149,7 @@ def test_parts_are_datasets_of_their_own(tmp_path):
         KEY,
         names=("m2", "mechanism.rod.length"),
         units={"mechanism.rod.length": "m"},
-        attributes=dataset.provenance("[mechanism]", "ab" * 32),
+        attributes=provenance("[mechanism]", "ab" * 32),
     )
     values = np.arange(8.0).reshape(4, 2)
     add(checkpoint, outcomes(0, 4), values)

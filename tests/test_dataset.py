@@ -22,7 +22,8 @@ from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.objectives import MEAN_GAP, ORDINALS
 from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status, failed
 from hpcclear.results import dataset, files, netcdf
-from hpcclear.results.names import KINDS
+from hpcclear.results.names import KINDS, designs_in
+from hpcclear.results.provenance import provenance
 
 SCENE = '[mechanism]\nkind = "slider-crank"  # Kurbel, naïve\n'
 HASH = "c0ffee" * 10 + "beef"
@@ -47,8 +48,8 @@ def outcomes(n: int) -> np.ndarray:
 def samples(n: int = 9) -> xr.Dataset:
     values = np.random.default_rng(1).random((n, 3))
     names, units = ["m2", "C", "mechanism.rod.length"], {"mechanism.rod.length": "m"}
-    provenance = dataset.provenance(SCENE, HASH)
-    return dataset.samples_dataset(names, values, units, outcomes(n), provenance)
+    made_by = provenance(SCENE, HASH)
+    return dataset.samples_dataset(names, values, units, outcomes(n), made_by)
 
 
 def example(kind: str) -> xr.Dataset:
@@ -76,7 +77,7 @@ def example(kind: str) -> xr.Dataset:
         data["m2"] = np.ones(tuple(sizes[dim] for dim in table.design_dims))
     if table.limit_dims is not None:
         data["m2_lower"] = np.zeros(tuple(sizes[dim] for dim in table.limit_dims))
-    return dataset.dataset(kind, coords, data, dataset.provenance(SCENE, HASH))
+    return dataset.dataset(kind, coords, data, provenance(SCENE, HASH))
 
 
 # -- table and builders -------------------------------------------------------------------------
@@ -187,7 +188,7 @@ def test_samples_are_sorted_and_come_back_as_the_same_records():
     records, values = outcomes(n), np.arange(2.0 * n).reshape(n, 2)
     found = dataset.samples_dataset(["m2", "C"], values[shuffled], {}, records[shuffled])
     assert dataset.records(found).tobytes() == records.tobytes()
-    designs = dataset.designs(found)
+    designs = designs_in(found)
     assert list(designs) == ["m2", "C"]
     np.testing.assert_array_equal(designs["C"], values[:, 1])
     assert np.isnan(found["objective"][3])
@@ -197,7 +198,7 @@ def test_samples_are_sorted_and_come_back_as_the_same_records():
 def test_design_variables_by_path_keep_their_path():
     found = samples()
     assert found["mechanism_rod_length"].attrs["units"] == "m"
-    assert list(dataset.designs(found)) == ["m2", "C", "mechanism.rod.length"]
+    assert list(designs_in(found)) == ["m2", "C", "mechanism.rod.length"]
 
 
 @pytest.mark.parametrize("name", ["objective", "sample", "status", "2m", "a b", "", "m.ö"])
@@ -244,7 +245,7 @@ def test_limits_of_design_variables_stand_beside_them():
     assert found["m2_lower"].dims == ("model",)
     assert found["m2_lower"].attrs["units"] == "kg"
     assert found["m2_lower"].attrs["long_name"] == "lower limit of the mass of the rod"
-    assert list(dataset.designs(found)) == ["m2"]
+    assert list(designs_in(found)) == ["m2"]
 
 
 def test_timing_and_response_builders():
@@ -304,6 +305,7 @@ import sys
 sys.path.insert(0, {tests!r})
 from test_dataset import example
 from hpcclear.results import dataset
+from hpcclear.results.names import designs_in
 for kind in dataset.KINDS:
     dataset.write(example(kind), f"{folder}/{{kind}}.nc")
 """

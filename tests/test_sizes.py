@@ -1,4 +1,4 @@
-"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused, loops that are written out."""
+"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused."""
 
 import dis
 from dataclasses import replace
@@ -12,7 +12,6 @@ from some_laws import effects_with
 
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text
-from hpcclear.base.unrolled import unrolled, written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
 from hpcclear.dynamics.explicit.combine import Step, stage_state, step_error
@@ -156,7 +155,7 @@ def test_rows_stand_one_behind_the_other_and_have_names():
         assert set(firsts) <= values
         assert all(row.words for row in rows.declared)
     asked = {row.asked_by for row in at.WRITTEN.declared if row.asked_by}
-    assert asked <= set(at.Effects._fields)
+    assert asked - {"steps"} <= set(at.Effects._fields)  # the latter are summed up between steps
 
 
 def test_rules_are_numbers_of_one_kind():
@@ -199,39 +198,3 @@ def test_lanes_begin_where_a_line_of_the_cache_does():
         lanes = Lanes(problem_of(scene_with()), width)
         assert lanes._block.work.ctypes.data % 64 == 0
         assert (lanes._block.work == 0.0).all()
-
-
-# ---- loops that are written out --------------------------------------------------------------------
-
-ITEMS = np.array([10, 20, 30])
-
-
-def _sum(x, flags):
-    c: dict = {}
-    total = 0
-    for k in written_out(ITEMS):
-        c[k] = x + k
-    for k in written_out(ITEMS):
-        total += c[k] * k
-    for one in written_out(at.GAPS):
-        if getattr(flags, one.asked_by) is not None:
-            total += one.rate + 1000
-    for s in written_out(range(2)):
-        total += s
-    return total
-
-
-def test_a_loop_written_out_does_what_the_loop_does():
-    flags = at.Open(joint_1=1)
-    written = unrolled(_sum)
-    assert written(5, flags) == _sum(5, flags)
-    names = written.__code__.co_varnames
-    assert {"c_0", "c_1", "c_2"} <= set(names)
-    assert "k" not in names
-    assert written.__code__.co_filename == __file__
-    assert written.__code__.co_firstlineno == _sum.__code__.co_firstlineno
-
-
-def test_a_function_without_such_a_loop_is_refused():
-    with pytest.raises(ValueError, match="no loop"):
-        unrolled(test_an_end_is_a_start)

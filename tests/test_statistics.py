@@ -228,8 +228,8 @@ def test_dataset_round_trip_and_raw_samples(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("hpcclear.results.dataset._versions", lambda: "numba 0.1"),
-        ("hpcclear.results.dataset._processor", lambda: "another one"),
+        ("hpcclear.results.provenance._versions", lambda: "numba 0.1"),
+        ("hpcclear.results.provenance._processor", lambda: "another one"),
     ],
 )
 def test_statistics_go_on_only_with_the_same_versions_and_processor(
@@ -328,7 +328,7 @@ def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("rank", [1, 2])
+@pytest.mark.parametrize("rank", [1, pytest.param(2, marks=pytest.mark.nightly)])
 def test_an_error_of_a_leader_or_of_who_it_leads_is_told_once_and_loses_nothing(tmp_path, rank):
     place = tmp_path / "out.nc"
     failed = launch(4, place, 60_000, SHARED="1", FAILS=str(rank))

@@ -1,6 +1,5 @@
-"""Vectors of 256 or 512 bits: what the trial computes, what is kept of it, and that no result depends on it."""
+"""Vectors of 256 or 512 bits: by the processor, by the environment, and that no result depends on it."""
 
-import ctypes
 import inspect
 import os
 import subprocess
@@ -10,9 +9,10 @@ from pathlib import Path
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
-from numba import config, njit
+from numba import njit
 
 from hpcclear.base import width
+from hpcclear.base.cached import features_in_use
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import narrow_vectors
 from hpcclear.base.one_text import one_text
@@ -23,60 +23,28 @@ SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 wide = pytest.mark.skipif(not WIDE, reason="this processor has no vectors of 512 bits")
 
 
-@wide
-def test_both_widths_compute_the_same_bits():
-    found = []
-    for bits in width.WIDTHS:
-        x, y = ((ctypes.c_double * 64)(*[0.5 + k / 64 for k in range(64)]) for _ in "xy")
-        width.compiled(bits)(x, y, 7)
-        found.append(list(y))
-        assert list(y) != [0.5 + k / 64 for k in range(64)]
-    assert found[0] == found[1]
-
-
-@wide
-def test_the_trial_ends_with_one_of_them():
-    assert width.faster() in width.WIDTHS
-
-
-def test_an_answer_is_measured_once(tmp_path):
-    place = tmp_path / "vector-bits"
-    assert width.kept(place, lambda: 512) == 512
-    assert width.kept(place, lambda: pytest.fail("measured again")) == 512
-    place.write_text("1024")
-    assert width.kept(place, lambda: 256) == 256
-    assert list(tmp_path.iterdir()) == [place]
-
-
-def test_of_several_that_measure_the_first_is_followed(tmp_path):
-    place = tmp_path / "vector-bits"
-
-    def meanwhile():
-        place.write_text("256")
-        return 512
-
-    assert width.kept(place, meanwhile) == 256
-
-
-def test_where_nothing_can_be_kept_the_answer_holds(tmp_path):
-    assert width.kept(tmp_path / "missing" / "vector-bits", lambda: 512) == 512
-
-
 @pytest.mark.parametrize("processor", [{"avx2": True}, {"avx512f": False}])
-def test_without_wide_vectors_there_is_nothing_to_choose(processor, monkeypatch, tmp_path):
+def test_without_wide_vectors_there_is_nothing_to_choose(processor, monkeypatch):
     known = llvm.FeatureMap(processor)
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
-    monkeypatch.setattr(width, "faster", lambda: pytest.fail("tried"))
-    assert width.features(tmp_path) is None
+    assert width.features() is None
+
+
+@pytest.mark.parametrize(("name", "sign"), [("znver5", "-"), ("skylake-avx512", "+")])
+def test_processors_that_slow_their_clock_have_narrow_vectors(name, sign, monkeypatch):
+    known = llvm.FeatureMap({"avx512f": True})
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
+    monkeypatch.setattr(llvm, "get_host_cpu_name", lambda: name)
+    monkeypatch.delenv("HPCCLEAR_VECTOR_BITS", raising=False)
+    assert width.features() == f"+avx512f,{sign}prefer-256-bit"
 
 
 @pytest.mark.parametrize(("asked", "sign"), [("256", "+"), ("512", "-")])
-def test_a_width_may_be_set(asked, sign, monkeypatch, tmp_path):
+def test_a_width_may_be_set(asked, sign, monkeypatch):
     known = llvm.FeatureMap({"avx512f": True})
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
-    monkeypatch.setattr(width, "faster", lambda: pytest.fail("tried"))
     monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", asked)
-    assert width.features(tmp_path) == f"+avx512f,{sign}prefer-256-bit"
+    assert width.features() == f"+avx512f,{sign}prefer-256-bit"
 
 
 @pytest.mark.parametrize(
@@ -88,7 +56,7 @@ def test_another_width_is_refused(monkeypatch, tmp_path, named):
     for name, value in named.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(InputError, match="256 or 512"):
-        width.features(tmp_path)
+        width.features()
     answer = subprocess.run(
         [sys.executable, "-m", "hpcclear", "simulate", SCENE, "-o", tmp_path / "r.nc"],
         capture_output=True, text=True, timeout=300,
@@ -115,7 +83,8 @@ def test_no_result_depends_on_it(tmp_path):
             out.mkdir(exist_ok=True)
             command = [sys.executable, "-m", "hpcclear", *map(str, words)]
             subprocess.run(command, env=settings, cwd=SCENE.parents[1], check=True, timeout=600)
-        files[bits] = [path.read_bytes() for path in sorted(out.glob("[rs]*.nc"))]
+        written = [path for path in sorted(out.glob("*.nc")) if "timing" not in path.name]
+        files[bits] = [path.read_bytes() for path in written]
         assert len(files[bits]) == 3
     assert files["256"] == files["512"]
 
@@ -136,7 +105,7 @@ def test_loops_over_coordinates_take_no_vector_that_they_do_not_fill():
         return compiled.inspect_asm(compiled.signatures[0])
 
     assert "zmm" not in doubled(True)
-    if "-prefer-256-bit" in (config.CPU_FEATURES or ""):
+    if "-prefer-256-bit" in features_in_use():
         assert "zmm" in doubled(False)
 
 
@@ -144,8 +113,3 @@ def test_loops_over_coordinates_take_no_vector_that_they_do_not_fill():
 def test_single_responses_ask_for_such_vectors_and_ensembles_do_not(lanes):
     text = inspect.getsource(one_text(explicit_steps, f"explicit_{lanes}", W=lanes, stages=7))
     assert ("narrow_vectors()" in text) == (lanes == 1)
-
-
-def test_a_trial_that_llvm_refuses_decides_nothing(monkeypatch):
-    monkeypatch.setattr(width, "_TRIAL", "what is this?")
-    assert width.faster() == 256

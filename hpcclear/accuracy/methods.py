@@ -220,7 +220,7 @@ def _full_turn(n: int, end: float) -> Event:
 def _event(value: Event, direction: float) -> Event:
     """A terminal event of scipy that has one value at one time.
 
-    scipy finds a change of sign in the states at both ends of a step, then asks the interpolant there, which differs by
+    scipy finds a change of sign in the states at both ends of a step, then evaluates the interpolant there, which differs by
     rounding: where the change is that small, it would find none and stop with an error.
     """
     known: dict[float, float] = {}

@@ -18,6 +18,7 @@ from hpcclear.ensemble.session import command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -78,7 +79,7 @@ class Panels:
         self._listener = notify
         self.values: dict[str, Any] = {}
         self.attributes: dict[str, Any] = {
-            **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
+            **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             "profile": profile.name,
             "command": command_line(),
             "designs": f"integration: {profile.designs} designs near the scene, one revolution from the start",
@@ -149,7 +150,7 @@ class Panels:
         else:
             self._shown(run)
         with self.ranks.stage("spending"):
-            until, check = self.profile.stretches, self.ranks.raise_if_stopped
+            until, check = self.profile.segments, self.ranks.raise_if_stopped
             for longer in spending.measure(self.scene, run, until, check):
                 self._store.save_stage("copies", vars(longer))
                 self._shown(longer)

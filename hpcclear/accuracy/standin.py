@@ -4,7 +4,7 @@ from typing import Any
 
 from hpcclear.accuracy.looked_at import mass_of
 from hpcclear.scene import Scene
-from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.scene.named import SHORT_NAMES
 
 CASE = "about_the_scene"
 WIDTH = 0.2

@@ -1,7 +1,6 @@
-"""What only some operating systems offer, with what takes its place elsewhere: the one module that asks for it.
+"""What only some operating systems offer, with what takes its place elsewhere: the one module that requires it.
 
-Linux has all of it, macOS most; native Windows has none of the modules that are loaded here, so each is loaded where it is
-called.
+Linux has all of it, macOS most, native Windows none: each module is loaded where it is called.
 """
 
 import contextlib

@@ -13,21 +13,15 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, RESPONSES
+from hpcclear.base.outcome import FIELDS, IMPACTS, OUTCOME, RESPONSES
 
 Function = Callable[..., Any]
 
-RECORDED = {
-    "objective": "m",
-    "mean_gap": "m",
-    "peak_contact_force": "N",
-    "mean_contact_force": "N",
-    "peak_crank_moment": "N m",
-    "slider_acceleration_deviation": "m/s^2",
-    "point_acceleration_deviation": "m/s^2",
-    "peak_point_acceleration": "m/s^2",
+RECORDED = {"objective": "m"} | {
+    name: FIELDS[name].unit.removeprefix("1")
+    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS)
 }
-"""Fields of a sample's record that `Objective.value` may ask for, with units; ``objective`` is f of eq. 13."""
+"""Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
 OF_JOINTS = {
     "gap": "m",
@@ -42,7 +36,7 @@ OF_JOINTS = {
     "bearing_radius": "m",
     "journal_radius": "m",
 }
-"""What `Objective.rate` may ask for of each joint with clearance, with units: distance from the clearance circle, positive in
+"""What `Objective.rate` may require of each joint with clearance, with units: distance from the clearance circle, positive in
 contact, and its rate; the same cut at 0; the forces of contact; the sliding speed; the normal from bearing to journal."""
 
 OF_ALL = {
@@ -53,7 +47,7 @@ OF_ALL = {
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",
 }
-"""What it may ask for of the mechanism: the angle from the x axis, speed and torque of the body that the drive turns, and the
+"""What it may require of the mechanism: the angle from the x axis, speed and torque of the body that the drive turns, and the
 acceleration of the followed body or point. Nothing of it jumps at the end of a revolution."""
 
 MADE = ("mean", "revolution", "rms", "peak")
@@ -78,7 +72,7 @@ class Objective:
     """Its value, of arguments in `RECORDED`, and ``rate``: what was made of `rate`. What joints have comes as an array over the
     joints with clearance. By default the rate, of the joint where it is largest."""
     rate: Function | None = None
-    """Plain arithmetic of arguments in `OF_JOINTS` and `OF_ALL`, compiled into the simulation as laws are. One that asks for
+    """Plain arithmetic of arguments in `OF_JOINTS` and `OF_ALL`, compiled into the simulation as laws are. One that requires
     nothing of joints is of the mechanism as a whole."""
     made: Literal["mean", "revolution", "rms", "peak"] = "mean"
     """What is made of the rate over the averaged revolutions: its mean in time, its integral over a revolution, its root mean
@@ -95,7 +89,7 @@ class Objective:
 
     @property
     def asks(self) -> frozenset[str]:
-        """All that its functions ask for."""
+        """All that its functions require."""
         return frozenset(name for one in (self.value, self.rate) if one for name in arguments(one))
 
     @property
@@ -128,6 +122,11 @@ class Objective:
     def needs_responses(self) -> bool:
         """Whether samples have to record more than gaps and peak forces for it."""
         return not self.asks.isdisjoint(RESPONSES)
+
+    @property
+    def needs_impacts(self) -> bool:
+        """Whether samples have to record measures of impact and noise for it."""
+        return not self.asks.isdisjoint(IMPACTS)
 
     def made_of(self, mean: Array, peak: Array, period: Array) -> Array:
         """What is made of the rate, (m, joints): of its mean in time, of its square where that is what is made, its peak
@@ -173,7 +172,7 @@ class Objective:
 
 
 def arguments(function: Function) -> tuple[str, ...]:
-    """Names of what a function asks for."""
+    """Names of what a function requires."""
     return tuple(signature(function).parameters)
 
 
@@ -203,6 +202,30 @@ OURS = {
     "peak-point-acceleration": Objective(
         "largest acceleration of the followed point", "m/s^2",
         lambda peak_point_acceleration: peak_point_acceleration,
+    ),
+    "impacts": Objective(
+        "number of impacts in a revolution, of the joint where it is larger", "",
+        lambda impacts: impacts.max(),
+    ),
+    "impact-energy": Objective(
+        "energy lost in impacts in a revolution, of all joints", "J",
+        lambda impact_energy: impact_energy.sum(),
+    ),
+    "contact-impulse": Objective(
+        "impulse of the contact force in a revolution, of the joint where it is larger", "N s",
+        lambda contact_impulse: contact_impulse.max(),
+    ),
+    "contact-loss": Objective(
+        "angle of the drive without contact in a revolution, of the joint where it is larger", "rad",
+        lambda contact_loss: contact_loss.max(),
+    ),
+    "rms-contact-force": Objective(
+        "root mean square of the contact force, of the joint where it is larger", "N",
+        lambda rms_contact_force: rms_contact_force.max(),
+    ),
+    "rms-frame-force": Objective(
+        "root mean square about its mean of the force on the frame", "N",
+        lambda rms_frame_force: rms_frame_force,
     ),
 }  # fmt: skip
 OURS = {name: replace(one, name=name) for name, one in OURS.items()}

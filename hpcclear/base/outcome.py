@@ -4,6 +4,7 @@ A failed simulation is an outcome, not an exception: its numbers are NaN and its
 """
 
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,13 @@ JOINTS = ("crank_rod", "rod_slider")
 """Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
 
 MAX_JOINTS = 8
-"""Largest number of joints of a record; datasets contain those of the scene."""
+"""Largest number of contacts of a record, one in each pin and four in each guide; datasets contain those of the scene."""
+
+CORNERS = {
+    "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
+    "back_right": (-1.0, -1.0), "back_left": (-1.0, 1.0),
+}  # fmt: skip
+"""Contacts of a guide with clearance, the corners of its slider: before or behind its middle along the line, left or right."""
 
 WAVE_ROWS = 32
 """Largest number of profile coefficients of all joints."""
@@ -130,85 +137,103 @@ _REGIMES = {
 }
 
 
-RESPONSES = (
-    "mean_contact_force",
-    "peak_crank_moment",
-    "slider_acceleration_deviation",
-    "point_acceleration_deviation",
-    "peak_point_acceleration",
-)
-"""Fields of `OUTCOME` that a study of one of them records."""
+class Field(NamedTuple):
+    """A number of a record: all that datasets, objectives and statistics know of it."""
 
-ON_REQUEST = (*RESPONSES, "rate_of_objective", "sliding_work", "sliding_waves", "energy_error")
-"""Fields of `OUTCOME` that are NaN, and left out of datasets, unless a scene requests them."""
+    unit: str
+    """SI, "1" of a plain number, "" of a code, "objective" of the study's objective, "rate" of what is made of its rate."""
+    words: str
+    kind: str = "f8"
+    """As of numpy."""
+    per: str = ""
+    """"joint" or "wave": what there is one for each of; "" for one a sample."""
+    when: str = ""
+    """What a scene has to require, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
+    "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
+    required: bool = False
+    """Whether every file with the outcome of a simulation has it."""
 
-STEADY = ("objective_limit", "lyapunov_exponent", "period", "steady_rtol", "steady_revolutions")
-"""Fields of `OUTCOME` that a target error fills in, and that datasets hold where a `regime` was judged."""
 
-MAPPED = ("lyapunov_exponent_limit", "attractors")
-"""Fields that a map fills in besides."""
+FIELDS = {
+    "sample": Field("1", "number of the sample in the design", "i8"),  # -1 never leaves the evaluator
+    "objective": Field("objective", "objective f, mean distance from the clearance circle", required=True),  # eq. 13
+    "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True),
+    "objective_uncertainty": Field("objective", "half-width of f, by replicas or of its steady mean"),
+    "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint"),
+    "peak_contact_force": Field("N", "largest contact force over the averaged revolutions", per="joint"),
+    "mean_contact_force": Field("N", "mean contact force over the averaged revolutions", per="joint", when="response"),
+    "peak_crank_moment": Field("N m", "largest absolute torque of the drive on the crank", when="response"),
+    "slider_acceleration_deviation": Field(
+        "m/s^2", "standard deviation of the slider acceleration in time", when="response"),
+    "point_acceleration_deviation": Field(
+        "m/s^2", "root mean square of the acceleration of the followed point about its mean", when="response"),
+    "peak_point_acceleration": Field("m/s^2", "largest acceleration of the followed point", when="response"),
+    "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact"),
+    "impact_energy": Field(
+        "J", "energy lost by damping of the contact in a revolution", per="joint", when="impact"),
+    "contact_impulse": Field("N s", "impulse of the normal force in a revolution", per="joint", when="impact"),
+    "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact"),
+    "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact"),
+    "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact"),
+    "rate_of_objective": Field("rate", "what is made of the objective's own rate", per="joint", when="request"),
+    "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
+    "sliding_waves": Field(
+        "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="request"),
+    "energy_error": Field("1", "residual of the energy balance, relative", when="request"),
+    "objective_limit": Field(
+        "objective", "half-width of the 95 % confidence interval of f as a steady mean", when="steady"),
+    "lyapunov_exponent": Field("1", "largest Lyapunov exponent, per revolution", when="steady"),
+    "lyapunov_exponent_limit": Field("1", "half-width of the 95 % confidence interval of lyapunov_exponent", when="map"),
+    "attractors": Field("1", "number of different motions reached from several starts", when="map"),
+    "period": Field("1", "period of the motion in revolutions", when="steady"),  # NaN where none was found
+    "steady_rtol": Field("1", "tightest relative tolerance used for the steady mean", when="steady"),
+    "steady_revolutions": Field("1", "revolutions of all replicas used for the steady mean", when="steady"),
+    "regime": Field("", "kind of motion", "i1"),
+    "latched": Field("", "whether damping uses the last impact velocity, for whole revolutions", "i1", "joint"),
+    "rhs_evaluations": Field("1", "number of evaluations of the equations of motion", "i8", required=True),
+    "status": Field("", "outcome of the simulation", "i1", required=True),
+    "flags": Field("", "validity warnings of the result", "i1"),
+}  # fmt: skip
+"""The record of a sample, a field each."""
+
+
+def _fields(*when: str) -> tuple[str, ...]:
+    return tuple(name for name, one in FIELDS.items() if one.when in when)
+
+
+RESPONSES = _fields("response")
+"""Fields that a study of one of them records."""
+
+IMPACTS = _fields("impact")
+"""Fields that measure impact and noise."""
+
+ON_REQUEST = _fields("response", "impact", "request")
+"""Fields that are NaN, and left out of datasets, unless a scene requests them."""
+
+STEADY, MAPPED = _fields("steady"), _fields("map")
+"""Fields that a target error fills in, and that datasets hold where a `regime` was judged; and those of a map besides."""
 
 JUDGED = (*STEADY, *MAPPED, "regime")
 """All that stands in datasets only where a `regime` was judged."""
 
-OUTCOME = np.dtype(
-    [
-        ("sample", np.int64),  # index in the design; -1 never leaves the evaluator
-        ("objective", np.float64),  # m, eq. 13
-        ("objective_spread", np.float64),  # m, standard deviation between averaged revolutions
-        (
-            "objective_uncertainty",
-            np.float64,
-        ),  # m, its half-width: over perturbed copies, or of the steady mean; NaN where nothing checked it
-        ("mean_gap", np.float64, MAX_JOINTS),  # m, time mean of | |e| - c | at each joint
-        (
-            "peak_contact_force",
-            np.float64,
-            MAX_JOINTS,
-        ),  # N, at each joint over the averaged revolutions
-        (
-            "mean_contact_force",
-            np.float64,
-            MAX_JOINTS,
-        ),  # N; NaN unless the study's objective asks for it,
-        ("peak_crank_moment", np.float64),  # N m, likewise
-        ("slider_acceleration_deviation", np.float64),  # m/s^2, likewise
-        ("point_acceleration_deviation", np.float64),  # m/s^2, of the followed point of a linkage
-        ("peak_point_acceleration", np.float64),  # m/s^2, likewise
-        (
-            "rate_of_objective",
-            np.float64,
-            MAX_JOINTS,
-        ),  # what is made of the objective's own rate; NaN without one
-        ("sliding_work", np.float64, MAX_JOINTS),  # J a revolution; NaN unless a joint wears
-        (
-            "sliding_waves",
-            np.float64,
-            WAVE_ROWS,
-        ),  # likewise, by the contact's angle; NaN unless recorded
-        ("energy_error", np.float64),  # of the balance, relative; NaN unless asked for
-        ("objective_limit", np.float64),  # m, 95 % half-width of the steady mean's limits
-        ("lyapunov_exponent", np.float64),  # largest Lyapunov exponent, per revolution
-        ("lyapunov_exponent_limit", np.float64),  # of its limits; NaN outside maps
-        ("attractors", np.float64),  # kinds of motion found from several starts; NaN outside maps
-        ("period", np.float64),  # revolutions; NaN where none was found
-        ("steady_rtol", np.float64),  # the tightest tolerance used
-        ("steady_revolutions", np.float64),  # of all copies, spin-up included
-        ("regime", np.int8),
-        ("latched", np.int8, MAX_JOINTS),
-        ("rhs_evaluations", np.int64),
-        ("status", np.int8),
-        ("flags", np.int8),
-    ]
-)
+_SHAPES = {"": (), "joint": (MAX_JOINTS,), "wave": (WAVE_ROWS,)}
+OUTCOME = np.dtype([(name, one.kind, _SHAPES[one.per]) for name, one in FIELDS.items()])
 """The record of one finished sample, as it travels over ranks and into datasets."""
+
+NUMBERS = tuple(name for name, one in FIELDS.items() if one.kind == "f8")
+"""Fields that are NaN where nothing is known, as in a failed sample."""
+
+
+def unknown(count: int) -> np.ndarray:
+    """Records (count,) of `OUTCOME`: numbers NaN, codes 0."""
+    records = np.zeros(count, OUTCOME)
+    for name in NUMBERS:
+        records[name] = np.nan
+    return records
 
 
 def failed(sample: int, status: Status, rhs_evaluations: int = 0) -> np.ndarray:
     """A record of one failed sample: numbers NaN, never 0 (shape ``(1,)`` of `OUTCOME`)."""
-    record = np.zeros(1, OUTCOME)
-    for name in OUTCOME.names or ():
-        if OUTCOME[name].base.kind == "f":
-            record[name] = np.nan
+    record = unknown(1)
     record["sample"], record["status"], record["rhs_evaluations"] = sample, status, rhs_evaluations
     return record

@@ -91,6 +91,24 @@ class Samples:
         return np.array(self.values)[np.minimum((chance * count).astype(np.int64), count - 1)]
 
 
+@dataclass(frozen=True)
+class Scaled:
+    """A distribution in shares of something of size `factor`."""
+
+    law: Quantiles
+    factor: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Least and largest value."""
+        low, high = self.law.span
+        return self.factor * low, self.factor * high
+
+    def __call__(self, chance: Array) -> Array:
+        """Quantiles, of any shape."""
+        return self.factor * self.law(chance)
+
+
 class Cut:
     """A distribution in scipy's shape, truncated at two bounds."""
 

@@ -28,7 +28,7 @@ def energies(
     active : ndarray, shape (m, MAX_JOINTS)
         Contact flags of the joints.
     turn_time : ndarray, shape (m,), optional
-        s, since the start of the revolution: tells the crank angle where it is no coordinate.
+        s, since the start of the revolution: gives the crank angle where it is no coordinate.
 
     Returns
     -------
@@ -39,12 +39,19 @@ def energies(
     linkage, places = linkage_of(scene), list(scene.open_places)
     kinetic, potential, eccentricity = linkage.energies(par, q, v, turn_time, scene.effects.gravity)
     p = Parameters(par)
-    gaps = np.hypot(eccentricity[:, 0], eccentricity[:, 1]).T - p.clearance[..., places]
+    contacts = linkage.mechanism.contacts
+    reach = p.clearance[..., places]
+    for k, contact in enumerate(contacts):
+        reach[..., k] = contact.geometry.reach(p, places[k])
+    gaps = np.hypot(eccentricity[:, 0], eccentricity[:, 1]).T - reach
     if any(scene.waves().values()):
         pose = linkage.poses.at(par, q, v, turn_time)[0]
         angles = {body.name: pose.angle[k] for k, body in enumerate(linkage.mechanism.bodies)}
-        for k, joint in enumerate(linkage.mechanism.clearances):
-            turns = tuple(angles.get(split(one)[0], 0.0) for one in (joint.bearing, joint.journal))
+        for k, contact in enumerate(contacts):
+            if contact.geometry.along_a_line:
+                continue
+            bodies = [split(place)[0] for place in (contact.bearing, contact.journal)]
+            turns = tuple(angles.get(body, 0.0) for body in bodies)
             direction = np.arctan2(eccentricity[k, 1], eccentricity[k, 0])
             gaps[:, k] -= _depth(scene, par, places[k], direction, turns)
     elastic = stored_energy(scene, par, gaps, active[:, places], places)

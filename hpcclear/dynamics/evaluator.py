@@ -10,10 +10,11 @@ from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
-from hpcclear.base.outcome import MAPPED, OUTCOME, RESPONSES, STEADY, Flag, Status
+from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import Problem, problem_of
@@ -31,7 +32,7 @@ CACHE_OF_A_VECTOR = 12 * 1024
 parameters do not fit."""
 
 LEAST_LANES = 16
-"""Shorter loops the compiler does not vectorise where it must ask at run time whether arrays overlap."""
+"""Shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap."""
 
 
 def default_lanes() -> int:
@@ -88,9 +89,9 @@ TIGHTEST = 1e-14
 """Tolerance of a copy at least: beyond it all is rounding."""
 
 COVERAGE = 1.7
-"""Stated uncertainty over how far the farthest copy is; `analysis/uncertainty.py` tells how often it holds and how wide it is.
-Copies no stricter than the sample would add errors of their own where its motion is nearly regular: limits that hold as often
-were up to 12 times the error there."""
+"""Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
+holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: equally reliable
+intervals were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
@@ -106,7 +107,7 @@ class Evaluator:
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
-        Samples in lockstep.
+        Samples of a batch.
     perturbations : sequence of int, optional
         In units of `PERTURBATION`, of replicas at a tighter tolerance that run beside each sample and give its objective a
         half-width, as `alone` gives those of a single response; none by default.
@@ -118,7 +119,7 @@ class Evaluator:
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do.
+        If the scene requires what the kernel cannot do.
     """
 
     def __init__(
@@ -200,14 +201,22 @@ class Evaluator:
 
 
 def responses_reported(problem: Problem) -> tuple[str, ...]:
-    """Which of `RESPONSES` samples notify: those asked for, of a slider where one is followed, of a point where one is."""
+    """Which of `RESPONSES` samples record: those requested, of a slider or a point only where one is followed."""
     if not problem.effects.responses:
         return ()
-    linkage = problem.linkage
+    linkage, impacts = problem.linkage, impacts_reported(problem)
     if linkage.follow and not linkage.follows_a_point:
-        return tuple(name for name in RESPONSES if "point" not in name)
+        return (*impacts, *(name for name in RESPONSES if "point" not in name))
     followed = "point" if linkage.follows_a_point else "nothing"
-    return tuple(name for name in RESPONSES if followed in name or "acceleration" not in name)
+    names = (name for name in RESPONSES if followed in name or "acceleration" not in name)
+    return (*impacts, *names)
+
+
+def impacts_reported(problem: Problem) -> tuple[str, ...]:
+    """Which of `IMPACTS` samples report: the force on the frame is that of rigid bodies only."""
+    rigid = modes_of(problem.linkage.mechanism) == 0
+    asked = IMPACTS if problem.effects.impacts else ()
+    return tuple(name for name in asked if rigid or name != "rms_frame_force")
 
 
 _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
@@ -256,44 +265,31 @@ def outcome_records(
 ) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
-    Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
+    Numbers of failed samples are NaN, and so are those that were not requested: the further responses unless
     `responses` (as of `responses_reported`), sliding work unless `worn`,
     what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """
-    records = np.zeros(len(labels), OUTCOME)
+    records = unknown(len(labels))
     records["sample"] = labels
     records["status"] = outcome.status
     records["rhs_evaluations"] = outcome.evaluations
     valid = np.isin(records["status"], [status for status in Status if status.valid])
-    records["objective"] = outcome.objective
-    records["objective_spread"] = outcome.spread
-    records["objective_uncertainty"] = np.nan
-    records["mean_gap"] = outcome.mean_gap
-    records["peak_contact_force"] = outcome.peak_force
-    records["mean_contact_force"] = outcome.mean_force
-    records["peak_crank_moment"] = outcome.peak_moment
-    records["slider_acceleration_deviation"] = outcome.acceleration_deviation
-    records["point_acceleration_deviation"] = outcome.acceleration_deviation
-    records["peak_point_acceleration"] = outcome.peak_acceleration
-    records["energy_error"] = np.nan
-    for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
-        records[name][~valid] = np.nan
-    for name in (*STEADY, *MAPPED):
-        records[name] = np.nan
-    for name in RESPONSES:
-        records[name][~(valid & (name in responses))] = np.nan
-    records["sliding_work"] = sliding_work(outcome) if worn else np.nan
-    records["sliding_work"][~valid] = np.nan
-    records["sliding_waves"] = (
-        outcome.profile * (outcome.time / outcome.revolutions)[:, None] if worn else np.nan
-    )
-    records["sliding_waves"][~valid] = np.nan
-    records[RATE] = np.nan
+    known = {
+        "objective": outcome.objective, "objective_spread": outcome.spread,
+        "mean_gap": outcome.mean_gap, "peak_contact_force": outcome.peak_force,
+    }  # fmt: skip
+    made = {**_responses(outcome), **measures(outcome)}
+    known |= {name: one for name, one in made.items() if name in responses}
+    if worn:
+        known |= {
+            "sliding_work": sliding_work(outcome),
+            "sliding_waves": outcome.profile * _revolution(outcome),
+        }
     if objective.rate is not None:
-        period = (outcome.time / outcome.revolutions)[:, None]
         largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
-        made = objective.made_of(outcome.mean_rate, largest, period)
-        records[RATE][valid] = made[valid]
+        known[RATE] = objective.made_of(outcome.mean_rate, largest, _revolution(outcome))
+    for name, values in known.items():
+        records[name][valid] = values[valid]
     latched = outcome.latched == 1.0
     records["latched"] = latched & valid[:, None]
     flags = int(Flag.LATCHED) * latched.any(axis=1)
@@ -303,13 +299,46 @@ def outcome_records(
     return records
 
 
+def _responses(outcome: Outcome) -> dict[str, Array]:
+    """Values of `RESPONSES`."""
+    scatter = outcome.acceleration_deviation
+    return {
+        "mean_contact_force": outcome.mean_force, "peak_crank_moment": outcome.peak_moment,
+        "slider_acceleration_deviation": scatter, "point_acceleration_deviation": scatter,
+        "peak_point_acceleration": outcome.peak_acceleration,
+    }  # fmt: skip
+
+
+def measures(outcome: Outcome) -> dict[str, Array]:
+    """Measures of impact and noise (`IMPACTS`) over the averaged revolutions, shape (m, MAX_JOINTS) or (m,).
+
+    Angles without contact go by time.
+    """
+    period = outcome.period[:, None]
+    mean_square = (outcome.frame_force**2).sum(axis=1)
+    return {
+        "impacts": outcome.begun * period,
+        "impact_energy": outcome.impact_power * period,
+        "contact_impulse": outcome.mean_force * period,
+        "contact_loss": outcome.flight * outcome.cycle[:, None],
+        "rms_contact_force": np.sqrt(np.maximum(outcome.square_force, 0.0)),
+        "rms_frame_force": np.sqrt(np.maximum(outcome.square_frame_force - mean_square, 0.0)),
+    }
+
+
 def sliding_work(outcome: Outcome) -> Array:
     """Normal force times sliding distance in a revolution, J, shape (m, MAX_JOINTS).
 
     Of the averaged revolutions; one of a crank that is free lasts as long as all do on average.
     """
-    work: Array = outcome.sliding_power * (outcome.time / outcome.revolutions)[:, None]
+    work: Array = outcome.sliding_power * _revolution(outcome)
     return work
+
+
+def _revolution(outcome: Outcome) -> Array:
+    """How long one lasts, s, (m, 1)."""
+    duration: Array = (outcome.time / outcome.revolutions)[:, None]
+    return duration
 
 
 def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:

@@ -7,8 +7,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.contacts.declared import Shape
+from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.laws import numbers
-from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, dundurs, reduced_compliance
+from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.dynamics.views import Parameters
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import length_path
@@ -26,21 +28,31 @@ the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c
 """
 
 
-def joint_numbers(get: Get, joint: Any, key: str, materials: str) -> dict[str, Array]:
-    """Numbers of a joint's samples by the names of `declared.JOINT`, (m,), from the tables at these paths."""
-    clearance, bearing = get(f"{key}.clearance"), get(f"{key}.bearing_radius")
+def shape_of(scene: Scene, get: Get, label: str) -> Shape:
+    """Numbers of a contact's shape."""
+    key = scene.joint_key(label)
+    return GEOMETRIES[scene.clearance_joint(label).geometry].shape(
+        lambda name: get(f"{key}.{name}")
+    )
+
+
+def joint_numbers(scene: Scene, get: Get, label: str) -> dict[str, Array]:
+    """Numbers of a contact's samples by the names of `declared.JOINT`, (m,)."""
+    key, materials = scene.joint_key(label), scene.materials_key(label)
+    shape = shape_of(scene, get, label)
+    clearance, bearing, journal = shape.radii
     moduli, ratios = (
         [get(f"{materials}.{part}.{entry}") for part in ("bearing", "journal")]
         for entry in ("youngs_modulus", "poisson_ratio")
     )
     h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
     alpha, beta = dundurs(moduli, ratios)
-    path = length_path(joint)
+    path = length_path(scene.clearance_joint(label))
     return {
-        "stiffness": contact_stiffness(h_bearing, h_journal, bearing, clearance),
+        "stiffness": sphere_stiffness(h_bearing, h_journal, shape.radius),
         "compliance": h_bearing + h_journal,
         "bearing_radius": bearing,
-        "journal_radius": bearing - clearance,
+        "journal_radius": journal,
         "clearance": clearance,
         "length": np.full_like(clearance, np.nan) if path is None else get(f"{key}.{path}"),
         "dundurs_alpha": alpha,
@@ -57,15 +69,15 @@ def _given(get: Get, kind: str, table: Any) -> dict[str, Any]:
     }
 
 
-def fill(scene: Scene, get: Get, key: str, materials: str, force: Array, p: Array) -> None:
-    """Fill one joint's block of parameters but for its film (a view, first column its first entry).
+def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
+    """Fill one contact's block of parameters but for its film (a view, first column its first entry).
 
     `force`: what inertia comes to, N, (m,): laws whose force is no power of the depth are looked at there.
     """
-    joint = joint_numbers(get, scene.clearance_joint(key.rpartition(".")[2]), key, materials)
-    p[:, at.CLEARANCE] = joint["clearance"]
-    p[:, at.BEARING_RADIUS] = joint["bearing_radius"]
-    p[:, at.JOURNAL_RADIUS] = joint["journal_radius"]
+    joint, shape = joint_numbers(scene, get, label), shape_of(scene, get, label)
+    p[:, at.CLEARANCE] = shape.clearance
+    p[:, at.BEARING_RADIUS] = shape.bearing_radius
+    p[:, at.JOURNAL_RADIUS] = shape.journal_radius
     table: Any = scene.effects.contact
     law = table.declared
     given = {**joint, **_given(get, "contact", table)}
@@ -78,6 +90,8 @@ def fill(scene: Scene, get: Get, key: str, materials: str, force: Array, p: Arra
         p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
     else:
         p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
+    if GEOMETRIES[scene.clearance_joint(label).geometry].along_a_line:  # a corner is small
+        p[:, at.DEEPEST_VALID] = np.minimum(p[:, at.DEEPEST_VALID], HERTZ_RANGE * shape.radius)
     rubs = scene.effects.friction
     if rubs.law == "none":
         return
@@ -106,10 +120,9 @@ def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
         return {}
     found = {name: np.full(len(forces), np.nan) for name in WIDEST}
     for k, label in enumerate(scene.joint_labels):
-        if label not in scene.clearance_joints() or not forces[k] > 0.0:
+        if label not in scene.contact_labels() or not forces[k] > 0.0:
             continue
-        joint, key = scene.clearance_joint(label), scene.joint_key(label)
-        given = joint_numbers(get, joint, key, scene.materials_key(label))
+        given = joint_numbers(scene, get, label)
         own = numbers.sample_numbers(law, given | _given(get, "contact", scene.effects.contact))
         force = forces[k : k + 1]
         state = {**own, "force": force, "depth": numbers.depth_at(law, force, own)}
@@ -120,7 +133,7 @@ def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
 
 def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: Any) -> Array:
     """Energy stored in the contacts at `places`, J, (t,); parameters (PARAMETERS,) or (t, PARAMETERS), gaps and contact flags
-    (t, places): under latched laws a penetration counts only while in contact."""
+    (t, places): under `latched` laws a penetration counts only while in contact."""
     table = scene.effects.contact
     if table is None or not len(places):
         return np.zeros(len(gaps))

@@ -63,10 +63,10 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
     """But for further numbers of films."""
     p = parameters_of(scene, get, points)
     force = _inertia(scene, get, p)
-    for k, joint in zip(scene.open_places, scene.clearance_joints(), strict=True):
-        key, block = scene.joint_key(joint), at.JOINT_BLOCKS + k * at.JOINT_ROWS
-        fill(scene, get, key, scene.materials_key(joint), force, p[:, block:])
-        _film_parameters(scene, get, joint, p, block)
+    for k, contact in zip(scene.open_places, scene.contact_labels(), strict=True):
+        block = at.JOINT_BLOCKS + k * at.JOINT_ROWS
+        fill(scene, get, contact, force, p[:, block:])
+        _film_parameters(scene, get, contact, p, block)
     held = scene.responses_asked() and is_prescribed(scene)
     p[:, at.HELD_MOMENT : at.HELD_PEAK + 1] = (
         held_extremes(scene, points, get.size) if held else np.nan
@@ -108,8 +108,7 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
     needed = np.ones(len(p))
     for key in scene.guide_friction_keys():
         needed = np.maximum(needed, 1.0 / (OF_RAMP * get(f"{key}.ramp_speed")))
-    for joint in scene.clearance_joints():
-        place = _place(scene, joint)
+    for place in scene.open_places:
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
         if scene.effects.friction.law != "none":
             needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
@@ -146,14 +145,15 @@ def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
     """With the waves of surfaces that are out of round, and thresholds of wear; of joints without the former are 0."""
     rows = np.zeros((len(p), at.FURTHER))
     rows[:, : p.shape[1]] = p
-    for joint in scene.clearance_joints():
+    for joint in scene.pins():
         own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
         paths = wave_paths(scene, joint)
         for k in range(len(paths) // 2):
             cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
             n = int(paths[2 * k].rpartition("_")[2])
             own[:, 4 * k : 4 * k + 4] = np.stack([cosine, sine, n * sine, -n * cosine], axis=-1)
-        row = at.THRESHOLDS + 2 * _place(scene, joint)
+    for joint, place in zip(scene.contact_labels(), scene.open_places, strict=True):
+        row = at.THRESHOLDS + 2 * place
         rows[:, row : row + 2] = _share_that_wears(scene, get, joint)
     return rows
 
@@ -219,7 +219,7 @@ def _with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
     rows = np.zeros((len(p), further_rows(scene)))
     rows[:, : p.shape[1]] = p
     for joint, further in _solved_films(scene).items():
-        key, table = scene.joint_key(joint), scene.clearance_joint(joint)
+        key, table = scene.joint_key(joint), scene.pin(joint)
         ratio = 0.5 * table.film.length / table.bearing_radius  # type: ignore[union-attr]
         varied = 0.5 * get(f"{key}.film.length") / get(f"{key}.bearing_radius")
         if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():

@@ -70,7 +70,7 @@ class Problem:
     atol: tuple[float, ...]
     """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
     impact_floor: float
-    """Least latched impact speed, m/s."""
+    """Least `latched` impact speed, m/s."""
     transient: int
     averaged: int
     max_steps: int
@@ -130,7 +130,7 @@ class Problem:
 
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
         """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
-        their starts (m), or were torn through."""
+        their starts (m), or were penetrated too deep."""
         p, failed = Parameters(par), start.failed
         outcome.status[failed != Status.OK] = failed[failed != Status.OK]
         torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)
@@ -151,10 +151,12 @@ def coordinate_count(scene: Scene) -> int:
     return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
 
 
-def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
+def effects_of(
+    scene: Scene, *, series: bool = False, energies: bool | None = None, impacts: bool | None = None
+) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
-    count = len(scene.clearance_joints())
+    count = len(scene.contact_labels())
     main = planar.linkage_of(scene).mechanism.period
     judge = scene.objective
     waves = scene.waves()
@@ -170,14 +172,15 @@ def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
-        responses=_flag(scene.responses_asked()),
+        responses=_flag(scene.responses_asked() or bool(impacts)),
+        impacts=_flag(bool(count) and (scene.impacts_asked() if impacts is None else impacts)),
         wear=_flag(bool(scene.worn_joints())),
         waves=_flag(any(waves.values())),
         bearing_waves=waves["bearing"] or None,
         journal_waves=waves["journal"] or None,
         threshold=_flag(scene.has_thresholds),
         profile=_flag(bool(scene.wear is not None and scene.wear.waves and scene.worn_joints())),
-        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)),
+        films=tuple(films.get(k) for k in range(at.MAX_JOINTS)) if films else None,
     )
 
 
@@ -200,7 +203,7 @@ def implicit_method(scene: Scene) -> str:
     if method == "auto" and scene.modes:
         mechanism = planar.linkage_of(scene).mechanism
         if max(bending.swings(mechanism)) * float(planar.period_of(mechanism)) > bending.STIFF:
-            return "always"  # there is no stretch of the motion in which they are slow
+            return "always"  # there is no segment of the motion in which they are slow
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
     if scene.films() or scene.bristles:

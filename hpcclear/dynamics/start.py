@@ -23,7 +23,7 @@ from hpcclear.dynamics.planar.problem import (
 )
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.planar.turning import loops_of, statuses
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -118,11 +118,12 @@ def _without_study(scene: Scene) -> Scene:
 
 
 def _start_contacts(scene: Scene, par: Array, points: Points | None, start: Start) -> None:
-    """A journal that starts on or beyond its contact circle starts in contact, at the least impact speed."""
+    """What starts as deep as its surfaces or deeper starts in contact, at the least impact speed."""
     law = scene.effects.contact
     if law is None or not law.latched:
         return
-    for k, joint in zip(scene.open_places, sample_of(scene, points).clearances, strict=True):
-        touching = np.hypot(*joint.start_eccentricity) >= Parameters(par).clearance[:, k]
+    gaps = [gap for joint in sample_of(scene, points).clearances for gap in joint.gaps]
+    for k, gap in zip(scene.open_places, gaps, strict=True):
+        touching = np.asarray(gap) >= 0.0
         start.active[:, k] = touching
         start.inverse_impact[:, k] = touching / law.minimum_impact_speed

@@ -12,10 +12,10 @@ from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.steady.wording import recorded
 from hpcclear.ensemble.session import samples_of
-from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.points import Points, check_points
-from hpcclear.scene.variables import SHORT_NAMES
 
 
 def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
@@ -81,6 +81,6 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     """
     designs = as_points(scene, points)
     records = asked(evaluate_records(scene, designs), scene.objective)
-    made = dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
+    made = provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
     attributes = made | recorded(scene, records)
     return samples_of(designs, records, attributes, scene.objective, scene.joint_labels)

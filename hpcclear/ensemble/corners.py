@@ -9,6 +9,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.planar.problem import poses_at_start, refused_of, scene_of
 from hpcclear.scene import Scene
+from hpcclear.scene.choices import expanded, snapped
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.sampling import generator
@@ -46,7 +47,10 @@ def corners(scene: Scene) -> Points:
     upper = np.concatenate([half, ~half])
     coordinates = np.where(upper, region.upper, region.lower)
     paths = tuple(scene.required_study.variable(name).paths for name in region.names)
-    return Points(region.names, to_physical(scene, region.names, coordinates), paths)
+    study = scene.required_study
+    coordinates = snapped(study, region.names, coordinates)
+    made = Points(region.names, to_physical(scene, region.names, coordinates), paths)
+    return expanded(study, made)
 
 
 def tried(scene: Scene, simulate: bool) -> Tried:

@@ -4,7 +4,7 @@ import hashlib
 import json
 
 from hpcclear.plugins.sources import digest
-from hpcclear.results.dataset import provenance
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.points import Points

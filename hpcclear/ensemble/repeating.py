@@ -12,6 +12,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.api import as_points
 from hpcclear.results import dataset
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -136,7 +137,7 @@ def _differing(ours: xr.Dataset, theirs: xr.Dataset) -> Iterator[str]:
 
 def _changed(content: xr.Dataset, scene: Scene) -> Iterator[str]:
     """What the file says of programs and processor, where that is not what is here."""
-    now = dataset.provenance("", scene.hash)
+    now = provenance("", scene.hash)
     for name in ("hpcclear_version", "processor"):
         if content.attrs.get(name) != now[name]:
             yield f"{name}: {content.attrs.get(name)}, here {now[name]}"

@@ -37,6 +37,7 @@ from hpcclear.results.checkpoint import (
 )
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -272,7 +273,7 @@ class Session:
         """Set `attributes`, what made the files of this run, and the labels of its joints."""
         self.joints = scene.joint_labels
         self.attributes = {
-            **dataset.provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
+            **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             **key_attribute(self.key),
         }
 

@@ -158,9 +158,14 @@ def sample_points(
     StorageError
         The disk refuses.
     """
-    task = Task(stage, maker or make_evaluator, payload_of(scene, points))
+    from hpcclear.scene.choices import expanded
+
+    sent = expanded(
+        scene.study, points
+    )  # columns of rows of catalogues as the numbers they stand for
+    task = Task(stage, maker or make_evaluator, payload_of(scene, sent))
     if checkpoint is None:
-        return ranks.run_points(task, points.values, progress=progress)
+        return ranks.run_points(task, sent.values, progress=progress)
     completed = checkpoint.completed(first, len(points))
     completed["sample"] -= first
 
@@ -176,7 +181,7 @@ def sample_points(
     with saving(save):
         return ranks.run_points(
             task,
-            points.values,
+            sent.values,
             completed=completed,
             on_records=take,
             save=checkpoint.flush_when_due,

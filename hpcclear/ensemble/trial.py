@@ -23,7 +23,7 @@ from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.scene.switches import Off, Switch, switches
 
 CONFIDENCE = 0.99
-"""Of each change's limits: several are looked at, and each more than once."""
+"""Confidence level of each change: several are looked at, and each more than once."""
 
 SCATTER = 8
 """Points of a replicate about its design, where the study has random inputs."""
@@ -194,7 +194,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
-        """What is asked of the effect screening.
+        """What is required of the effect screening.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class Trial:
         return scene.with_({"numerics.max_steps": most} | self._turns)
 
     def _limit(self, records: Records) -> None:
-        """Limits by what the whole scene took at its first points."""
+        """Bounds by what the whole scene took at its first points."""
         numerics = self.scene.numerics
         self._evaluations = int(records["rhs_evaluations"].max())
         if numerics.target_error is not None and self.scene.clearance_joints():
@@ -244,7 +244,7 @@ class Trial:
             self._limit(records)
         scene, labels = self.variant(asked.off).scene, self.scene.joint_labels
         force = np.full((len(records), len(labels)), np.nan)
-        for name in scene.clearance_joints():
+        for name in scene.contact_labels():
             place = scene.joint_labels.index(name)
             force[:, labels.index(name)] = records["peak_contact_force"][:, place]
         shape = (asked.last - asked.first, self.drawn.size)

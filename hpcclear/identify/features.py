@@ -1,4 +1,4 @@
-"""Features of a signal: harmonics, third octaves and their scatter between revolutions; and the few combinations that tell.
+"""Features of a signal: harmonics, third octaves, their scatter between revolutions, and the most informative combinations.
 
 A revolution of a chaotic motion does not repeat, so no instant of it is a feature. Means over revolutions are, and the variance
 between revolutions says how well they are known.
@@ -160,7 +160,7 @@ def known_scatter(seen: Spectrum) -> Spectrum:
 
 @dataclass(frozen=True)
 class Choice:
-    """The combinations of features that tell most.
+    """The most informative combinations of features.
 
     Attributes
     ----------

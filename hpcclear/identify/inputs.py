@@ -73,7 +73,7 @@ class Inputs:
 
     @classmethod
     def of(cls, scene: Scene, unknowns: Sequence[str]) -> "Inputs":
-        """Return the unknowns, and the random inputs of the scene's study that drive none of their entries.
+        """Return the unknowns, and the random inputs of the scene's study that drive other entries.
 
         Raises
         ------

@@ -60,7 +60,7 @@ class Verdict:
     interval : ndarray, shape (3, unknowns)
         Lower end, median and upper end, SI.
     doubt : ndarray, shape (2,)
-        Standard scores of the fit: of the combinations that tell, and of all other features.
+        Standard scores of the fit: of the informative combinations, and of all other features.
     explained : bool
     worst : int
         Feature that fits least.

@@ -41,7 +41,7 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     if spans := _spans(together):
         text += f"; they differ in {spans}"
     same = [
-        f"{labels.words(one)} = {labels.quantity(float(one[0]), str(one.attrs['units']))}"
+        f"{labels.words(one)} = {labels.value(one[0])}"
         for one in labels.design_variables(together)
         if float(one.max()) - float(one.min()) <= SAME * abs(float(one.max()))
     ]
@@ -51,7 +51,11 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
 
 def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
     """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
-    masses = [one.name for one in labels.design_variables(together) if one.attrs["units"] == "kg"]
+    masses = [
+        one.name
+        for one in labels.design_variables(together)
+        if one.attrs["units"] == "kg" and "of_random_inputs" not in one.attrs
+    ]
     if not masses:
         return ""
     whole = np.sum([together[name].to_numpy() for name in masses], axis=0)

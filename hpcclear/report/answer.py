@@ -9,15 +9,23 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ORDINALS
 from hpcclear.base.outcome import Flag
 from hpcclear.report import alike, failures, scatter
 from hpcclear.report.figures import fits, labels
+from hpcclear.report.merit import (
+    USUAL,
+    VERDICTS,
+    baseline_of,
+    best_of,
+    goals_of,
+    is_plain,
+    judged,
+    merit,
+    ours_of,
+    standing,
+)
 from hpcclear.report.scatter import HALF_WIDTH
 from hpcclear.report.spread import Line
-
-SPAN = 2.0
-"""Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
 
 MANY = 0.05
 """Share of samples outside the range of Hertz contact above which that is the first of the next steps."""
@@ -51,14 +59,14 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     verified = files.get("verification")
     if verified is None or not np.isfinite(verified["mean_true"]).any():
         return []
-    ours = _ours(verified)
-    best = _best(ours)
-    original = _original(ours)
+    ours = ours_of(verified)
+    best = best_of(ours)
+    original = baseline_of(ours)
     chaotic = _scatter(files, best)
-    near = alike.flat(ours, best, _judged(ours))
+    near = alike.flat(ours, best, judged(ours))
     return [
         Line("recommended", _named(best)),
-        Line("criterion", f"{_merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
+        Line("criterion", f"{merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
              f"f: {labels.objective(verified)}"),
         Line("values", _values(best)),
         Line("mean", _moment(best, "mean", original)),
@@ -69,6 +77,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         *([Line("near", near)] if near else []),
         Line("active bounds", bounds(best)),
         *scatter.lines(files, best),
+        *scatter.worst(files, best),
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
         Line("contact model", _left(files, best)),
@@ -79,33 +88,10 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ]  # fmt: skip
 
 
-def recommended(verified: xr.Dataset) -> str:
-    """Return the name of the recommended design; "" if no design was verified."""
-    known = bool(np.isfinite(verified["mean_true"]).any())
-    return str(_best(_ours(verified))["design"].item()) if known else ""
-
-
-USUAL = ("mean of f", "deviation of f", "95th percentile of f")
-"""Quantities that are printed of every design, whatever the objectives of its case."""
-
-
 def unit_of(one: xr.Dataset, name: str) -> str:
     """Return the unit of a variable; of what a case makes small it stands beside it."""
     own = f"{name.removesuffix('_true')}_unit"
     return str(one[own].item()) if own in one else str(one[name].attrs["units"])
-
-
-def goals_of(one: xr.Dataset) -> list[str]:
-    """Objectives of the case of a design, where the file has them: "first", "second", and further ones."""
-    return [name for name in ORDINALS if f"{name}_goal" in one and str(one[f"{name}_goal"].item())]
-
-
-def leading_goals(verified: xr.Dataset) -> list[str]:
-    """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
-    if not any(counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
-        return []
-    first = _ours(verified).isel(design=0)
-    return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
 
 
 def _goals(best: xr.Dataset) -> Iterator[str]:
@@ -124,10 +110,6 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
         yield text
 
 
-VERDICTS = {"broken": "violated", "cannot be told": "undecided", "kept": "satisfied"}
-"""How a file states the verdict on a constraint, the worst first, and what is printed."""
-
-
 def constraints(best: xr.Dataset) -> Iterator[str]:
     """Yield the constraints of the case of a design, each with its value and verdict."""
     if "constraints" in best and str(best["constraints"].item()):
@@ -137,87 +119,6 @@ def constraints(best: xr.Dataset) -> Iterator[str]:
             for word, printed in VERDICTS.items():
                 text = text.replace(f": {word}", f": {printed}")
             yield text
-
-
-def is_plain(one: xr.Dataset) -> bool:
-    """Return whether the objectives of its case are mean and standard deviation, without constraints."""
-    if "first_goal" not in one:
-        return True
-    asked = tuple(str(one[f"{name}_goal"].item()) for name in goals_of(one))
-    return asked == USUAL[:2] and not str(one["constraints"].item())
-
-
-def standing(text: str) -> str:
-    """Return the worst verdict on a design's constraints, in the words of the file."""
-    for word in VERDICTS:
-        if f": {word}" in text:
-            return word
-    return ""
-
-
-def _ours(verified: xr.Dataset) -> xr.Dataset:
-    """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
-    rows = [k for k in range(verified.sizes["design"]) if counts(verified.isel(design=k))]
-    if "case" in verified:
-        cases = [str(case) for case in verified["case"].to_numpy()]
-        chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
-        rows = [k for k in rows if cases[k] == chosen]
-    return verified.isel(design=rows)
-
-
-def _random_inputs(verified: xr.Dataset, k: int) -> int:
-    return len(str(verified["random"].to_numpy()[k]).split()) if "random" in verified else 0
-
-
-def counts(one: xr.Dataset) -> bool:
-    """Return whether a design was simulated and is no design of a publication."""
-    finite = np.isfinite(float(one["mean_true"])) and np.isfinite(float(one["deviation_true"]))
-    return finite and not labels.is_printed(one)
-
-
-def _original(ours: xr.Dataset) -> xr.Dataset | None:
-    for k, name in enumerate(ours["design"].to_numpy()):
-        if str(name).rpartition(" ")[2] == "original":
-            return ours.isel(design=k)
-    return None
-
-
-def _best(ours: xr.Dataset) -> xr.Dataset:
-    """The recommended design, of `_ours`."""
-    return ours.isel(design=int(_judged(ours).argmin()))
-
-
-def _judged(ours: xr.Dataset) -> np.ndarray:
-    """What designs of a case are compared by: infinite for those that keep its constraints less well than others."""
-    if is_plain(ours.isel(design=0)):
-        return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
-    order = ("", "kept", "cannot be told", "broken")
-    ranks = np.array([order.index(standing(str(one))) for one in ours["constraints"].to_numpy()])
-    merit = ours["first_true"].to_numpy()
-    level = ranks == ranks.min()
-    if ranks.min() > 1 and "constraint_excess" in ours:  # none is surely within: the nearest
-        excess = ours["constraint_excess"].to_numpy()
-        within = level & (excess <= 0.0)
-        level, merit = (within, merit) if within.any() else (level, excess)
-    return np.where(level, merit, np.inf)
-
-
-def _merit(ours: xr.Dataset, best: xr.Dataset) -> str:
-    """What `_judged` goes by, in words."""
-    if is_plain(best):
-        return f"lowest mean + {SPAN:g} standard deviations of f"
-    words = f"lowest {labels.statistic(str(best['first_goal'].item()))}"
-    found = standing(str(best["constraints"].item()))
-    if found == "broken":
-        return "smallest violation of the constraints"
-    if found == "cannot be told":
-        inside = float(best.get("constraint_excess", np.nan)) <= 0.0
-        return (
-            f"{words} where estimates satisfy the constraints,"
-            if inside
-            else "smallest estimated violation of the constraints"
-        )
-    return f"{words} within the constraints" if found else words
 
 
 _NONE = {
@@ -242,7 +143,7 @@ def _case(best: xr.Dataset) -> str:
 
 def _values(best: xr.Dataset) -> str:
     shown = [
-        f"{labels.words(v)} = {labels.quantity(float(v), str(v.attrs['units']))}"
+        f"{labels.words(v)} = {labels.value(v)}"
         for v in labels.design_variables(best)
         if np.isfinite(float(v))
     ]
@@ -350,7 +251,7 @@ def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     if not float(own["chaotic"]) > SOME:
         return f"{text}; this one is not: perturbations of 1e-9 leave its samples unchanged"
     return (
-        f"{text}. Perturbations of 1e-9 change {float(own['chaotic']):.0%} of the samples of this one and explain "
+        f"{text}. Perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples and explain "
         f"{float(own['chaos_share']):.0%} of its variance"
     )
 

@@ -8,18 +8,17 @@ import xarray as xr
 
 from hpcclear.base.objectives import ENDS
 from hpcclear.report import alike
-from hpcclear.report.answer import (
+from hpcclear.report.answer import bounds, unit_of
+from hpcclear.report.figures import labels
+from hpcclear.report.merit import (
     USUAL,
     VERDICTS,
-    bounds,
     counts,
     goals_of,
     is_plain,
     recommended,
     standing,
-    unit_of,
 )
-from hpcclear.report.figures import labels
 
 BESIDE = ("original", *ENDS[:2])
 """Designs that every case with a baseline has."""
@@ -106,7 +105,11 @@ def _role(end: str, own: xr.Dataset) -> str:
 
 def masses(verified: xr.Dataset) -> list[xr.DataArray]:
     """Return the design variables that are masses."""
-    return [v for v in labels.design_variables(verified) if v.attrs.get("units") == "kg"]
+    return [
+        v
+        for v in labels.design_variables(verified)
+        if v.attrs.get("units") == "kg" and "of_random_inputs" not in v.attrs
+    ]
 
 
 def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:

@@ -31,6 +31,7 @@ ROWS: dict[str, tuple[str, ...]] = {
     "verification": ("design",),
     "chaos": ("design",),
     "contributions": ("design", "input"),
+    "worst": ("design", "input"),
     "claims": ("claim",),
     "readings": ("reading", "design"),
     "statistics": ("bin",),

@@ -23,6 +23,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
+from hpcclear.results.names import designs_in
 
 INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""
@@ -280,7 +281,7 @@ class Checkpoint:
 
     def _designs(self, content: xr.Dataset) -> np.ndarray:
         """Designs (n, k) of a part, a column for each name."""
-        designs = dataset.designs(content)
+        designs = designs_in(content)
         columns = [designs[name] for name in self.names]
         return np.stack(columns, 1) if columns else np.empty((content.sizes["sample"], 0))
 
@@ -383,7 +384,7 @@ class Checkpoint:
             self.problems.append(f"samples of {path.name} are done again: {error.reason}")
             return
         check_key(content, self.key, path)
-        if set(dataset.designs(content)) != set(self.names):
+        if set(designs_in(content)) != set(self.names):
             self.problems.append(f"samples of {path.name} are done again: other design variables")
             return
         self._keep(level, path, dataset.records(content), self._designs(content))

@@ -4,19 +4,15 @@ The names, dimensions and units come from `hpcclear.results.names`; how bytes re
 `hpcclear.results.netcdf` and `hpcclear.results.files`.
 """
 
-import functools
 import os
-import platform
 import re
 from collections.abc import Iterator, Mapping, Sequence, Sized
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from hpcclear.base import host
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import (
@@ -28,21 +24,22 @@ from hpcclear.base.outcome import (
     OUTCOME,
     STEADY,
     WAVE_ROWS,
-    Status,
 )
 from hpcclear.results import netcdf
-from hpcclear.results.names import DESIGN_VARIABLES, FORMER, FURTHER, KINDS, Column, Kind
+from hpcclear.results.faults import fault_of
+from hpcclear.results.names import (
+    DESIGN_VARIABLES,
+    FORMER,
+    FURTHER,
+    FURTHER_DIMS,
+    KINDS,
+    LIMIT,
+    ROLE,
+    Column,
+    Kind,
+)
 
 CONVENTIONS = "CF-1.11"
-_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
-LINKAGE_DIMS = {"body", "point", "pin"}
-FURTHER_DIMS = LINKAGE_DIMS | {"wave", "angle", "mode"} | {
-    "record", "particle", "feature", "candidate", "revolutions",
-}  # fmt: skip
-"""Coordinates that only some files have."""
-
-_ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
-_LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
 
 # -----------------------------------------------------------------------------------------------
@@ -150,9 +147,9 @@ def _design_row(
     table: Kind,
 ) -> tuple[Column, dict[str, str]]:
     """Row and further attributes of a design variable, or of a limit of one."""
-    dims, base, start, role = table.design_dims, name, "", _ROLE
+    dims, base, start, role = table.design_dims, name, "", ROLE
     if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
-        dims, base, start, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", _LIMIT
+        dims, base, start, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", LIMIT
     unit, long_name = DESIGN_VARIABLES.get(base, (None, f"design variable {base}"))
     unit = units.get(base, unit)
     unit = "1" if unit == "" else unit
@@ -285,29 +282,23 @@ def records(samples: xr.Dataset) -> np.ndarray:
     return found
 
 
-def designs(samples: xr.Dataset) -> dict[str, np.ndarray]:
-    """The design variables in a dataset, by their names or scene paths."""
-    return {
-        str(variable.attrs["scene_path"]): variable.to_numpy()
-        for variable in samples.data_vars.values()
-        if variable.attrs.get("role") == _ROLE
-    }
-
-
 def response_dataset(
     time: ArrayLike,
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
-    linkage: Mapping[str, Sequence[str]] | None = None,
+    linkage: Mapping[str, Sequence[str] | np.ndarray] | None = None,
 ) -> xr.Dataset:
     """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
 
-    `linkage`: labels along the dimensions ``body``, ``point`` and ``mode``, of series that have these.
+    `linkage`: labels or numbers along further dimensions, of what has these.
     """
     coords = {"time": time, "joint": np.array(joints, dtype=str)}
-    coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
+    coords |= {
+        name: words if isinstance(words, np.ndarray) else np.array(words, dtype=str)
+        for name, words in (linkage or {}).items()
+    }
     attrs = {**(attributes or {}), **_checked(data)}
     return dataset("response", coords, data, attrs, objective=objective)
 
@@ -321,45 +312,6 @@ def timing_dataset(
     """Where the time went: arrays of shape (ranks, stages) in seconds; kind ``timing``."""
     coords = {"rank": np.arange(np.shape(data["busy"])[0]), "stage": np.array(stages, dtype=str)}
     return dataset("timing", coords, {**data, "command": command}, attributes)
-
-
-def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, str]:
-    """Global attributes that say what made a file; no time in them: equal runs, equal bytes.
-
-    Parameters
-    ----------
-    scene, scene_hash : str
-        Its text and the hash of its content.
-    references : str
-        Published work that its numbers are taken from; "" leaves the attribute out.
-    """
-    version = _version()
-    return {
-        "source": f"hpcclear {version}",
-        "history": f"written by hpcclear {version}",
-        **({"references": references} if references else {}),
-        "scene": scene,
-        "scene_hash": scene_hash,
-        "hpcclear_version": version,
-        "versions": _versions(),
-        "processor": _processor(),
-    }
-
-
-@functools.cache
-def _version() -> str:
-    return metadata.version("hpcclear")
-
-
-@functools.cache
-def _versions() -> str:
-    found = [f"python {platform.python_version()}"]
-    return ", ".join(found + [f"{name} {metadata.version(name)}" for name in _PACKAGES])
-
-
-@functools.cache
-def _processor() -> str:
-    return host.processor()
 
 
 # -----------------------------------------------------------------------------------------------
@@ -407,7 +359,7 @@ def read(
     place = _path(path)
     content = netcdf.load(place)
     content = content.rename({o: n for n, o in FORMER.items() if o in content and n not in content})
-    fault = _fault(content, kind)
+    fault = fault_of(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")
     found = content.attrs.get("scene_hash")
@@ -451,59 +403,3 @@ def _path(path: str | os.PathLike[str]) -> Path:
             "file", text, "a path cannot contain a NUL character", "Choose another name"
         )
     return Path(text)
-
-
-def _fault(content: xr.Dataset, kind: str | None) -> str | None:
-    """What is wrong with a dataset that was read, or None."""
-    found = content.attrs.get("hpcclear_kind")
-    if not isinstance(found, str) or found not in KINDS:
-        return "it does not say which kind of result it holds"
-    if kind is not None and found != kind:
-        return f"it holds {found}, not {kind}"
-    table = KINDS[found]
-    missing = (table.required | (set(table.coords) - FURTHER_DIMS)) - set(content.variables)
-    if missing:
-        return f"it lacks {', '.join(sorted(missing))}"
-    for key, variable in content.variables.items():
-        name = str(key)
-        row = table.coords.get(name) or table.data.get(name)
-        if row is None:
-            roles = {_ROLE: table.design_dims, _LIMIT: table.limit_dims}
-            dims = roles.get(str(variable.attrs.get("role")))
-            if dims is None:
-                return f"it holds {name}, which {found} has not"
-            if not isinstance(variable.attrs.get("scene_path"), str):
-                return f"{name} does not say which scene path it is"
-            row = Column(dims, "", "", "f8")
-        if variable.dims != row.dims:
-            return f"{name} has dimensions {variable.dims}, not {row.dims}"
-        kinds = {"f8": "f", "i8": "i", "i1": "i", "text": "U"}
-        if variable.dtype.kind != kinds[row.dtype]:
-            return f"{name} has type {variable.dtype}, not {row.dtype}"
-        if name in table.coords and row.dtype == "f8" and not np.isfinite(variable.values).all():
-            return f"{name} is not finite everywhere"
-    return _outcome_fault(content) if "status" in content else None
-
-
-_NUMBERS = [name for name in OUTCOME.names or () if OUTCOME[name].base.kind == "f"]
-
-
-def _outcome_fault(content: xr.Dataset) -> str | None:
-    """Outcomes that cannot be, such as a number in a failed sample."""
-    status = content["status"]
-    if not np.isin(status, [int(code) for code in Status]).all():
-        return "a status is unknown"
-    finished = status == Status.OK
-    if bool((finished & ~np.isfinite(content["objective"])).any()):
-        return "a finished simulation has no objective"
-    for name in _NUMBERS:
-        judged = name not in JUDGED or "regime" in content  # 0 where nobody looked
-        if judged and name in content and bool((~finished & content[name].notnull()).any()):
-            return f"a failed simulation has a number in {name}"
-    if "sample" in content.coords:
-        samples = content["sample"].to_numpy()
-        if (samples < 0).any() or (np.diff(samples) <= 0).any():
-            return "sample numbers are not in order"
-        if not all(np.isfinite(values).all() for values in designs(content).values()):
-            return "a design is not finite"
-    return None

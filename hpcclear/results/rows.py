@@ -8,6 +8,7 @@ Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^
 from typing import NamedTuple
 
 from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.outcome import FIELDS, IMPACTS
 
 Dims = tuple[str, ...]
 
@@ -59,39 +60,38 @@ def text(dims: Dims, long_name: str, *, required: bool = False) -> Column:
 
 def outcome(*per_sample: str) -> Columns:
     """What one simulation comes to, in a file with these dimensions."""
-    per_joint = (*per_sample, "joint")
-    # fmt: off
     return {
-        "objective": number(per_sample, "objective", f"objective f, {MEAN_GAP.words}", required=True),
-        "objective_spread": number(per_sample, "objective",
-        "cycle-to-cycle standard deviation of f", required=True),
-        "objective_uncertainty": number(per_sample, "objective", "half-width of f, by replicas or of its steady mean"),
-        "objective_limit": number(per_sample, "objective", "half-width of the 95 % confidence interval of f as a steady mean"),
-        "regime": flag(per_sample, "kind of motion"),
-        "period": number(per_sample, "1", "period of the motion in revolutions"),
-        "lyapunov_exponent": number(per_sample, "1", "largest Lyapunov exponent, per revolution"),
-        "lyapunov_exponent_limit": number(per_sample, "1", "half-width of the 95 % confidence interval of lyapunov_exponent"),
-        "attractors": number(per_sample, "1", "number of different motions reached from several starts"),
-        "steady_rtol": number(per_sample, "1", "tightest relative tolerance used for the steady mean"),
-        "steady_revolutions": number(per_sample, "1", "revolutions of all replicas used for the steady mean"),
-        "mean_gap": number(per_joint, "m", "time mean of the distance from the clearance circle"),
-        "peak_contact_force": number(per_joint, "N", "largest contact force over the averaged revolutions"),
-        "mean_contact_force": number(per_joint, "N", "mean contact force over the averaged revolutions"),
-        "peak_crank_moment": number(per_sample, "N m", "largest absolute torque of the drive on the crank"),
-        "slider_acceleration_deviation": number(per_sample, "m/s^2",
-        "standard deviation of the slider acceleration in time"),
-        "point_acceleration_deviation": number(per_sample, "m/s^2",
-        "root mean square of the acceleration of the followed point about its mean"),
-        "peak_point_acceleration": number(per_sample, "m/s^2", "largest acceleration of the followed point"),
-        "rate_of_objective": number(per_joint, "rate", "what is made of the objective's own rate"),
-        "sliding_work": number(per_joint, "J", "normal force times sliding distance in a revolution"),
-        "energy_error": number(per_sample, "1", "residual of the energy balance, relative"),
-        "latched": flag(per_joint, "whether damping uses the last impact velocity, for whole revolutions"),
-        "rhs_evaluations": count(per_sample, "number of evaluations of the equations of motion", required=True),
-        "status": flag(per_sample, "outcome of the simulation", required=True),
-        "flags": flag(per_sample, "validity warnings of the result"),
+        name: Column((*per_sample, one.per) if one.per else per_sample, one.unit, one.words, one.kind, one.required)
+        for name, one in FIELDS.items()
+        if name != "sample" and (per_sample or one.per != "wave")
+    }  # fmt: skip
+
+
+def by_revolution() -> Columns:
+    """Measures of impact and noise of each averaged revolution, and half-widths of their means."""
+    found = {}
+    means = outcome()
+    for name in IMPACTS:
+        row = means[name]
+        dims = ("revolution", *row.dims)
+        found[f"{name}_by_revolution"] = number(dims, row.units, f"{row.long_name}: of each")
+        words = f"half-width of the 95 % confidence interval of {name}"
+        found[f"{name}_limit"] = number(row.dims, row.units, words)
+    return found
+
+
+def spectrum(name: str, words: str, *dims: str) -> Columns:
+    """Orders and third-octave levels of a force."""
+    found = {
+        f"{name}_orders": number(
+            ("order", *dims), "N", f"root mean square of the order in the {words}"
+        )
     }
-    # fmt: on
+    level = f"third-octave level of the {words}, dB re 1e-6 N; NaN of a band without an order"
+    for end, which in (("", ""), ("_lower", ": lower end"), ("_upper", ": upper end")):
+        interval = f"{which} of its 95 % confidence interval" if which else ""
+        found[f"{name}_level{end}"] = number(("band", *dims), "1", level + interval)
+    return found
 
 
 def fit(*dims: str) -> Columns:

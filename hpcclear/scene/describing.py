@@ -18,7 +18,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
         clearance = scene.number(f"{scene.joint_key(name)}.clearance")
         size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
-        yield f"clearance {size} in joint {name}" + (f" ({NAMES[name]})" if name in NAMES else "")
+        where = f"joint {name}" if name in scene.pins() else f"guide {name}"
+        where = "the guide" if where == "guide guide" else where
+        yield f"clearance {size} in {where}" + (f" ({NAMES[name]})" if name in NAMES else "")
         joint: Any = scene.clearance_joint(name)
         if joint.out_of_round is not None:
             yield f"joint {name} out of round"
@@ -77,7 +79,7 @@ def warnings(scene: SceneTables) -> Iterator[str]:
                 f"mechanism.{name}.mass_center = {link.mass_center:g} m lies beyond the pins, "
                 f"which are at 0 and {link.length:g} m"
             )
-    for name in scene.clearance_joints():
+    for name in scene.pins():
         joint: Any = scene.clearance_joint(name)
         start = joint.start_eccentricity
         parts = start if isinstance(start, tuple) else (start.x, start.y)

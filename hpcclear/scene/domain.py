@@ -62,12 +62,12 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
 def _reaches(study: Study, widen: Iterable[str]) -> dict[str, tuple[float, float]]:
     """How far each path moves below and above its design value."""
     rows = [study.random_input(name) for name in widen]
-    return {
-        path: (min(row.span[0], 0.0), max(row.span[1], 0.0))
-        for row in rows
-        if not row.absolute
-        for path in row.paths
-    }
+    found: dict[str, tuple[float, float]] = {}
+    for row in rows:
+        if not row.absolute:
+            low, high = study.reach(row)
+            found |= dict.fromkeys(row.paths, (min(low, 0.0), max(high, 0.0)))
+    return found
 
 
 def _bounds(
@@ -77,6 +77,8 @@ def _bounds(
     reach: dict[str, tuple[float, float]],
 ) -> tuple[float, float]:
     lower, upper = variable.bounds
+    if not variable.paths:
+        return lower, upper
     low, high = reach.get(variable.paths[0], (0.0, 0.0))
     if variable.ratio is None:
         return lower + low, upper + high

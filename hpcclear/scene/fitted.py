@@ -7,8 +7,8 @@ from pydantic_core import PydanticCustomError
 
 from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import quantities, replace
-from hpcclear.scene.variables import SHORT_NAMES
 
 
 def with_fits_of_joints(content: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -23,12 +23,13 @@ def with_fits_of_joints(content: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def with_shares(content: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The content of a file with `half_width = "3 %"` of its random inputs as that share of the number that they scatter about.
+    """The content of a file with `half_width = "3 %"` of its random inputs as that share of the number that they scatter about;
+    where the study varies that, it stays a share, and the input is `relative`.
 
     Raises
     ------
     PydanticCustomError
-        If the number is not there, or a design variable moves it.
+        If the number is not there.
     """
     rows = _at(content, "study.random")
     for name, row in rows.items() if isinstance(rows, Mapping) else ():
@@ -41,10 +42,14 @@ def with_shares(content: Mapping[str, Any]) -> Mapping[str, Any]:
             if path not in quantities() or not quantities()[path].unit:
                 continue  # a percentage is a number of its own there
             if isinstance(_at(content, f"study.variables.{name}"), Mapping) and "mean" not in row:
-                raise invalid(
-                    "is a share of a number that the study varies",
-                    f"Write it in {quantities()[path].unit}", where, share,
-                )  # fmt: skip
+                others = [row[k] for k in ("half_width", "deviation") if k in row]
+                if not all(isinstance(one, str) and one.rstrip().endswith("%") for one in others):
+                    raise invalid(
+                        "is a share of the design's value, and what stands beside it is none",
+                        f"Write both in % or both in {quantities()[path].unit}", where, share,
+                    )  # fmt: skip
+                content = replace(content, f"study.random.{name}.relative", True)
+                continue
             middle = row["mean"] if "mean" in row else _number(content, path)
             if middle is None:
                 raise invalid(

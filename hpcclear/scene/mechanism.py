@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.bending import Bending
-from hpcclear.scene.driving import Turns, check_start
+from hpcclear.scene.driving import Turns, check_start, check_torque
 from hpcclear.scene.fields import (
     Curve,
     CurveOf,
@@ -20,6 +20,9 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.fits import with_clearance
+from hpcclear.scene.guides import SliderGuide
+from hpcclear.scene.loads import Law
+from hpcclear.scene.materials import Material
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
 
@@ -51,6 +54,8 @@ class Slider(Table):
 
     mass: Mass
     """kg."""
+    inertia: Inertia | None = None
+    """Moment of inertia about its pin, where its mass centre is, kg m2; needed where its guide has clearance."""
 
 
 class Mechanism(Table):
@@ -107,8 +112,11 @@ class TorqueDrive(Table):
     """A torque acts on the free crank; its speed is part of the motion."""
 
     kind: Literal["torque"]
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """N m, constant or ``[[crank angle, torque], ...]`` over the turns of a revolution."""
+    torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
+    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m, straight from row
+    to row and level beyond."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
@@ -130,23 +138,17 @@ class TorqueDrive(Table):
     @model_validator(mode="after")
     def _started(self) -> "TorqueDrive":
         check_start(self)
+        check_torque(self)
         return self
 
 
 Drive = Annotated[ConstantSpeed | TorqueDrive, Field(discriminator="kind")]
 
 
-class Material(Table):
-    """Elastic constants of one contact partner."""
-
-    youngs_modulus: Annotated[float, Quantity("Pa", above=0)]
-    """Pa."""
-    poisson_ratio: Annotated[float, Quantity("", above=-1, most=0.5)]
-    """Poisson's ratio."""
-
-
 def length_path(joint: Any) -> str | None:
-    """Where a joint with clearance has the length of its bearing: its own entry, or that of its film or wear."""
+    """Where a joint with clearance has its length at right angles to the plane: its own entry, or that of its film or wear."""
+    if joint.corners:
+        return None if joint.width is None else "width"
     if joint.length is not None:
         return "length"
     parts = ("film", "wear")
@@ -169,6 +171,9 @@ def check_journal(joint: Any) -> None:
 
 class ClearanceJoint(Table):
     """A journal that moves freely in a bearing larger than itself by the clearance."""
+
+    geometry: ClassVar[str] = "pin_in_bearing"
+    corners: ClassVar[tuple[str, ...]] = ()
 
     kind: Literal["clearance"]
     clearance: PositiveLength
@@ -229,9 +234,11 @@ Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]
 
 
 class Joints(Table):
-    """The two joints that may have clearance; the joint of crank and frame is ideal."""
+    """The joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
     """O12."""
     rod_slider: Joint
     """O23."""
+    guide: SliderGuide | None = None
+    """The slider's guide; left out, it has no clearance."""

@@ -2,7 +2,7 @@
 mechanism of them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -23,7 +23,9 @@ from hpcclear.scene.fields import (
 )
 from hpcclear.scene.film import Film
 from hpcclear.scene.fits import with_clearance
-from hpcclear.scene.mechanism import Material, check_journal, slender_inertia
+from hpcclear.scene.guides import NOT_OF_GUIDES, OfContacts, check_slide
+from hpcclear.scene.materials import Materials
+from hpcclear.scene.mechanism import check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound
 from hpcclear.scene.wear import Wear
@@ -116,15 +118,11 @@ class PlanarRevolute(Table):
     """``body.point``, or ``ground.point``."""
 
 
-class Materials(Table):
-    """Of both partners of a contact."""
-
-    bearing: Material
-    journal: Material
-
-
 class PlanarClearance(Table):
     """A journal in a bearing larger than itself."""
+
+    geometry: ClassVar[str] = "pin_in_bearing"
+    corners: ClassVar[tuple[str, ...]] = ()
 
     name: str
     kind: Literal["clearance"]
@@ -169,19 +167,42 @@ class Rubbing(Table):
     """Sliding speed below which the force falls to zero with the speed, m/s."""
 
 
-class PlanarSlide(Table):
-    """A guide on the ground or on a body."""
+class PlanarSlide(OfContacts, Table):
+    """A guide on the ground or on a body; with clearance, a rectangular slider in a channel that is a little higher."""
 
     name: str
     kind: Literal["slide"]
     point: str
-    """``body.point`` that moves along the line."""
+    """``body.point`` that moves along the line; with clearance, the middle of the slider."""
     line: str
     """``body.point``, or ``ground.point``, on the line."""
     angle: Angle = 0.0
     """Direction of the line in its carrier's axes, rad."""
     friction: Rubbing | None = None
-    """Left out, it slides freely."""
+    """Of a guide without clearance; left out, it slides freely."""
+    clearance: PositiveLength | None = None
+    """Gap on either side of a slider in the middle of its channel, m; left out, there is none."""
+    length: PositiveLength | None = None
+    """Of a slider with clearance, along the line, m."""
+    height: PositiveLength | None = None
+    """Of such a slider, across the line, m; the channel is higher by twice the clearance."""
+    corner_radius: PositiveLength | None = None
+    """Radius to which the slider's corners are rounded, m; stiffness follows from it."""
+    width: PositiveLength | None = None
+    """Of the slider, at right angles to the plane, m; line contact needs it."""
+    materials: Materials | None = None
+    """Of channel (bearing) and slider (journal), with clearance."""
+    start_offset: Length | None = None
+    """How far the slider's middle is to the left of the guide's line at the start, m; in the middle unless said otherwise."""
+    start_tilt: Angle | None = None
+    """Angle of the slider against the line at the start, rad; 0 unless said otherwise."""
+
+    elsewhere: ClassVar = NOT_OF_GUIDES
+
+    @model_validator(mode="after")
+    def _slider_fits(self) -> "PlanarSlide":
+        check_slide(self)
+        return self
 
 
 class PlanarFixed(Table):

@@ -111,9 +111,11 @@ def _joints(scene: SceneTables) -> Iterator[str]:
                     f"{key}.{part}.youngs_modulus = {modulus:g} Pa is {what}; "
                     'steel has "206 GPa", bronze "110 GPa", a polymer "2 GPa"'
                 )
-        if joint.clearance > WIDEST * joint.bearing_radius:
+    for name in scene.pins():
+        pin, key = scene.pin(name), scene.joint_key(name)
+        if pin.clearance > WIDEST * pin.bearing_radius:
             yield (
-                f"{key}.clearance = {joint.clearance:g} m is {joint.clearance / joint.bearing_radius:.0%} of the "
+                f"{key}.clearance = {pin.clearance:g} m is {pin.clearance / pin.bearing_radius:.0%} of the "
                 "bearing's radius; write the radial clearance, half of the difference of the diameters"
             )
 
@@ -127,7 +129,7 @@ def _films(scene: SceneTables) -> Iterator[str]:
                 f"{key}.viscosity = {film.viscosity:g} Pa s is {what}; engine oil has 0.01 Pa s when hot and 0.3 when cold, "
                 f'and if mPa s are meant, write "{film.viscosity:g} mPa*s"'
             )
-        ratio = 0.5 * film.length / scene.clearance_joint(name).bearing_radius
+        ratio = 0.5 * film.length / scene.pin(name).bearing_radius
         least, most = film.law.lengths
         if not least <= ratio <= most:
             yield (

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
+from hpcclear.scene.choices import expanded
 from hpcclear.scene.domain import entries
 from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.paths import described, quantities
@@ -48,12 +49,13 @@ class Points:
     @property
     def units(self) -> tuple[str, ...]:
         """SI unit of each column, "" for none."""
-        return tuple(quantities()[paths[0]].unit for paths in self.paths)
+        return tuple(quantities()[paths[0]].unit if paths else "" for paths in self.paths)
 
     @property
     def words(self) -> dict[str, str]:
         """What each column is, by its name: a file's long names."""
-        return {name: described(paths) for name, paths in zip(self.names, self.paths, strict=True)}
+        named = zip(self.names, self.paths, strict=True)
+        return {name: described(paths) for name, paths in named if paths}
 
     def column(self, name: str) -> Array:
         """Values of one column, shape (n,)."""
@@ -77,6 +79,7 @@ def check_points(
         If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
         radius, friction at rest is less than sliding, or a rod is not longer than its crank.
     """
+    points = expanded(scene.study, points)
     for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
         for path in paths:
             bounds = quantities()[path].bounds()
@@ -91,15 +94,21 @@ def check_points(
     if isinstance(scene.mechanism, Mechanism):
         reason = "the rod no longer than the crank"
         pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
-    for joint in scene.clearance_joints():
+    for joint in scene.pins():
         key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
         pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
+    for joint in scene.guides():
+        key, reason = scene.joint_key(joint), "corners rounder than half of the slider"
+        pairs += [
+            (f"{key}.corner_radius", f"{key}.{size}", reason) for size in ("length", "height")
+        ]
     for small, large, reason in pairs:
         lower, upper = (
             entries(scene, points.paths, points.values, path) for path in (small, large)
         )
-        gap = np.broadcast_to(np.asarray(upper - lower), len(points))
-        _refuse(gap <= 0, gap, f"{large} - {small}", f"makes {reason}", label)
+        times, word = (2.0, "2 ") if small.endswith("corner_radius") else (1.0, "")
+        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
+        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
     _check_laws(scene, points, label)
 
 

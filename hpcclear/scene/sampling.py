@@ -18,6 +18,8 @@ from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.domain import box, slender_inertias, to_physical
 from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.random_inputs import RandomInput
+from hpcclear.scene.study import Study
 from hpcclear.scene.table import read_points
 
 __all__ = [
@@ -101,6 +103,9 @@ def latin_hypercube(
     rng = generator(study.seed, f"lhs {purpose}")
     unit = unit_lhs(count, len(region.names), rng)
     coordinates = region.lower + unit * (region.upper - region.lower)
+    for column, name in enumerate(region.names):
+        if (options := study.variable(name).options) is not None:
+            coordinates[:, column] = _of_options(options, unit[:, column])
     points = Points(
         region.names,
         to_physical(scene, region.names, coordinates),
@@ -204,12 +209,20 @@ def monte_carlo(
             continue
         place = uniform[moving.index(name)]
         if name in chosen:
-            centre = (fixed or {}).get(name, scene.number(paths[column][0]))
-            found = inputs[name].law(place)
-            values[:, column] = found if inputs[name].absolute else centre + found
+            continue  # by designs, below
+        lower, upper = study.variable(name).bounds
+        values[:, column] = lower + place * (upper - lower)
+        if (options := study.variable(name).options) is not None:
+            values[:, column] = _of_options(options, place)
+    for name in chosen:
+        column = names.index(name)
+        centre = (fixed or {}).get(name, scene.number(paths[column][0]))
+        place = uniform[moving.index(name)]
+        if fixed is not None or not study.moves(inputs[name]):
+            found = study.law(inputs[name], {**(fixed or {}), name: centre})(place)
         else:
-            lower, upper = study.variable(name).bounds
-            values[:, column] = lower + place * (upper - lower)
+            found = _by_designs(study, inputs[name], names, values, place, centre)
+        values[:, column] = found if inputs[name].absolute else centre + found
     if fixed is None:
         for column, name in enumerate(names):
             if name not in chosen and study.variable(name).ratio is not None:
@@ -219,14 +232,46 @@ def monte_carlo(
     return points
 
 
-def offsets(scene: Scene, random: Sequence[str], chances: Sequence[Array]) -> dict[str, Array]:
+def _of_options(options: Sequence[float], place: Array) -> Array:
+    """Values of a variable that takes some only, each as often as another, of numbers from 0 to 1, (n,)."""
+    count = len(options)
+    return np.array(options)[np.minimum((place * count).astype(np.int64), count - 1)]
+
+
+def _by_designs(
+    study: Study,
+    row: RandomInput,
+    names: Sequence[str],
+    values: Array,
+    place: Array,
+    centre: float,
+) -> Array:
+    """A random input at probabilities (n,) where every row of `values` (n, d) is a design of its own."""
+    drivers = [name for name in study.drivers(row) if name in names]
+    columns = [names.index(name) for name in drivers]
+    keys, which = np.unique(values[:, columns], axis=0, return_inverse=True)
+    found = np.empty(len(values))
+    for k, key in enumerate(keys):
+        design = dict(zip(drivers, key.tolist(), strict=True)) | {row.name: centre}
+        here = which.ravel() == k
+        found[here] = study.law(row, design)(place[here])
+    return found
+
+
+def offsets(
+    scene: Scene,
+    random: Sequence[str],
+    chances: Sequence[Array],
+    design: Mapping[str, float] | None = None,
+) -> dict[str, Array]:
     """Random inputs at independent probabilities, (n,) each, which are made to vary together as the study says: values of
-    those that are absolute, else differences from the design."""
+    those that are absolute, else differences from the design (SI, by name), which counts where distributions depend on it."""
     study = scene.required_study
     if study.correlation is not None:
         chances = study.correlation.together(random, chances)
+    rows = [study.random_input(name) for name in random]
     return {
-        name: study.random_input(name).law(one) for name, one in zip(random, chances, strict=True)
+        row.name: study.law(row, design or {})(one) for row, one in zip(rows, chances, strict=True)
     }
 
 

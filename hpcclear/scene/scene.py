@@ -10,6 +10,7 @@ from hpcclear.base import markup
 from hpcclear.base.errors import InputError, unboxed
 from hpcclear.plugins.sources import using
 from hpcclear.scene import citation, describing, domain
+from hpcclear.scene.choices import input_entry
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.former import renewed
@@ -18,6 +19,7 @@ from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.units import noting
 from hpcclear.scene.validation import check_path, validated
+from hpcclear.scene.variables import Variable
 
 
 class Scene(SceneTables):
@@ -41,7 +43,8 @@ class Scene(SceneTables):
         numbers = self._numbers()
         for table, rows in (("variables", self.study.variables), ("random", self.study.random)):
             for row in rows:
-                for path in row.paths:
+                of_rows = row.entry_paths if isinstance(row, Variable) else ()
+                for path in (*row.paths, *of_rows):
                     if path not in numbers:
                         raise invalid(
                             f"drives {path}, and this scene has no number there",
@@ -49,6 +52,12 @@ class Scene(SceneTables):
                             key=f"study.{table}.{row.name}",
                         )
         self._check_corners()
+        for variable in self.study.variables:
+            if variable.rows:
+                try:
+                    self.baseline(variable.name)
+                except InputError as error:
+                    raise invalid(error.reason, error.remedy, error.key, error.value) from None
         try:
             domain.box(self, widen=tuple(row.name for row in self.study.random))
         except InputError as error:
@@ -86,16 +95,16 @@ class Scene(SceneTables):
         assert self.study is not None
         names = (*PHYSICAL, "numerics", "plugins")
         content = {name: plain(table) for name in names if (table := getattr(self, name))}
-        reach = {row.name: row.span for row in self.study.random if not row.absolute}
+        reach = {row.name: self.study.reach(row) for row in self.study.random if not row.absolute}
         spans = {
-            variable.name: ("variables", variable.paths, variable.range)
+            variable.name: ("variables", variable.paths, variable.bounds)
             for variable in self.study.variables
-            if variable.range is not None
+            if variable.paths and variable.ratio is None
         }
         for row in self.study.random:
             if row.name not in self.study.names:
                 centre = 0.0 if row.absolute else self.number(row.paths[0])
-                reach[row.name] = row.span
+                reach[row.name] = self.study.reach(row)
                 spans[row.name] = ("random", row.paths, (centre, centre))
         for name, (table, paths, (lower, upper)) in spans.items():
             corners = [(table, lower), (table, upper)] if table == "variables" else []
@@ -103,19 +112,44 @@ class Scene(SceneTables):
                 low, high = reach[name]
                 corners += [("random", lower + low), ("random", upper + high)]
             for key, value in corners:
-                corner: Mapping[str, Any] = content
-                for path in paths:
-                    corner = replace(corner, path, value)
-                try:
-                    Scene.model_validate(corner)
-                except ValidationError as error:
-                    context = error.errors(include_url=False)[0].get("ctx", {})
-                    reason = context.get("reason", "it is not valid")
-                    raise invalid(
-                        f"reaches {name} = {value:g}, which makes no mechanism: {reason}",
-                        "Narrow it",
-                        key=f"study.{key}.{name}",
-                    ) from None
+                entries = dict.fromkeys(paths, value)
+                _check_corner(content, entries, f"study.{key}.{name}", f"{name} = {value:g}")
+        for variable in self.study.variables:
+            for option in variable.rows:
+                entries = {path: float(option.entries[path]) for path in variable.entry_paths}
+                key = f"study.variables.{variable.name}"
+                _check_corner(content, entries, key, f"{variable.name} = {option.name!r}")
+
+    def baseline(self, name: str) -> float:
+        """Where the scene itself is in the column of a study variable: its number, SI, or the row of its table.
+
+        Raises
+        ------
+        InputError
+            The scene's own numbers are not among its rows.
+        """
+        study = self.required_study
+        variable = study.variable(name)
+        if variable.paths:
+            return self.number(variable.paths[0])
+        values = {path: self.number(path) for path in study.own_entries(variable)}
+        for path in variable.input_paths:
+            of, entry = input_entry(path)
+            value: Any = study.random_input(of)
+            for part in entry.split("."):
+                value = None if value is None else getattr(value, part)
+            values[path] = value
+        if not variable.rows:
+            found = next(iter(values.values()))
+            return 1.0 if found is None else float(found)  # of a bore or pin without entries
+        for k, row in enumerate(variable.rows):
+            if all(_alike(row.entries[path], value) for path, value in values.items()):
+                return float(k)
+        listed = ", ".join(f"{path} = {value}" for path, value in values.items())
+        raise InputError(
+            f"study.variables.{name}", listed, "the value of the scene is not among its rows",
+            "Write the values of one row into the scene: that is the baseline design",
+        )  # fmt: skip
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -218,3 +252,27 @@ def _placed(content: Mapping[str, Any], read: Mapping[str, str]) -> Iterator[str
             if isinstance(text, str) and text.strip() in read:
                 yield f"{key}: {text.strip()!r} is read as {read[text.strip()]}"
                 break  # one of a list says it for all
+
+
+def _check_corner(
+    content: Mapping[str, Any], entries: Mapping[str, float], key: str, words: str
+) -> None:
+    """An error for validators unless the scene is one with other entries."""
+    corner = content
+    for path, value in entries.items():
+        corner = replace(corner, path, value)
+    try:
+        Scene.model_validate(corner)
+    except ValidationError as error:
+        context = error.errors(include_url=False)[0].get("ctx", {})
+        reason = context.get("reason", "it is not valid")
+        raise invalid(
+            f"reaches {words}, which makes no mechanism: {reason}", "Narrow it", key=key
+        ) from None
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two entries are the same, numbers to their last digits."""
+    if isinstance(one, float) and isinstance(other, float):
+        return abs(one - other) <= 1e-9 * max(abs(one), abs(other))
+    return bool(one == other)

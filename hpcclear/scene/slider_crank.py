@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from hpcclear.scene.driving import ForceLoad, PlanarDrive, PlanarSpeed, PlanarTorque
+from hpcclear.scene.guides import SHAPED, STARTED
+from hpcclear.scene.materials import Materials
 from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed
 from hpcclear.scene.places import NamedPlace, Place
 from hpcclear.scene.planar import (
     Ground,
-    Materials,
     Planar,
     PlanarBody,
     PlanarClearance,
@@ -55,7 +56,7 @@ _TABLES = {
     "drive": "mechanism.drives.drive",
     "effects.guide_friction": "mechanism.joints.guide.friction",
     "effects.slider_load": "mechanism.loads.load.size",
-    **{f"joints.{name}": f"mechanism.joints.{name}" for name in JOINTS},
+    **{f"joints.{name}": f"mechanism.joints.{name}" for name in (*JOINTS, "guide")},
 }
 
 
@@ -82,7 +83,10 @@ def linkage_of(scene: Any) -> Planar:
         )
     ]  # fmt: skip
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
-    slider = PlanarBody.model_construct(name="slider", mass=mechanism.slider.mass, points=(pin,))
+    turning = {} if mechanism.slider.inertia is None else {"inertia": mechanism.slider.inertia}
+    slider = PlanarBody.model_construct(
+        name="slider", mass=mechanism.slider.mass, points=(pin,), **turning
+    )
     rubs = effects.guide_friction
     friction = None
     if rubs is not None:
@@ -92,8 +96,9 @@ def linkage_of(scene: Any) -> Planar:
         beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
         ground, line = Ground(points=(*ground.points, beside)), "ground.guide"
     guide = PlanarSlide.model_construct(
-        name="guide", kind="slide", point="slider.pin", line=line, friction=friction
-    )
+        name="guide", kind="slide", point="slider.pin", line=line, friction=friction,
+        **_loose(scene.joints.guide),
+    )  # fmt: skip
     frame = PlanarRevolute.model_construct(
         name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o"
     )
@@ -111,6 +116,14 @@ def linkage_of(scene: Any) -> Planar:
         drives=(_drive(scene.drive),),
         loads=loads,
     )
+
+
+def _loose(guide: Any) -> dict[str, Any]:
+    """Entries of the slide that a guide with clearance stands for."""
+    if guide is None:
+        return {}
+    materials = Materials.model_construct(bearing=guide.bearing, journal=guide.journal)
+    return {name: getattr(guide, name) for name in (*SHAPED, *STARTED)} | {"materials": materials}
 
 
 def _joint(scene: Any, name: str) -> PlanarJoint:

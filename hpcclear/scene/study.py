@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
@@ -13,6 +13,9 @@ from hpcclear.scene.cases import Case
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.formula import names_in
+from hpcclear.scene.moving import Moving
+from hpcclear.scene.named import SHORT_NAMES
+from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import (
     CertificateOfEffects,
     MomentAccuracy,
@@ -23,7 +26,7 @@ from hpcclear.scene.stages import (
     Verification,
     of_both,
 )
-from hpcclear.scene.variables import SHORT_NAMES, RandomInput, Variable
+from hpcclear.scene.variables import Variable
 
 _LINKS = ("crank", "rod", "slider")  # in the order they are joined
 LEAST_PER_INPUT = 3
@@ -31,7 +34,7 @@ LEAST_PER_INPUT = 3
 _LINK_NUMBERS = ("mass", "mass_center", "inertia")
 
 
-class Study(Table):
+class Study(Moving, Table):
     """Sampling and optimisation over a scene."""
 
     seed: Annotated[int, Count(0, 2**63 - 1)] = 0
@@ -58,6 +61,9 @@ class Study(Table):
     surrogate: Surrogate = Surrogate()
     swarm: Swarm = Swarm()
     verification: Verification = Verification()
+    worst_case: Annotated[bool, Field(strict=True)] = False
+    """Whether the largest f within the bounds of the random inputs is searched for the best designs (at their corners and
+    inside); inputs without bounds are taken within three standard deviations."""
     certificate: CertificateOfEffects | None = None
     """Left out, the stage is."""
 
@@ -84,6 +90,9 @@ class Study(Table):
             data["random"] = {
                 name: _with_paths(row, variables.get(name)) for name, row in random.items()
             }
+            data["variables"] = {
+                name: _with_unit(row, data["random"]) for name, row in variables.items()
+            }
         stage = data.get("sensitivity", {})
         if isinstance(variables, Mapping) and isinstance(stage, Mapping):
             data["sensitivity"] = {"parameter": _only_clearance(variables), **stage}
@@ -98,6 +107,9 @@ class Study(Table):
                 key="variables",
             )
         self._check_paths()
+        self.check_laws()
+        for row in self.random:
+            self._check_width(row)
         self._check_correlation()
         self._check_cases()
         self.sensitivity.check()
@@ -108,7 +120,7 @@ class Study(Table):
     def _check_paths(self) -> None:
         owner: dict[str, str] = {}
         for variable in self.variables:
-            for path in variable.paths:
+            for path in (*variable.paths, *self.own_entries(variable)):
                 if path in owner:
                     raise invalid(
                         f"{variable.name} and {owner[path]} both drive {path}",
@@ -135,7 +147,6 @@ class Study(Table):
                         "Remove one",
                         key=f"random.{row.name}",
                     )
-            self._check_width(row)
 
     def _check_width(self, row: RandomInput) -> None:
         if row.worn and row.name not in self.names:
@@ -146,7 +157,7 @@ class Study(Table):
             )
         if row.name not in self.names:
             return
-        if self.variable(row.name).range is None:
+        if self.variable(row.name).ratio is not None:
             if row.absolute:
                 raise invalid(
                     "a distribution that does not follow the design needs a domain in SI",
@@ -158,11 +169,11 @@ class Study(Table):
             return  # seen when its lives are known
         lower, upper = self.variable(row.name).bounds
         slack = 1e-12 * (upper - lower)  # half-widths of decimal numbers are not exact
-        low, high = row.span
+        low, high = self.reach(row)
         if row.absolute:
             inside = lower - slack <= low and high <= upper + slack
         else:
-            inside = high - low <= upper - lower + slack
+            inside = bool(row.relative) or self.moves(row) or high - low <= upper - lower + slack
         if not inside:
             raise invalid(
                 "the distribution is wider than its domain, "
@@ -230,8 +241,60 @@ class Study(Table):
                             key=f"cases.{case.name}.{table}.{k}.formula",
                             value=goal.formula,
                         )
+                    if self.variable(name).rows:
+                        raise invalid(
+                            f"{name!r} is a row of a table and no number",
+                            'Give its rows a cost, and write statistic = "cost"',
+                            key=f"cases.{case.name}.{table}.{k}.formula",
+                            value=goal.formula,
+                        )
+                if goal.of is not None and goal.of != self.objective:
+                    why = self._not_recorded(goal.of)
+                    if why:
+                        raise invalid(
+                            why, f"Make it study.objective, and name {self.objective!r} in `of` in its place",
+                            key=f"cases.{case.name}.{table}.{k}.of", value=goal.of,
+                        )  # fmt: skip
+                    goal.placed(2 + self.further.index(goal.of))
+                if goal.statistic == "cost":
+                    priced = tuple(one for one in self.variables if one.name in own and one.priced)
+                    if not priced:
+                        raise invalid(
+                            "no design variable of this case has a cost",
+                            'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one, say',
+                            key=f"cases.{case.name}.{table}.{k}.statistic",
+                        )
+                    goal.priced_by(priced)
+
+    @property
+    def further(self) -> Names:
+        """Responses besides its objective that objectives and constraints of cases are of."""
+        asked = (goal.of for case in self.cases for goal in (*case.goals, *case.kept))
+        return tuple(dict.fromkeys(one for one in asked if one not in (None, self.objective)))  # type: ignore[arg-type]
+
+    @staticmethod
+    def _not_recorded(name: str) -> str:
+        """Why samples of a study do not record a response besides its objective; "" if they do."""
+        found = OBJECTIVES.get(name)
+        if found.rate is not None:
+            return "is made of a rate, and a simulation integrates that of its own objective only"
+        if "objective" in found.asks:
+            return "is made of the mean gap, which samples with another objective do not keep"
+        return ""
 
     def _check_names(self) -> None:
+        of_loads = [one.name for one in self.variables if one.over is not None]
+        if len(of_loads) > 1:
+            raise invalid(
+                f"{of_loads[0]} and {of_loads[1]} both are load cases",
+                "Use one catalogue, with a row for each combination",
+                key=f"variables.{of_loads[1]}.over",
+            )
+        for row in self.random:
+            if row.name in of_loads:
+                raise invalid(
+                    "is a load case", "Remove it, or name another entry", f"random.{row.name}"
+                )
         lists: list[tuple[str, Iterable[str]]] = [
             ("surrogate.optimisation", self.surrogate.optimisation or ()),
             *(("surrogate.models", model) for model in self.surrogate.models or ()),
@@ -246,6 +309,17 @@ class Study(Table):
                     )
             if len(set(names)) < len(names):
                 raise invalid("a variable is named twice", "Remove one", key=key)
+            loads = [n for n in names if n in of_loads]
+            if loads:
+                raise invalid(
+                    f"{loads[0]!r} is a load case, which no design chooses", "Leave it out", key=key
+                )
+            odd = [n for n in names if not self.variable(n).paths and "optimisation" not in key]
+            if odd:
+                raise invalid(
+                    f"{odd[0]!r} has no slope: it is a row of a table, or a width that f does not know",
+                    "Leave it out", key=key,
+                )  # fmt: skip
         if any(
             not names for names in (self.surrogate.models or ()) + (self.sensitivity.groups or ())
         ):
@@ -348,6 +422,7 @@ class Study(Table):
             row.name
             for row in self.variables
             if row.name != self.sensitivity.parameter
+            and row.paths
             and all(path.startswith("mechanism.bodies.") for path in row.paths)
         ]
         last = max(len(of_bodies) - len(of_bodies) % 2 - 2, 0)
@@ -356,18 +431,28 @@ class Study(Table):
 
     @property
     def models(self) -> tuple[Names, ...]:
-        """Inputs of the Kriging models; the last one, `optimisation`, is always among them."""
+        """Inputs of the Kriging models; the last one has those of `optimisation` that f knows."""
         models = self.surrogate.models
         if models is None:
             parameter = self.sensitivity.parameter
             models = tuple((*group, parameter) for group in self.groups if parameter is not None)
-        return (*(model for model in models if model != self.optimisation), self.optimisation)
+        searched = tuple(n for n in self.optimisation if not self.variable(n).silent)
+        return (*(model for model in models if model != searched), searched)
 
     @property
     def optimisation(self) -> Names:
-        """Inputs of the model the swarm searches."""
+        """Variables of the optimisation: inputs of the model the swarm searches, and those that only random inputs know."""
         chosen = self.surrogate.optimisation
-        return self.names if chosen is None else chosen
+        return (
+            tuple(one.name for one in self.variables if one.over is None)
+            if chosen is None
+            else chosen
+        )
+
+    @property
+    def load_cases(self) -> Variable | None:
+        """The variable whose values or rows are load cases of every design."""
+        return next((one for one in self.variables if one.over is not None), None)
 
     def design_variables(self, case: str) -> Names:
         """Z of a case: inputs of the optimisation that are not random wherever the design is."""
@@ -388,6 +473,21 @@ def _with_paths(row: Any, variable: Any) -> Any:
     return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
 
 
+def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
+    """A variable that drives a random input with an entry that has the same unit."""
+    if not isinstance(row, Mapping) or "like" in row:
+        return row
+    given = row.get("follows", row.get("paths", row.get("path", ())))
+    first = given if isinstance(given, str) else next(iter(given or ()), "")
+    _, _, rest = str(first).partition("random.")
+    own = random.get(rest.partition(".")[0])
+    if not rest or not isinstance(own, Mapping) or "fits" in row:
+        return row
+    paths = own.get("paths", own.get("path", SHORT_NAMES.get(rest.partition(".")[0], ())))
+    like = paths if isinstance(paths, str) else next(iter(paths), None)
+    return row if own.get("relative") or like is None else {**row, "like": like}
+
+
 def _only_clearance(variables: Mapping[str, Any]) -> str | None:
     """Name of the only study variable that drives clearances; None if there is none or another."""
     found = []
@@ -395,9 +495,11 @@ def _only_clearance(variables: Mapping[str, Any]) -> str | None:
         own = row if isinstance(row, Mapping) else {}
         paths = own.get("paths", own.get("path", SHORT_NAMES.get(name, ())))
         paths = (paths,) if isinstance(paths, str) else paths
-        clear = isinstance(paths, (list, tuple)) and {
-            str(path).endswith(".clearance") for path in paths
-        }
+        clear = (
+            "range" in own
+            and isinstance(paths, (list, tuple))
+            and {str(path).endswith(".clearance") for path in paths}
+        )
         if clear == {True}:
             found.append(name)
     return found[0] if len(found) == 1 else None

@@ -12,6 +12,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.scene.driving import PlanarTorque, speed_entry
 from hpcclear.scene.fields import Curve
+from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
@@ -75,13 +76,17 @@ def switches(scene: Scene) -> tuple[Switch, ...]:
 
 def _clearances(scene: Scene) -> Iterator[Switch]:
     for label in scene.clearance_joints():
-        if label in scene.numerics.objective_joints:
+        if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        if isinstance(joint, PlanarClearance):
+        ideal: dict[str, Any] | None = {"kind": "ideal"}
+        if isinstance(joint, SliderGuide):
+            ideal = None
+        elif isinstance(joint, PlanarClearance):
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
-        else:
-            ideal = {"kind": "ideal"}
+        elif isinstance(joint, PlanarSlide):
+            kept = ("kind", "point", "line", "angle")
+            ideal = {name: getattr(joint, name) for name in kept}
         yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
 
 
@@ -89,7 +94,7 @@ def _films(scene: Scene) -> Iterator[Switch]:
     for label, film in scene.films().items():
         key = f"{scene.joint_key(label)}.film"
         yield Switch(f"oil film in {label}", {key: None})
-        slender = 0.5 * film.length / scene.clearance_joint(label).bearing_radius
+        slender = 0.5 * film.length / scene.pin(label).bearing_radius
         for words, model in () if film.law.simpler is None else film.law.simpler(slender):
             yield Switch(f"{words} in {label}", {f"{key}.model": model})
 
@@ -203,7 +208,8 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
         turns = turns_of(scene.linkage)
-        yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
+        if drive.torque is not None:
+            yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 
 class Off:

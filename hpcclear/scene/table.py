@@ -8,12 +8,12 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene.fields import nearest
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.sheets import Column, Sheet, read
 from hpcclear.scene.units import UnitError, factor, note_turns, noting, to_si
-from hpcclear.scene.variables import SHORT_NAMES
 
 LABELS = (
     "design",

@@ -16,14 +16,24 @@ from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
 from hpcclear.scene.film import Film
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
+from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
-from hpcclear.scene.planar import Planar, PlanarClearance
+from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.study import Study
-from hpcclear.scene.variables import SHORT_NAMES
 from hpcclear.scene.wear import Lives
+
+Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide
+"""Tables of joints that may have clearance."""
+
+
+def _is_loose(joint: Any) -> bool:
+    """Whether a joint of a linkage has clearance."""
+    slides = isinstance(joint, PlanarSlide)
+    return joint.clearance is not None if slides else isinstance(joint, PlanarClearance)
 
 
 class SceneTables(Table):
@@ -115,7 +125,23 @@ class SceneTables(Table):
                     "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
                     key=f"effects.{entry}",
                 )
+        if self.template is not None and self.joints.guide is not None:
+            self._check_guide()
         return self
+
+    def _check_guide(self) -> None:
+        """A slider with clearance tilts, and rubs at its corners."""
+        if self.slider_crank.slider.inertia is None:
+            raise invalid(
+                "a slider in a guide with clearance can turn, so it needs an inertia",
+                "Write its moment of inertia about its pin in kg m2",
+                key="mechanism.slider.inertia", value=None,
+            )  # fmt: skip
+        if self.effects.guide_friction is not None:
+            raise invalid(
+                "a guide with clearance rubs at the slider's corners, by the friction of all contacts",
+                "Remove it, and write effects.friction", key="effects.guide_friction", value=None,
+            )  # fmt: skip
 
     @model_validator(mode="after")
     def _curves_repeat(self) -> Self:
@@ -136,9 +162,12 @@ class SceneTables(Table):
         if contact is not None and contact.has_length:
             for name in clearance:
                 if length_path(self.clearance_joint(name)) is None:
+                    entry, part = (
+                        ("width", "slider") if name in self.guides() else ("length", "bearing")
+                    )
                     raise invalid(
-                        f'the contact geometry "{contact.geometry}" needs the length of the bearing',
-                        'Add length = "20 mm" or so to the joint', f"{self.joint_key(name)}.length", None,
+                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
+                        f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
                     )  # fmt: skip
         if clearance and self.effects.contact is None:
             raise invalid(
@@ -177,15 +206,15 @@ class SceneTables(Table):
     @model_validator(mode="after")
     def _objective_s_joints_are_there(self) -> Self:
         chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
-        clearance = self.clearance_joints()
+        clearance = dict.fromkeys((*self.clearance_joints(), *self.contact_labels()))
         for joint in chosen:
             if joint not in clearance:
                 raise invalid(
                     f"{joint} is not a joint with clearance of this scene",
-                    nearest(joint, clearance),
+                    nearest(joint, tuple(clearance)),
                     key=key,
                 )
-        if len(set(chosen)) < len(chosen):
+        if len(set(self._contacts_in(chosen))) < len(self._contacts_in(chosen)):
             raise invalid("a joint is named twice", "Name each once", key=key)
         if self.study is not None and self.numerics.objective is not None:
             raise invalid(
@@ -240,13 +269,24 @@ class SceneTables(Table):
         """An objective, of the joints that count here."""
         chosen, labels = self.numerics.objective_joints, self.joint_labels
         joints, places = (
-            tuple(map(labels.index, names)) for names in (chosen, self.clearance_joints())
+            tuple(map(labels.index, names))
+            for names in (self._contacts_in(chosen), self.contact_labels())
         )
         return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
 
     def responses_asked(self) -> bool:
-        """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        return self.numerics.responses or self.objective.needs_responses
+        """Whether each sample records more than gaps and peak forces: asked for, or required by the study."""
+        asked = self.numerics.responses or any(one.needs_responses for one in self._objectives())
+        return asked or self.impacts_asked()
+
+    def impacts_asked(self) -> bool:
+        """Whether each sample records measures of impact and noise: ``numerics.impacts``, or what the study requires of it."""
+        return self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
+
+    def _objectives(self) -> list[Objective]:
+        """The objective, and the further responses of the study."""
+        further = () if self.study is None else self.study.further
+        return [self.objective, *map(self.objective_named, further)]
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""
@@ -266,8 +306,8 @@ class SceneTables(Table):
 
     @property
     def bristles(self) -> int:
-        """Joints whose friction has bristles, each with a state of its own."""
-        return len(self.clearance_joints()) if self.effects.friction.bristled else 0
+        """Contacts whose friction has bristles, each with a state of its own."""
+        return len(self.contact_labels()) if self.effects.friction.bristled else 0
 
     def bending(self) -> dict[str, Bending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
@@ -332,24 +372,45 @@ class SceneTables(Table):
         return path if self.template is None else str(self.template.path_in_linkage(path))
 
     def clearance_joints(self) -> tuple[str, ...]:
-        """Labels of the joints with clearance, O12 before O23; those of a linkage in file order."""
-        return tuple(
-            joint.name for joint in self.linkage.joints if isinstance(joint, PlanarClearance)
-        )
+        """Names of the joints with clearance, O12 before O23; those of a linkage in file order."""
+        return tuple(joint.name for joint in self.linkage.joints if _is_loose(joint))
+
+    def contact_labels(self) -> tuple[str, ...]:
+        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners."""
+        return self._contacts_in(self.clearance_joints())
+
+    def _contacts_in(self, joints: tuple[str, ...]) -> tuple[str, ...]:
+        """Labels of the contacts of joints; labels of contacts stay as they are."""
+        found: list[str] = []
+        for name in joints:
+            corners = () if "." in name else self.clearance_joint(name).corners
+            found += [f"{name}.{word}" for word in corners] or [name]
+        return tuple(found)
+
+    def pins(self) -> tuple[str, ...]:
+        """Names of the joints with clearance that are pins in bearings."""
+        return tuple(n for n in self.clearance_joints() if not self.clearance_joint(n).corners)
+
+    def guides(self) -> tuple[str, ...]:
+        """Names of the guides with clearance."""
+        return tuple(n for n in self.clearance_joints() if self.clearance_joint(n).corners)
 
     @property
     def joint_labels(self) -> tuple[str, ...]:
-        """Labels along the dimension ``joint`` of this scene's datasets: both of a slider-crank, whether open or not."""
-        return self.clearance_joints() if self.template is None else tuple(self.template.JOINTS)
+        """Labels along the dimension ``joint`` of this scene's datasets: the contacts; of a slider-crank without a guide among
+        them both joints, whether open or not."""
+        template = self.template
+        return self.contact_labels() if template is None or self.guides() else (*template.JOINTS,)
 
     @property
     def open_places(self) -> tuple[int, ...]:
-        """Where joints with clearance stand among `joint_labels`, one behind the other."""
-        return tuple(self.joint_labels.index(name) for name in self.clearance_joints())
+        """Where contacts stand among `joint_labels`, one behind the other."""
+        return tuple(map(self.joint_labels.index, self.contact_labels()))
 
     def joint_key(self, label: str) -> str:
-        """Dotted path of a joint's table."""
-        return f"mechanism.joints.{label}" if self.template is None else f"joints.{label}"
+        """Dotted path of the table of a joint, or of a contact's joint."""
+        name = label.partition(".")[0]
+        return f"mechanism.joints.{name}" if self.template is None else f"joints.{name}"
 
     def materials_key(self, label: str) -> str:
         """Dotted path of the table that has the materials of a joint with clearance."""
@@ -362,12 +423,19 @@ class SceneTables(Table):
             return ("effects.guide_friction",) * len(rubs)
         return tuple(f"mechanism.joints.{one.name}.friction" for one in rubs)
 
-    def clearance_joint(self, label: str) -> ClearanceJoint | PlanarClearance:
-        """The table of a joint with clearance."""
-        rows = self.linkage.joints if self.template is None else ()
-        found = next((joint for joint in rows if joint.name == label), None)
-        found = getattr(self.joints, label) if found is None else found
+    def pin(self, name: str) -> ClearanceJoint | PlanarClearance:
+        """The table of a pin in a bearing."""
+        found = self.clearance_joint(name)
         assert isinstance(found, (ClearanceJoint, PlanarClearance))
+        return found
+
+    def clearance_joint(self, label: str) -> Loose:
+        """The table of a joint with clearance, or of a contact's joint."""
+        name = label.partition(".")[0]
+        rows = self.linkage.joints if self.template is None else ()
+        found = next((joint for joint in rows if joint.name == name), None)
+        found = getattr(self.joints, name) if found is None else found
+        assert isinstance(found, Loose)
         return found
 
     @property

@@ -34,6 +34,7 @@ from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
+from hpcclear.scene.choices import expanded
 from hpcclear.scene.describing import unused
 from hpcclear.scene.points import Points
 from hpcclear.study import launched, lives, optimisation
@@ -86,7 +87,7 @@ def run_study(
         The scene has no study, the directory holds results of
         another run, or all simulations of a stage failed.
     Stopped
-        If asked to end early; everything finished is on disk.
+        If requested to end early; everything finished is on disk.
     """
     if tell is not None:
         warnings.warn("use notify instead of tell", DeprecationWarning, stacklevel=2)
@@ -127,7 +128,7 @@ def _carry_out(scene: Scene, session: Session) -> dict[str, str]:
     units = {variable.name: variable.unit for variable in study.variables}
     checkpoint = session.opened(study.names, units)
     columns = tuple(variable.paths for variable in study.variables)
-    points = Points(study.names, np.empty((0, len(columns))), columns)
+    points = expanded(study, Points(study.names, np.empty((0, len(columns))), columns))
     compile_ahead(scene, session.ranks, points, style)
     announce = Announcer(scene).announced if style != "quiet" else Announcer.silent
     simulations = Simulations(scene, session.ranks, checkpoint, style)

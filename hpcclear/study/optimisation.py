@@ -1,7 +1,7 @@
-"""Robust optimisation of each case: fronts of mean and deviation, or of what it makes small, and their ends (eqs. 19 to 23)."""
+"""Robust optimisation of each case: fronts of mean and standard deviation or others, and their ends (eqs. 19 to 23)."""
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,22 +15,26 @@ from hpcclear.base.objectives import ENDS
 from hpcclear.plugins import SEARCHES
 from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import Box, box, to_physical
+from hpcclear.scene.goals import Goal
+from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
-from hpcclear.statistics.random.moments import RobustObjective
+from hpcclear.statistics.random.moments import Drawn, RobustObjective
 from hpcclear.statistics.search import foreign
 from hpcclear.statistics.search.asking import Search, Task, made, minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study import surrogates
 from hpcclear.study.goals import ends_in_all, excess, guessed, shortfall
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate, method_of
 
-Draws = tuple[int, np.random.Generator] | dict[str, Array] | None
-"""How many Monte Carlo draws of which generator, the draws themselves, or none for an exact rule."""
+Draws = tuple[int, np.random.Generator] | dict[str, Array] | Drawn | None
+"""How many Monte Carlo draws of which generator, the draws themselves, those of designs, or none for an exact rule."""
 
 PROBES = 64
 """Designs, beside the corners, at which the rules of derived random inputs are chosen."""
@@ -38,7 +42,7 @@ PROBES = 64
 
 TOGETHER = 256
 """Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a kernel that is no product of
-them, and for all that is not mean and deviation."""
+them, and for all that is not mean and standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +56,13 @@ class Problem:
     region : Box
         Their bounds in sampling coordinates.
     objective : RobustObjective
-        Mean and deviation of designs in SI.
+        Mean and standard deviation of designs in SI.
     scene : Scene
     case : Case
-    draws : mapping of str to array (s,)
-        Points of a Sobol sequence in the random inputs, for what is made small besides.
+    draws : callable
+        Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides.
+    further : tuple of RobustObjective
+        The same of `Study.further`, responses besides f that cases ask for.
     """
 
     names: tuple[str, ...]
@@ -64,31 +70,41 @@ class Problem:
     objective: RobustObjective
     scene: Scene
     case: Case
-    draws: Mapping[str, Array]
+    draws: Drawn
+    further: tuple[RobustObjective, ...] = ()
 
     def physical(self, coordinates: Array) -> Array:
-        """Designs in SI, shape (n, d)."""
-        return to_physical(self.scene, self.names, coordinates)
+        """The nearest designs that exist, in SI, shape (n, d)."""
+        return to_physical(self.scene, self.names, self.snapped(coordinates))
+
+    def snapped(self, coordinates: Array) -> Array:
+        """The nearest designs that exist, in sampling coordinates, (n, d)."""
+        return snapped(self.scene.required_study, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, goals); with constraints, how much it breaks them, (n,), besides."""
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
         if self.case.plain:
             return self.objective(designs)
-        drawn = self.objective.sampled(designs, self.draws)
+        draws = self.draws(designs)
+        each = [one.sampled(designs, draws) for one in (self.objective, *self.further)]
         named = dict(zip(self.names, designs.T, strict=True))
-        found = np.column_stack([guessed(goal, drawn, named) for goal in self.case.goals])
+
+        def of(goal: Goal) -> Array:
+            return each[max(goal.place - 1, 0)]
+
+        found = np.column_stack([guessed(goal, of(goal), named) for goal in self.case.goals])
         if not self.case.kept:
             return found
         broken = [
-            shortfall(one, one.most, drawn)
+            shortfall(one, one.most, of(one))
             if one.statistic == "exceedance"
-            else excess([one], guessed(one, drawn, named)[:, None])
+            else excess([one], guessed(one, of(one), named)[:, None])
             for one in self.case.kept
         ]
         return found, np.maximum(np.max(broken, axis=0), 0.0)
 
     def moments(self, designs: Array) -> Array:
-        """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
+        """Mean and standard deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
         found = np.full((len(designs), 2), np.nan)
         for row, design in enumerate(designs):
             try:
@@ -98,8 +114,10 @@ class Problem:
         return found
 
 
-def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
-    """The problem of one case on a surrogate of its objective.
+def problem_of(
+    scene: Scene, case: str, model: Piecewise, others: Sequence[Piecewise] = ()
+) -> Problem:
+    """The problem of one case on a surrogate of its objective, and on those of further responses.
 
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
     the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
@@ -121,14 +139,22 @@ def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(names))))
     probes = region.lower + np.concatenate([unit, corners]) * (region.upper - region.lower)
     rows = [study.random_input(name) for name in random]
-    inputs = [RandomVariable(row.name, row.law, about_design=not row.absolute) for row in rows]
+    moving = any(study.moves(row) for row in rows)
+    inputs = [
+        RandomVariable(
+            row.name, _inner(study, row) if moving else row.law, about_design=not row.absolute
+        )
+        for row in rows
+    ]
     askew = len(model.leaves) > 1 and (
         any(set(one.of) & set(random) for one in derived)
         or any(isinstance(row.law, quantiles.Cut) for row in rows)
     )
     draws: Draws = None
     joint = None
-    if study.correlation is not None and len(set(study.correlation.inputs) & set(random)) > 1:
+    if moving:
+        draws = _drawn(scene, case, names, sobol(len(random), rng, 0, TOGETHER).T)
+    elif study.correlation is not None and len(set(study.correlation.inputs) & set(random)) > 1:
         draws = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
 
         def joint(count: int, rng: np.random.Generator) -> dict[str, Array]:
@@ -157,8 +183,44 @@ def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
             raise
         objective = averaged((study.swarm.monte_carlo_samples, rng))
     rng = generator(study.seed, "goals", case)
-    points = offsets(scene, random, list(sobol(len(random), rng, 0, TOGETHER).T))
-    return Problem(names, region, objective, scene, study.case(case), points)
+    points = _drawn(scene, case, names, sobol(len(random), rng, 0, TOGETHER).T)
+    further = tuple(
+        RobustObjective(
+            other,
+            names,
+            inputs,
+            derived=derived,
+            probes=to_physical(scene, names, probes),
+            draws=points,
+        )
+        for other in others
+    )
+    return Problem(names, region, objective, scene, study.case(case), points, further)
+
+
+def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:
+    """Ends of a distribution that depends on the design, as the domain of the surrogate has them for all."""
+    low, high = study.reach(row) if row.absolute else (0.0, 0.0)
+    return quantiles.Uniform((low + high) / 2.0, (high - low) / 2.0)
+
+
+def _drawn(scene: Scene, case: str, names: Sequence[str], chances: Array) -> Drawn:
+    """Draws of the random inputs of a case at probabilities (inputs, s): the same for all designs, unless distributions
+    depend on them."""
+    study = scene.required_study
+    random = study.case(case).random
+    if not any(study.moves(study.random_input(name)) for name in random):
+        fixed = {name: one[None] for name, one in offsets(scene, random, list(chances)).items()}
+        return lambda designs: fixed
+
+    def of_designs(designs: Array) -> dict[str, Array]:
+        rows = [
+            offsets(scene, random, list(chances), dict(zip(names, design, strict=True)))
+            for design in designs
+        ]
+        return {name: np.array([row[name] for row in rows]) for name in random}
+
+    return of_designs
 
 
 def _ratio(scene: Scene, inertia: str) -> Derived:
@@ -188,16 +250,17 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
     Returns
     -------
     dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + goals): design coordinates, and what the case makes
+        For case number k ``front_k`` (runs, solutions, d + objectives): design coordinates, and what the case makes
         small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
     """
     result: Result = {}
+    others = surrogates.of_further(run, model)
     for index, case in enumerate(run.study.cases):
         fronts, gains = [], []
-        problem = problem_of(run.scene, case.name, model)
+        problem = problem_of(run.scene, case.name, model, others)
         for number in range(run.study.swarm.runs):
             front = _search(run, problem, run.rng("swarm", case.name, str(number)))
-            fronts.append(np.column_stack([front.points, front.values]))
+            fronts.append(np.column_stack([problem.snapped(front.points), front.values]))
             gains.append(front.gain)
         size = max(len(front) for front in fronts)
         padded = np.full((len(fronts), size, fronts[0].shape[1]), np.nan)
@@ -215,7 +278,7 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
 
 
 def check(scene: Scene) -> None:
-    """That the surrogate and the search a study asks for can be had, before anything is simulated.
+    """That the surrogate and the search a study requires can be had, before anything is simulated.
 
     Raises
     ------
@@ -258,7 +321,7 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
         return problem.searched(problem.physical(coordinates))
 
     def nearest(coordinates: Array) -> Array:
-        """Where no design keeps the constraints: how much it breaks them, and the first goal."""
+        """Where no design keeps the constraints: how much it breaks them, and the first objective."""
         values, broken = function(coordinates)
         return np.column_stack([broken, values[:, 0]])
 
@@ -293,7 +356,7 @@ class Choice:
     place : (int, int) or None
         Run of the swarm and solution, for one that stands on a front.
     origin : str
-        "search", or "given": the original, and what a publication prints.
+        "search", or "given": the baseline design, and what a publication prints.
     """
 
     name: str
@@ -309,7 +372,7 @@ def chosen_in_all(study: Study) -> tuple[int, int]:
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of least deviation.
+    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of lowest standard deviation.
 
     Averaged over the runs, as the paper makes its alpha and beta, in sampling coordinates, so that the
     average keeps the bounds; and the best single ones.
@@ -356,5 +419,6 @@ def spread(run: StudyRun, fronts: Result) -> list[Choice]:
 
 def _design(run: StudyRun, case: str, coordinates: Array) -> dict[str, float]:
     names = run.study.design_variables(case)
-    values = to_physical(run.scene, names, coordinates[None])[0]
+    place = snapped(run.study, names, coordinates[None])
+    values = to_physical(run.scene, names, place)[0]
     return dict(zip(names, values.tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Responses of the original and the optimised designs, side by side (the paper's Fig. 10)."""
+"""Responses of the baseline and the optimised designs beside each other (the paper's Fig. 10)."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -11,7 +11,8 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.single import responses_of
 from hpcclear.report.figures.motion import phase
-from hpcclear.results.dataset import provenance, variable_name
+from hpcclear.results.dataset import variable_name
+from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.study import Study
@@ -27,7 +28,7 @@ STATISTICS = ("mean", "fluctuation", "peak")
 
 
 def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
-    """Names and designs whose responses are compared: the original, alpha, beta (and further ends) of each case."""
+    """Names and designs whose responses are compared: the baseline design, alpha, beta (and further ends) of each case."""
     known = {choice.name: choice for choice in designs}
     cases = run.study.cases
     original = known[f"{cases[0].name} original"]
@@ -53,7 +54,7 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
         "numerics.objective": run.scene.objective.name,
     }
     for name, value in choice.design.items():
-        changes |= dict.fromkeys(run.study.variable(name).paths, value)
+        changes |= run.study.variable(name).entries(value)
     if settings.response_clearance is not None:
         for joint in run.scene.clearance_joints():
             changes[f"{run.scene.joint_key(joint)}.clearance"] = settings.response_clearance
@@ -61,9 +62,9 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Statistics of each design's steady response and of copies perturbed at their start, stretch by stretch.
+    """Statistics of each design's steady response and of copies perturbed at their start, segment by segment.
 
-    Where motion is chaotic one response says little of a design: copies see other stretches of the
+    Where motion is chaotic one response says little of a design: copies see other segments of the
     same motion.
 
     Returns
@@ -117,7 +118,7 @@ def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
 
 
 def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:
-    """Statistics of each stretch of a steady response, (windows, statistics, quantities); NaN if it failed."""
+    """Statistics of each segment of a steady response, (windows, statistics, quantities); NaN if it failed."""
     shape = (windows, len(STATISTICS), _quantities(scene))
     if response["status"] != Status.OK:
         return np.full(shape, np.nan)

@@ -8,6 +8,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
+from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box
 from hpcclear.scene.study import Study
 from hpcclear.statistics import sensitivity
@@ -317,14 +318,16 @@ def _sobol_points(run: StudyRun) -> Array:
     if rows == 0:
         return np.empty((0, len(run.study.names)))
     bounds = _bounds(run, run.study.names)
-    points = sensitivity.sobol_design(bounds, rows, run.rng("sobol"))
+    names = run.study.names
+    points = snapped(run.study, names, sensitivity.sobol_design(bounds, rows, run.rng("sobol")))
     near = points[: _beside(run.study)]
     steps = (
         NEARBY
         * (bounds[:, 1] - bounds[:, 0])
         * run.rng("sobol noise").uniform(-1.0, 1.0, near.shape)
     )
-    return np.concatenate([points, np.clip(near + steps, *bounds.T)])
+    near = snapped(run.study, names, np.clip(near + steps, *bounds.T))
+    return np.concatenate([points, near])
 
 
 def _beside(study: Study) -> int:

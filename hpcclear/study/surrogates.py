@@ -1,13 +1,15 @@
 """Surrogates of the objective: fitted, checked on fresh points, written and read back."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
-from hpcclear.scene.domain import Box, box
+from hpcclear.scene.choices import snapped
+from hpcclear.scene.domain import Box, box, to_coordinates
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
@@ -79,6 +81,7 @@ def fit_all(run: StudyRun) -> Result:
             method=method,
             rng=run.rng("kriging", " ".join(names)),
             names=[coordinate(run.study.variable(name)) for name in names],
+            snap=partial(snapped, run.study, names, model=True),
         )
         result |= _packed(k, model) | _checked(run, k, model)
     return result
@@ -109,6 +112,44 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
     return found
 
 
+def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
+    """Surrogates of responses besides f that cases ask for (`Study.further`), of the designs simulated so far in the inputs of
+    the model that is searched, as it is of f.
+
+    Raises
+    ------
+    InputError
+        Nearly all of these simulations failed.
+    """
+    study, names = run.study, run.study.models[-1]
+    if not study.further:
+        return []
+    values, responses = run.simulations.met()
+    columns = [study.names.index(name) for name in names]
+    loads = study.load_cases
+    rest = [
+        k
+        for k, name in enumerate(study.names)
+        if k not in columns and (loads is None or name != loads.name)
+    ]
+    here = values[:, rest] == np.array([run.scene.baseline(study.names[k]) for k in rest])
+    points = to_coordinates(run.scene, names, values[:, columns])
+    inside = (points >= model.lower) & (points <= model.upper)
+    rows = here.all(axis=1) & inside.all(axis=1)
+    unknown, accepted = np.full(1, np.nan), np.zeros(1, bool)
+    found = []
+    for name, one in zip(study.further, responses[1:], strict=True):
+        leaf = method_of(run.scene).fit(
+            points[rows],
+            one[rows],
+            np.column_stack([model.lower, model.upper]),
+            rng=run.rng("kriging", name),
+            names=[coordinate(study.variable(n)) for n in names],
+        )
+        found.append(Piecewise((leaf,), unknown, unknown, accepted))
+    return found
+
+
 def _packed(k: int, model: Piecewise) -> Result:
     return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
 
@@ -118,7 +159,7 @@ def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:
     names = run.study.models[k]
     rng = run.rng("kriging check", " ".join(names))
     unit = unit_lhs(_tests(run.study), len(names), rng)
-    points = model.lower + unit * (model.upper - model.lower)
+    points = snapped(run.study, names, model.lower + unit * (model.upper - model.lower), model=True)
     truth = run.simulations.values(names, points, f"{STAGE} check")
     reached = accuracy(truth, model.predict(points))
     return {f"model{k}_check": np.array([getattr(reached, name) for name in _CHECKS])}

@@ -38,8 +38,12 @@ def contact_stiffness(
     source, Lankarani and Nikravesh 1990 (doi:10.1115/1.2912617), for internal contact of spheres.
     """
     journal_radius = bearing_radius - clearance
-    shape = (bearing_radius * journal_radius / clearance) ** 0.5
-    return 4.0 / (3.0 * (h_bearing + h_journal)) * shape
+    return sphere_stiffness(h_bearing, h_journal, bearing_radius * journal_radius / clearance)
+
+
+def sphere_stiffness(h_bearing: Number, h_journal: Number, radius: Number) -> Number:
+    """Return Hertz's K in N/m^1.5 of a sphere on a plane, or of what is as stiff as one."""
+    return 4.0 / (3.0 * (h_bearing + h_journal)) * radius**0.5
 
 
 def elastic(depth, stiffness):

@@ -17,8 +17,9 @@ from numba import carray
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.elements import harmonic, held_inverse, sign_of, spring_force
-from hpcclear.dynamics.linkage.motion import joint_force, table_value
+{geometries}from hpcclear.dynamics.linkage.elements import (
+    along, drag, harmonic, held_inverse, hinge, one_sided, sign_of, spring_force, table_value,
+)
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated
 '''
@@ -65,9 +66,13 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
         )
         for row, first, (before, angle) in _curves(motion)
     )
+    geometries = dict.fromkeys(c.geometry for c in motion.forest.mechanism.contacts)
+    head = _HEAD.format(
+        geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries)
+    )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"
-    return f"{_HEAD}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
+    return f"{head}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
 
 
 Angle = tuple[tuple[str, ...], str]

@@ -5,7 +5,7 @@ accelerations, gaps, forces and powers; an effect that is off is not in it. It i
 contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -13,13 +13,16 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.loads import piecewise
+from hpcclear.dynamics.linkage.loads.writing import Writing
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
-    Clearance,
+    Acting,
+    Contact,
     Drive,
     Force,
     Revolute,
@@ -40,6 +43,7 @@ class On(NamedTuple):
     energies: bool = False  # energy balance
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
+    impacts: bool = False  # force on the frame
     follow: str = ""  # a guided body, or body.point
     objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
@@ -125,8 +129,8 @@ class _Generator:
         self.load_power = ZERO
 
     def motion(self) -> Motion:
-        for k, joint in enumerate(self.mechanism.clearances):
-            self._contact(k, joint)
+        for k, contact in enumerate(self.mechanism.contacts):
+            self._contact(k, contact)
         for load in self.mechanism.loads:
             self._load(load)
         torques = [self._torque(d) for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
@@ -170,50 +174,64 @@ class _Generator:
         """First line of the text: what is integrated, where the contacts are, what closes loops."""
         parts = {
             "coordinates": [one.name for one in self.forest.coordinates],
-            "joints with clearance": [joint.name for joint in self.mechanism.clearances],
+            "joints with clearance": [contact.name for contact in self.mechanism.contacts],
             "constraints": [row.name for row in self.constraints],
         }
         said = "; ".join(f"{what} {', '.join(names)}" for what, names in parts.items() if names)
         return f'"""Accelerations of lane i: {said}."""'
 
     # ---- forces ---------------------------------------------------------------------------------
-    def _contact(self, k: int, joint: Clearance) -> None:
-        """Call of the contact law: journal relative to bearing, and what the joint exerts on both."""
-        kin, write = self.kinematics, self.writer
-        journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
+    def _contact(self, k: int, contact: Contact) -> None:
+        """Call of a contact's geometry: journal relative to bearing, and what the contact exerts on both."""
+        kin, write, geometry = self.kinematics, self.writer, contact.geometry
+        places = contact.journal, contact.bearing
+        journal, bearing = map(kin.point, places)
         apart = kin.position(journal) - kin.position(bearing)
         moving = kin.velocity(journal) - kin.velocity(bearing)
-        spins = [kin.end_spin(place) for place in joint.places]
+        spins = [kin.end_spin(place) for place in places]
         relative = [write.text(term) for term in (*apart, *moving, *spins)]
         if not (self.on.friction or self.on.waves):  # which are no faster by it
             relative[4:] = ["None" if spin is ZERO else write.text(spin) for spin in spins]
-        turns = self._turns(joint) if self.on.waves else "None"
-        made = [write.fresh(f"{name}_{joint.name}") for name in ("fx", "fy", "mb", "mj", "loss")]
-        call = (
-            f"joint_force(effects, work, par, joints[{k}], ({', '.join(relative)}), {turns}, i, W)"
-        )
+        frame = self._frame(contact)
+        made = [write.fresh(f"{name}_{contact.word}") for name in ("fx", "fy", "mb", "mj", "loss")]
+        given = f"joints[{k}], ({', '.join(relative)}), {frame}"
+        call = f"{geometry.function}(effects, work, par, {given}, i, W)"
         write.line(f"{', '.join(made)} = {call}")
         fx, fy, on_bearing, on_journal, loss = map(named, made)
         force = Vector(fx, fy)
-        self.balance.pulls += [Pull(joint.journal, -force), Pull(joint.bearing, force)]
-        if self.on.friction or self.on.waves:
-            for place, moment in ((joint.journal, on_journal), (joint.bearing, on_bearing)):
-                body, point = split(place)
-                if body != GROUND:
-                    self.balance.twists.append(Twist(body, moment, point))
+        self.balance.pulls += [Pull(contact.journal, -force), Pull(contact.bearing, force)]
+        turning = self.on.friction or self.on.waves
+        for place, moment, turned in (
+            (contact.journal, on_journal, turning),
+            (contact.bearing, on_bearing, turning or geometry.along_a_line),
+        ):
+            body, point = split(place)
+            if turned and body != GROUND:
+                self.balance.twists.append(Twist(body, moment, point))
         self.losses.append(loss)
 
-    def _turns(self, joint: Clearance) -> str:
-        """Cosines and sines of the angles of both bodies of a joint, which waves around its surfaces turn with."""
+    def _frame(self, contact: Contact) -> str:
+        """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
+        angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
-        for place in (joint.bearing, joint.journal):
+        if isinstance(contact.joint, Slide):
+            across = self.closing.direction(contact.joint).across()
+            found = [*(across if contact.side > 0.0 else -across)]
+            return f"({', '.join(self.writer.text(term) for term in found)})"
+        if not self.on.waves:
+            return "None"
+        for place in (contact.bearing, contact.journal):
             body = split(place)[0]
             own = Vector(ONE, ZERO) if body == GROUND else kin.offset(body)
             found += [*kin.rotated(self.forest.frames[body], own)]
         return f"({', '.join(self.writer.text(term) for term in found)})"
 
-    def _load(self, load: Force | Torque | Spring) -> None:
+    def _load(self, load: Force | Torque | Spring | Acting) -> None:
         kin, write, power = self.kinematics, self.writer, ZERO
+        if isinstance(load, Acting):
+            power = load.act(Writing(kin, write, self.balance))
+            self.load_power = self.load_power + power
+            return
         if isinstance(load, Spring):
             self._spring(load)
             return
@@ -228,6 +246,17 @@ class _Generator:
                 for axis, value in zip("xy", load.force, strict=True)
             )
             force = Vector(*parts)
+            if load.follows:
+                body = split(load.place)[0]
+                cosine, sine = kin.offset(body)
+                own = Vector(cosine * force.x - sine * force.y, sine * force.x + cosine * force.y)
+                turned_force = kin.rotated(self.forest.frames[body], own)
+                force = Vector(
+                    *(
+                        write.let(f"{load.name}_{axis}", one)
+                        for axis, one in zip("xy", turned_force, strict=True)
+                    )
+                )
             self.balance.pulls.append(Pull(load.place, force))
             for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
                 power = power + part * speed
@@ -251,7 +280,8 @@ class _Generator:
         numbers = [write.parameter(f"{load.name}_{n}") for n in ("stiffness", "damping", "length")]
         texts = [write.text(t) for t in (*numbers, *apart, *moving)]
         made = [write.fresh(f"{name}_{load.name}") for name in ("fx", "fy", "power")]
-        write.line(f"{', '.join(made)} = spring_force({', '.join(texts)})")
+        call = "spring_force(" if load.side == 0 else f"one_sided({float(load.side)}, "
+        write.line(f"{', '.join(made)} = {call}{', '.join(texts)})")
         fx, fy, power = map(named, made)
         force = Vector(fx, fy)
         self.balance.pulls += [Pull(load.first, force), Pull(load.second, -force)]
@@ -259,6 +289,11 @@ class _Generator:
 
     def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:
         write = self.writer
+        if drive.by_speed is not None:
+            speed = self.kinematics.spin(self.forest.frames[drive.body])
+            name = f"{drive.name}_by_speed"
+            torque = piecewise.term(write, name, len(drive.by_speed), speed)
+            return Column("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
             torque = write.let(drive.name, torque * self._turned(drive.name))
@@ -344,7 +379,7 @@ class _Generator:
         return coupled(moving, factored, found) if moving else found
 
     def _passed(self, block: list[int]) -> dict[int, list[int]]:
-        """Multipliers of pins in a free linkage, which may fold flat, with those of the same pin.
+        """Multipliers of pins in a free linkage, which may become singular, with those of the same pin.
 
         What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
         """
@@ -390,6 +425,8 @@ class _Generator:
             self._rate(at.LOAD_POWER, self.load_power)
         if on.follow and (on.series or on.responses or on.objective):
             self._follow(found)
+        if on.impacts and not self.kinematics.bends:
+            self._shaking(found)
         if on.objective:
             self._objective()
 
@@ -400,15 +437,15 @@ class _Generator:
         terms = (*kin.rotated(frame, kin.offset(body)), kin.spin(frame))
         drive = ", ".join(map(self.writer.text, terms))
         whole = self.on.objective == "whole"
-        for k in range(1 if whole else len(self.mechanism.clearances)):
+        for k in range(1 if whole else len(self.mechanism.contacts)):
             row = self.rows.rates + at.OBJECTIVE_RATES
             joint = "None" if whole else f"joints[{k}]"
             where = f"{row}" if whole else f"({self.rows.rates} + joints[{k}].objective_rate)"
             call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
             self.writer.line(f"work[{where} * W + i] = {call}")
 
-    def _follow(self, found: dict[int, Term]) -> None:
-        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
+    def _second(self, found: dict[int, Term]) -> Callable[[Column], Term]:
+        """Accelerations of coordinates, by their columns; 0 of what is none."""
 
         def second(column: Column) -> Term:
             term = found[self.number[column]] if column in self.number else ZERO
@@ -416,6 +453,28 @@ class _Generator:
                 return term - self.writer.parameter("gravity")
             return term
 
+        return second
+
+    def _shaking(self, found: dict[int, Term]) -> None:
+        """Force of the mechanism on its frame, weight included, of rigid bodies only.
+
+        Loads act between bodies and the frame, so that of all forces inertia and weight are left.
+        """
+        kin, write, second = self.kinematics, self.writer, self._second(found)
+        total = NOWHERE
+        for body in self.mechanism.bodies:
+            moved = kin.acceleration(kin.center(body.name), second)
+            if self.on.gravity:
+                moved = moved + Vector(ZERO, write.parameter("gravity"))
+            total = total - moved.times(self.balance.mass_of(body))
+        x, y = (write.let(f"frame_{axis}", term) for axis, term in zip("xy", total, strict=True))
+        self._rate(at.FRAME_X, x)
+        self._rate(at.FRAME_Y, y)
+        self._rate(at.FRAME_SQUARE, x * x + y * y)
+
+    def _follow(self, found: dict[int, Term]) -> None:
+        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
+        second = self._second(found)
         kin, follow = self.kinematics, self.on.follow
         if "." not in follow:
             if (k := self.number.get(Column("slide", follow))) is not None:
@@ -441,7 +500,7 @@ class _Generator:
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
     def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
-        """Moment of a drive: what is given, or what the prescribed angle asks for."""
+        """Moment of a drive: what is given, or what the prescribed angle requires."""
         column = Column("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]

@@ -8,13 +8,17 @@ from typing import Any
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Acting,
     Body,
     Clearance,
+    Contact,
     Drive,
     Fixed,
     Harmonic,
     Joint,
     Load,
+    Loose,
+    LooseSlide,
     Pair,
     Revolute,
     Slide,
@@ -24,7 +28,7 @@ from hpcclear.dynamics.linkage.parts import (
 )
 
 MOST_COORDINATES = 24
-MOST_CLEARANCES = 8
+MOST_CONTACTS = 8
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -58,14 +62,19 @@ class Mechanism:
         return self.ground[point] if name == GROUND else self.body(name).points[point]
 
     @property
-    def clearances(self) -> tuple[Clearance, ...]:
+    def clearances(self) -> tuple[Loose, ...]:
         """The joints with clearance, in file order."""
-        return tuple(joint for joint in self.joints if isinstance(joint, Clearance))
+        return tuple(joint for joint in self.joints if isinstance(joint, Loose))
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """Their contacts, joint by joint."""
+        return tuple(contact for joint in self.clearances for contact in joint.contacts)
 
     @property
     def ideal(self) -> tuple[Joint, ...]:
         """The joints without."""
-        return tuple(joint for joint in self.joints if not isinstance(joint, Clearance))
+        return tuple(joint for joint in self.joints if not isinstance(joint, Loose))
 
     @property
     def period(self) -> Drive:
@@ -104,9 +113,12 @@ def modes_of(mechanism: Mechanism) -> int:
 
 
 def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> list[set[str]]:
-    """Which bodies hang together by joints of some kinds: sets of names, the ground's first."""
+    """Which bodies hang together by joints of some kinds: sets of names, the ground's first.
+
+    Guides with clearance, which let their sliders turn, have no kind of their own.
+    """
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
-    for joint in mechanism.joints:
+    for joint in mechanism.joints if kinds is object else mechanism.ideal:
         if isinstance(joint, kinds):
             names = {split(place)[0] for place in joint.places}
             touched = [group for group in groups if group & names]
@@ -157,12 +169,14 @@ def _places(m: Mechanism) -> None:
                 continue
             listed = ", ".join(sorted(words)) or "none yet"
             raise InputError(f"{key}.{entry}", place, reason, f"Known are: {listed}")
-        acted_on = getattr(one, "body", None)
-        if acted_on is not None and acted_on not in known.keys() - {GROUND}:
-            raise InputError(
-                f"{key}.body", acted_on, "there is no such moving body",
-                f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
-            )  # fmt: skip
+        for entry in ("body", "other"):
+            acted_on = getattr(one, entry, None)
+            if acted_on is not None and acted_on not in known.keys() - {GROUND}:
+                raise InputError(
+                    f"{key}.{entry}", acted_on, "there is no such moving body",
+                    f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
+                )  # fmt: skip
+    _turned(m)
     for joint in m.joints:
         first, second = (split(place)[0] for place in joint.places)
         if first == second:
@@ -181,6 +195,31 @@ def _places(m: Mechanism) -> None:
             )  # fmt: skip
 
 
+def _turned(m: Mechanism) -> None:
+    """Bodies whose angles loads act by can turn, and do not go round and round with the revolutions."""
+    groups = joined(m, (Slide, Fixed))
+    still = next((names for names in groups if GROUND in names), set())
+    round_ = next((names for names in groups if m.drives and m.period.body in names), set())
+    for load in m.loads:
+        if not isinstance(load, Acting):
+            continue
+        for entry in ("body", "other"):
+            body = getattr(load, entry, None)
+            if body in still:
+                raise InputError(
+                    f"loads.{load.name}.{entry}",
+                    body,
+                    "this body cannot rotate",
+                    "Name a body that does",
+                )
+            if load.by_angle and body in round_ and m.period.advance:
+                raise InputError(
+                    f"loads.{load.name}.{entry}", body,
+                    "this body goes round with every revolution, so that its angle has no end",
+                    "Name a body that swings",
+                )  # fmt: skip
+
+
 def _numbers(m: Mechanism) -> None:
     """Masses, inertias, clearances and the numbers of drives that have to be positive."""
     turns = turning(m)
@@ -197,6 +236,7 @@ def _numbers(m: Mechanism) -> None:
             )  # fmt: skip
     positive = {
         Clearance: ("clearance", "bearing_radius", "stiffness"),
+        LooseSlide: ("clearance", "length", "height", "corner_radius", "stiffness"),
         Harmonic: ("frequency",),
     }
     for key, one in _records(m):
@@ -212,7 +252,7 @@ def _numbers(m: Mechanism) -> None:
                     f"{key}.{entry}", 0.0, "there would be no motion", "Write a speed or amplitude"
                 )
     for joint in m.clearances:
-        if joint.clearance >= joint.bearing_radius:
+        if isinstance(joint, Clearance) and joint.clearance >= joint.bearing_radius:
             raise InputError(
                 f"joints.{joint.name}.clearance", joint.clearance,
                 f"must be smaller than the bearing radius ({joint.bearing_radius:g} m)",
@@ -294,7 +334,7 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {Revolute: 2, Slide: 2, Fixed: 3, Clearance: 0}
+    taken = {Revolute: 2, Slide: 2, Fixed: 3, Clearance: 0, LooseSlide: 0}
     ideal = sum(taken[type(joint)] for joint in m.joints)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 
@@ -313,8 +353,8 @@ def _sizes(m: Mechanism) -> None:
         raise InputError(
             "bodies", free, f"more than {MOST_COORDINATES} degrees of freedom", "Use ideal joints"
         )
-    if len(m.clearances) > MOST_CLEARANCES:
+    if len(m.contacts) > MOST_CONTACTS:
         raise InputError(
-            "joints", len(m.clearances), f"more than {MOST_CLEARANCES} joints with clearance",
-            "Make some of them ideal",
+            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints with clearance (four in each guide)",
+            "Make some of the joints ideal",
         )  # fmt: skip

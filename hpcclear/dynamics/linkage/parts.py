@@ -6,8 +6,15 @@ angles count counter-clockwise.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from hpcclear.base.outcome import CORNERS
+from hpcclear.dynamics.contacts.declared import Geometry
+from hpcclear.dynamics.contacts.guide import corner, gap_of
+from hpcclear.dynamics.contacts.registry import GEOMETRIES
 
 GROUND = "ground"
 Pair = tuple[float, float]
@@ -39,6 +46,26 @@ class Body:
     bending: Bending | None = None
 
 
+class Contact(NamedTuple):
+    """Where two bodies may touch: a place of the journal's body against one of the bearing's, by a geometry of contact.
+
+    `name` is the joint's, followed by a dot and a word where the joint has several; `side`: of a contact at a guide's line,
+    1 on its left, -1 on its right.
+    """
+
+    name: str
+    joint: "Joint"
+    journal: str
+    bearing: str
+    geometry: Geometry
+    side: float = 0.0
+
+    @property
+    def word(self) -> str:
+        """Its name in texts."""
+        return self.name.replace(".", "_")
+
+
 @dataclass(frozen=True)
 class Revolute:
     """A pin without clearance between two places."""
@@ -46,6 +73,7 @@ class Revolute:
     name: str
     journal: str
     bearing: str
+    contacts: ClassVar[tuple[Contact, ...]] = ()
 
     @property
     def places(self) -> tuple[str, str]:
@@ -61,6 +89,22 @@ class Clearance(Revolute):
     bearing_radius: float = 0.0
     stiffness: float = 0.0
     start_eccentricity: Pair = (0.0, 0.0)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:  # type: ignore[override]
+        """The one of its journal."""
+        pin = GEOMETRIES["pin_in_bearing"]
+        return (Contact(self.name, self, self.journal, self.bearing, pin),)
+
+    @property
+    def gaps(self) -> tuple[Any, ...]:
+        """Of its contacts at the start, m, below 0 in flight."""
+        return (np.hypot(*self.start_eccentricity) - self.clearance,)
+
+    @property
+    def without_play(self) -> Revolute:
+        """The same without clearance."""
+        return Revolute(self.name, self.journal, self.bearing)
 
 
 @dataclass(frozen=True)
@@ -82,6 +126,7 @@ class Aligned:
     point: str
     line: str
     angle: float = 0.0
+    contacts: ClassVar[tuple[Contact, ...]] = ()
 
     @property
     def places(self) -> tuple[str, str]:
@@ -97,11 +142,62 @@ class Slide(Aligned):
 
 
 @dataclass(frozen=True)
+class LooseSlide(Slide):
+    """A rectangular slider, its middle at the point, in a channel that is higher by twice the clearance; all in m.
+
+    Its x axis goes along the line but for tilt. At the start it is offset to the left of the line and tilted (rad).
+    """
+
+    clearance: float = 0.0
+    length: float = 0.0
+    height: float = 0.0
+    corner_radius: float = 0.0
+    stiffness: float = 0.0
+    start_offset: float = 0.0
+    start_tilt: float = 0.0
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:  # type: ignore[override]
+        """One a corner, in the order of `CORNERS`."""
+        body, guide = split(self.point)[0], GEOMETRIES["guide"]
+        return tuple(
+            Contact(
+                f"{self.name}.{word}", self, f"{body}.{self.name}_{word}", self.line, guide, side
+            )
+            for word, (_, side) in CORNERS.items()
+        )
+
+    @property
+    def gaps(self) -> tuple[Any, ...]:
+        """Of its contacts at the start, m, below 0 in flight."""
+        return tuple(gap_of(self, word, self.start_offset, self.start_tilt) for word in CORNERS)
+
+    @property
+    def start_eccentricity(self) -> tuple[Any, Any]:
+        """What the constraints of a guide without clearance are at the start: offset, sine of the tilt."""
+        return self.start_offset, np.sin(self.start_tilt)
+
+    def corners(self, middle: Any) -> dict[str, tuple[Any, Any]]:
+        """Points of the slider that are centres of its corners, `middle` its place in the slider's axes."""
+        size = self.length, self.height
+        return {
+            f"{self.name}_{word}": corner(middle, size, self.corner_radius, word)
+            for word in CORNERS
+        }
+
+    @property
+    def without_play(self) -> Slide:
+        """The same without clearance."""
+        return Slide(self.name, self.point, self.line, self.angle)
+
+
+@dataclass(frozen=True)
 class Fixed(Aligned):
     """A body held on the ground: the point stays where the line begins."""
 
 
-Joint = Revolute | Clearance | Slide | Fixed
+Joint = Revolute | Clearance | Slide | LooseSlide | Fixed
+Loose = Clearance | LooseSlide
 
 
 @dataclass(frozen=True)
@@ -179,7 +275,8 @@ class TorqueDrive:
     """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: times a curve over the angle of the
     period's body.
 
-    Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one.
+    Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one. `by_speed`:
+    rows (rad/s, N m) in place of the torque, straight between and level beyond.
     """
 
     name: str
@@ -192,6 +289,7 @@ class TorqueDrive:
     turns: int = 1
     expected_speed: float | None = None
     no_load_speed: float | None = None
+    by_speed: tuple[Pair, ...] | None = None
     prescribed: ClassVar[bool] = False
 
     @property
@@ -215,12 +313,16 @@ Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 @dataclass(frozen=True)
 class Force:
-    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body."""
+    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body.
+
+    `follows`: along the axes of its body instead.
+    """
 
     name: str
     place: str
     force: Pair
     table: bool = False
+    follows: bool = False
 
 
 @dataclass(frozen=True)
@@ -235,7 +337,10 @@ class Torque:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring (N/m, free length in m) and damper (N s/m) between two places."""
+    """A spring (N/m, free length in m) and damper (N s/m) between two places.
+
+    `side`: 1 acts beyond the length only, as a rope, -1 within it only, as a buffer; 0 on both sides.
+    """
 
     name: str
     first: str
@@ -243,9 +348,35 @@ class Spring:
     stiffness: float
     length: float = 0.0
     damping: float = 0.0
+    side: int = 0
 
 
-Load = Force | Torque | Spring
+@dataclass(frozen=True)
+class Acting:
+    """A load that writes itself, one of `hpcclear.dynamics.linkage.loads`.
+
+    Its fields `first` and `second` are places, `body` and `other` bodies; the mechanism checks that there are such.
+    """
+
+    name: str
+    by_angle: ClassVar[bool] = False
+    """Whether it goes by the angle of a body, which must not go round with the revolutions."""
+
+    @classmethod
+    def of(cls, table: Any) -> Self:
+        """That of a table of the scene, whose entries have the names of the fields."""
+        return cls(**{one.name: getattr(table, one.name) for one in fields(cls)})
+
+    def numbers(self) -> dict[str, Any]:
+        """Its parameters by the names that `act` reads, SI; numbers or arrays of samples."""
+        raise NotImplementedError
+
+    def act(self, on: Any) -> Any:
+        """Add its forces and moments to a motion (`loads.writing.Writing`); return the power that it gives, W, as a term."""
+        raise NotImplementedError
+
+
+Load = Force | Torque | Spring | Acting
 
 
 def split(place: str) -> tuple[str, str]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.linkage.assembly import Assembly
+from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import WORDS
@@ -53,11 +54,16 @@ class Poses:
             lines.append(f"out[{6 * k + 4}] = {writer.text(self._angle(kin, frame))}")
             lines.append(f"out[{6 * k + 5}] = {writer.text(kin.spin(frame))}")
         first = 6 * len(forest.mechanism.bodies)
-        for k, joint in enumerate(forest.mechanism.clearances):
-            journal, bearing = (kin.position(kin.point(place)) for place in joint.places)
-            for axis, apart in enumerate(journal - bearing):
-                lines.append(f"out[{first + 2 * k + axis}] = {writer.text(apart)}")
-        self.size = first + 2 * len(forest.mechanism.clearances)
+        for k, contact in enumerate(forest.mechanism.contacts):
+            places = contact.journal, contact.bearing
+            journal, bearing = (kin.position(kin.point(place)) for place in places)
+            apart = journal - bearing
+            if isinstance(contact.joint, Slide):  # the part across the line
+                across = Closing(kin, writer).direction(contact.joint).across()
+                apart = across.times(dot(apart, across))
+            for axis, part in enumerate(apart):
+                lines.append(f"out[{first + 2 * k + axis}] = {writer.text(part)}")
+        self.size = first + 2 * len(forest.mechanism.contacts)
         names: dict[str, Any] = WORDS | words_of(forest.mechanism)
         body_text = "\n    ".join([*writer.lines, *lines, "pass"])
         exec(f"def poses(work, par, out, i=0, W=1):\n    {body_text}", names)
@@ -69,7 +75,8 @@ class Poses:
         return Term("0") if frame == GROUND else _needed(kin, frame)
 
     def at(self, par: Array, q: Array, v: Array, time: Array | float) -> tuple[Pose, Array]:
-        """Poses, each (bodies, m), and eccentricities (joints, 2, m).
+        """Poses, each (bodies, m), and eccentricities (contacts, 2, m): of a journal from the centre of its bearing, of a
+        corner from the line of its guide.
 
         Parameters
         ----------

@@ -28,6 +28,7 @@ PLACEHOLDER = 1e-3
 
 NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
                 "torque", "no_load_speed", "flywheel_inertia", "stiffness", "damping", "size", "direction",
+                "linear", "quadratic", "stop_stiffness",
                 "coefficient", "ramp_speed")  # fmt: skip
 """Entries that no sample's start depends on."""
 
@@ -229,7 +230,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
-    """The status of a scene whose own linkage cannot turn, and what to say; None of one that can, or is not to be judged.
+    """The status of a scene whose own linkage cannot turn, and what to say; None for one that can, or is not to be judged.
 
     Raises
     ------

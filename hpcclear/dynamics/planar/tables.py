@@ -1,5 +1,6 @@
 """From the tables of a linkage to the mechanism as data."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,13 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.curves import angle_cells
-from hpcclear.dynamics.laws.hertz_contact import contact_stiffness, reduced_compliance
+from hpcclear.dynamics.laws.hertz_contact import (
+    contact_stiffness,
+    reduced_compliance,
+    sphere_stiffness,
+)
 from hpcclear.dynamics.linkage import parts
+from hpcclear.dynamics.linkage.loads import KINDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
@@ -19,7 +25,7 @@ from hpcclear.scene.driving import (
     PlanarTorque,
     SpringLoad,
 )
-from hpcclear.scene.mechanism import Material
+from hpcclear.scene.materials import Materials
 from hpcclear.scene.planar import (
     Planar,
     PlanarBody,
@@ -61,9 +67,10 @@ def _put(table: Any, keys: list[str], value: Array) -> Any:
 
 
 def _tables(planar: Any) -> dict[str, Any]:
+    joints = tuple(_joint(joint) for joint in planar.joints)
     return {
-        "bodies": tuple(_body(body) for body in planar.bodies),
-        "joints": tuple(_joint(joint) for joint in planar.joints),
+        "bodies": tuple(_with_corners(_body(body), joints) for body in planar.bodies),
+        "joints": joints,
         "drives": tuple(_drive(drive) for drive in planar.drives),
         "ground": {point.name: (point.x, point.y) for point in planar.ground.points},
         "loads": tuple(_load(load) for load in planar.loads),
@@ -87,15 +94,26 @@ def _body(body: PlanarBody) -> parts.Body:
     )
 
 
+def _with_corners(body: parts.Body, joints: tuple[parts.Joint, ...]) -> parts.Body:
+    """A body that slides in channels wider than itself, with the centres of its corners as points."""
+    points = dict(body.points)
+    for joint in joints:
+        if isinstance(joint, parts.LooseSlide):
+            own, point = parts.split(joint.point)
+            if own == body.name and point in points:
+                points |= joint.corners(points[point])
+    return replace(body, points=points)
+
+
 def _bending(table: Any) -> parts.Bending | None:
     return None if table is None else parts.Bending(table.modes, table.stiffness, table.damping)
 
 
-def _stiffness(bearing: Material, journal: Material, radius: float, clearance: float) -> float:
-    h_bearing, h_journal = (
-        reduced_compliance(m.youngs_modulus, m.poisson_ratio) for m in (bearing, journal)
+def _compliances(both: Materials) -> tuple[float, float]:
+    found = (
+        reduced_compliance(m.youngs_modulus, m.poisson_ratio) for m in (both.bearing, both.journal)
     )
-    return contact_stiffness(h_bearing, h_journal, radius, clearance)
+    return tuple(found)  # type: ignore[return-value]
 
 
 def _joint(joint: Any) -> parts.Joint:
@@ -103,16 +121,29 @@ def _joint(joint: Any) -> parts.Joint:
         return parts.Revolute(joint.name, joint.journal, joint.bearing)
     if isinstance(joint, PlanarClearance):
         both, start = joint.materials, joint.start_eccentricity
-        stiffness = _stiffness(both.bearing, both.journal, joint.bearing_radius, joint.clearance)
+        stiffness = contact_stiffness(*_compliances(both), joint.bearing_radius, joint.clearance)
         return parts.Clearance(
             joint.name, joint.journal, joint.bearing, joint.clearance, joint.bearing_radius,
             stiffness, (start.x, start.y),
         )  # fmt: skip
+    if isinstance(joint, PlanarSlide) and joint.clearance is not None:
+        return _loose_slide(joint)
     if isinstance(joint, PlanarSlide):
         rubs = joint.friction
         friction = None if rubs is None else parts.GuideFriction(rubs.coefficient, rubs.ramp_speed)
         return parts.Slide(joint.name, joint.point, joint.line, joint.angle, friction)
     return parts.Fixed(joint.name, joint.point, joint.line, joint.angle)
+
+
+def _loose_slide(joint: Any) -> parts.LooseSlide:
+    stiffness = sphere_stiffness(*_compliances(joint.materials), joint.corner_radius)
+    offset, tilt = (
+        0.0 if start is None else start for start in (joint.start_offset, joint.start_tilt)
+    )
+    return parts.LooseSlide(
+        joint.name, joint.point, joint.line, joint.angle, None, joint.clearance,
+        joint.length, joint.height, joint.corner_radius, stiffness, offset, tilt,
+    )  # fmt: skip
 
 
 def _drive(drive: Any) -> parts.Drive:
@@ -129,17 +160,19 @@ def _drive(drive: Any) -> parts.Drive:
         )
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
+    torque = 1.0 if table or drive.torque is None else drive.torque
     return parts.TorqueDrive(
-        drive.name, drive.body, 1.0 if table else drive.torque,  # type: ignore[arg-type]
+        drive.name, drive.body, torque,  # type: ignore[arg-type]
         drive.initial_speed, drive.flywheel_inertia, table, drive.period, drive.turns,
-        drive.expected_speed, drive.no_load_speed,
+        drive.expected_speed, drive.no_load_speed, drive.torque_by_speed,
     )  # fmt: skip
 
 
 def _load(load: Any) -> parts.Load:
     if isinstance(load, ForceLoad):
         if load.force is not None:
-            return parts.Force(load.name, load.place, (load.force.x, load.force.y))
+            pair = (load.force.x, load.force.y)
+            return parts.Force(load.name, load.place, pair, follows=load.follows)
         table = isinstance(load.size, tuple)
         size: Any = 1.0 if table else load.size
         # a quarter turn is one, to the last bit
@@ -147,11 +180,14 @@ def _load(load: Any) -> parts.Load:
             np.where(np.abs(part) < 1e-15, 0.0, part)[()]
             for part in (np.cos(load.direction), np.sin(load.direction))
         )
-        return parts.Force(load.name, load.place, (size * cosine, size * sine), table)
+        return parts.Force(load.name, load.place, (size * cosine, size * sine), table, load.follows)
     if isinstance(load, SpringLoad):
         return parts.Spring(
-            load.name, load.first, load.second, load.stiffness, load.length, load.damping
-        )
+            load.name, load.first, load.second, load.stiffness, load.length, load.damping,
+            {"both": 0, "pushing": -1, "pulling": 1}[load.acts],
+        )  # fmt: skip
+    if load.kind in KINDS:
+        return KINDS[load.kind].of(load)
     table = isinstance(load.torque, tuple)
     return parts.Torque(load.name, load.body, 1.0 if table else load.torque, table)
 

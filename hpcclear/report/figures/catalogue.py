@@ -11,6 +11,7 @@ from hpcclear.report.figures import (
     accuracy,
     designs,
     effects,
+    guides,
     identified,
     maps,
     motion,
@@ -37,6 +38,8 @@ class Entry(NamedTuple):
     """Of the file."""
     draw: "Callable[[xr.Dataset], Figure]"
     caption: str
+    along: str = "time"
+    """A dimension that the file must have; any file of a response has instants."""
 
 
 def section_figure(found: xr.Dataset) -> "Figure":
@@ -72,33 +75,33 @@ RESULTS: tuple[Entry, ...] = (
         "sensitivities",
         "sensitivity",
         surrogates.sensitivity_figure,
-        "Sensitivities against clearance: lines with bands over the whole interval, marks with bars where they "
-        "stopped changing; two standard errors.",
+        "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: "
+        "from the ranges at which they converged.",
     ),
     Entry(
         "sobol",
         "sensitivity",
         surrogates.sobol_figure,
-        "Global sensitivities: first-order Sobol indices (a variable by itself) and total ones (with interactions, "
-        "so that their sum may exceed 1), with two standard errors.",
+        "Global sensitivities with two standard errors: first-order Sobol indices (each variable alone) and total "
+        "indices (with interactions; their sum may exceed 1).",
     ),
     Entry(
         "surface-fit",
         "sensitivity",
         surrogates.fit_figure,
-        "Fit of the response surfaces on test points, against clearance and length of the interval.",
+        "Fit of the response surfaces on test points, against clearance and length of the ranges.",
     ),
     Entry(
         "surrogates",
         "kriging",
         surrogates.surfaces_figure,
-        "Objective over pairs of design variables at the least and the largest clearance, by Kriging.",
+        "Objective by Kriging over pairs of design variables, at the smallest and the largest clearance.",
     ),
     Entry(
         "parity",
         "kriging",
         surrogates.parity_figure,
-        "Surrogate against simulation: each point predicted without itself; R² on test points.",
+        "Surrogate against simulation: leave-one-out predictions; R² on test points.",
     ),
     Entry(
         "wear",
@@ -116,7 +119,7 @@ RESULTS: tuple[Entry, ...] = (
         "wear-profile",
         "wear",
         wear.profile_figure,
-        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over all runs.",
+        "Depth of wear around bearings and journals, at several ages (medians over all runs).",
     ),
     Entry(
         "posterior",
@@ -151,6 +154,7 @@ RESPONSE: tuple[Entry, ...] = (
         "contact force by its direction",
     ),
     Entry("penetration", "response", response.penetration_figure, "penetration"),
+    Entry("guide", "response", guides.guide_figure, "offset, tilt and contacts in guides", "guide"),
     Entry("phase", "response", portraits.phase_figure, "phase portraits"),
     Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
     Entry("spectrum", "response", response.spectrum_figure, "spectra"),
@@ -185,5 +189,7 @@ def drawings(
     if responses:
         one = responses.get("original", next(iter(responses.values())))
         made["response"] = partial(response.response_figure, one)
-        made |= {entry.name: partial(entry.draw, one) for entry in RESPONSE}
+        made |= {
+            entry.name: partial(entry.draw, one) for entry in RESPONSE if entry.along in one.dims
+        }
     return made

@@ -83,6 +83,14 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
     return f"{value * chosen.factor:.{digits}g}{unit}"
 
 
+def value(one: xr.DataArray) -> str:
+    """A design variable of a design as it is printed: with its unit, or the name of the row of a table."""
+    number, options = float(one), str(one.attrs.get("options", ""))
+    if options and np.isfinite(number):
+        return options.split("; ")[int(number)]
+    return quantity(number, str(one.attrs["units"]))
+
+
 NOT_CHECKED = "not checked"
 """What stands in place of a half-width that nobody simulated."""
 

@@ -7,10 +7,11 @@ import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike, beside
-from hpcclear.report.answer import constraints, is_plain
+from hpcclear.report.answer import constraints
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
+from hpcclear.report.merit import is_plain
 
 _SIMULATED = (
     ("mean_true", "mean of f"),
@@ -160,6 +161,9 @@ def _table(
         row: list[object] = [words]
         for scale, (variable, _) in zip(scales, known, strict=True):
             text = number(float(variable[k]) * scale.factor)
+            if variable.attrs.get("options") and np.isfinite(variable[k]):
+                row.append(labels.value(variable[k]))
+                continue
             row.append(Number(text + _half_width(chosen.isel(design=k), str(variable.name), scale)))
         rows.append([*row, *_goals(chosen.isel(design=k), asked)])
     return Table(header, rows, caption)

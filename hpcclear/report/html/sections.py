@@ -158,9 +158,9 @@ def identified_machine(content: Content) -> list[object] | None:
 
 
 def statistics(content: Content) -> list[object] | None:
-    """Mean, standard deviation and quantiles of the samples, shares beyond thresholds of the study, and warnings."""
+    """Statistics of the samples, shares beyond thresholds of the study, and warnings; of a study its designs have them."""
     samples = content.get("samples")
-    if samples is None:
+    if samples is None or content.get("verification") is not None:
         return None
     lines = spread.statistics(samples, _thresholds(samples))
     rows = [[line.label, line.text] for line in lines]
@@ -232,5 +232,7 @@ def _listed(numbers: np.ndarray, of: int) -> str:
     """Numbers of samples, the first ones only where they are many, "all" where all are meant."""
     if len(numbers) == of > 1:
         return "all"
+    if len(numbers) > max(LISTED, of // 2):
+        return f"all but {of - len(numbers)}"
     shown = ", ".join(str(n) for n in numbers[:LISTED])
     return shown if len(numbers) <= LISTED else f"{shown} and {len(numbers) - LISTED} more"

@@ -27,6 +27,9 @@ from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
 
+Drawn = Callable[[np.ndarray], Mapping[str, np.ndarray]]
+"""Designs (n, k) to draws (n or 1, s) of each random input."""
+
 MOST_PLACES = 2**16
 """Points at which a surrogate is evaluated at a time."""
 
@@ -98,9 +101,10 @@ class RobustObjective:
         Needed only where a derived input depends on a random one.
     tolerance : float
         Absolute error allowed in the integral of any kernel (at most 1) over one random input.
-    draws : (int, numpy Generator) or mapping of str to array (s,), optional
+    draws : (int, numpy Generator), mapping of str to array (s,), or callable, optional
         Monte Carlo in place of quadrature: how many draws, and what makes them; or the draws themselves, of each random input,
-        which may vary together then. All designs see the same ones, so that their ranking is not noise.
+        which may vary together then. All designs see the same ones, so that their ranking is not noise. Of distributions that
+        depend on the design a function of designs (n, k) that returns draws (n or 1, s) of each.
     joint : callable, optional
         Of inputs that vary together, independent draws of them all: (count, numpy Generator) to a mapping of str to
         array (count,).
@@ -128,16 +132,18 @@ class RobustObjective:
         derived: Sequence[Derived] = (),
         probes: np.ndarray | None = None,
         tolerance: float = 1e-8,
-        draws: tuple[int, np.random.Generator] | Mapping[str, np.ndarray] | None = None,
+        draws: tuple[int, np.random.Generator] | Mapping[str, np.ndarray] | Drawn | None = None,
         joint: Callable[[int, np.random.Generator], Mapping[str, np.ndarray]] | None = None,
     ) -> None:
         self.model = model
         self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
-        self._draws: dict[str, np.ndarray] | None = None
+        self._draws: Mapping[str, np.ndarray] | Drawn | None = None
         self._rules: tuple[TensorRule, ...] = ()
         self._joint = joint
         if isinstance(draws, Mapping):
             self._draws = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
+        elif callable(draws):
+            self._draws = draws
         elif draws is not None:
             self._draws = self._drawn(*draws)
         elif not model.separable:
@@ -158,7 +164,8 @@ class RobustObjective:
     def __call__(self, designs: np.ndarray) -> np.ndarray:
         designs = self._checked(designs)
         if self._draws is not None:
-            return self._averaged(designs, self._draws)
+            drawn = self._draws(designs) if callable(self._draws) else self._draws
+            return self._averaged(designs, drawn)
         share, mean, variance = (np.zeros((len(self._rules), len(designs))) for _ in range(3))
         for k, rule in enumerate(self._rules):
             share[k], mean[k], variance[k] = rule.moments(designs)
@@ -168,14 +175,14 @@ class RobustObjective:
         return np.stack([total, np.sqrt(spread)], axis=1)
 
     def sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The surrogate at given draws of the random inputs, (s,) each: ``(n, s)``.
+        """The surrogate at given draws of the random inputs, (s,) each, or (n, s): ``(n, s)``.
 
         Raises
         ------
         InputError
             As on a call.
         """
-        rows = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
+        rows = {name: np.atleast_2d(draws[name]) for name in self._wiring.random}
         return self._sampled(self._checked(designs), rows)
 
     def monte_carlo(
@@ -218,7 +225,7 @@ class RobustObjective:
         return designs
 
     def _averaged(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Mean and deviation over draws, ``(n, 2)``: the model's own, if it has any."""
+        """Mean and standard deviation over draws, ``(n, 2)``: the model's own, if it has any."""
         found = []
         for places in self._places(designs, draws):
             own = self.model.moments(places)
@@ -243,7 +250,8 @@ class RobustObjective:
         size = max((array.shape[1] for array in draws.values()), default=1)
         step = max(MOST_PLACES // size, 1)
         for k in range(0, len(designs), step):
-            yield self._wiring.places(dims, designs[k : k + step], draws)
+            own = {n: one[k : k + step] if len(one) > 1 else one for n, one in draws.items()}
+            yield self._wiring.places(dims, designs[k : k + step], own)
 
     def _closed(self, leaf: Any, design: np.ndarray) -> tuple[float, float]:
         wiring = self._wiring

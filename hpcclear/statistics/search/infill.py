@@ -80,6 +80,7 @@ def proposals(
     count: int,
     rng: np.random.Generator,
     excess: Array | None = None,
+    snap: Callable[[Array], Array] = np.asarray,
 ) -> Array:
     """Designs to evaluate next, at most `count`, shape (k, d).
 
@@ -95,6 +96,8 @@ def proposals(
         Advanced.
     excess : array, shape (n,), optional
         By how much each breaks the constraints, at most 0 where it keeps them; NaN where it failed.
+    snap : callable, optional
+        Points (n, d) to the nearest designs that exist.
 
     Raises
     ------
@@ -108,7 +111,7 @@ def proposals(
         models = [TwoScales(designs, column, bounds, rng) for column in table.T]
         fronts = [
             minimise(
-                _believed(models, boldness, values.shape[1]),
+                _believed(models, boldness, values.shape[1], snap),
                 bounds,
                 iterations=ITERATIONS,
                 rng=rng,
@@ -122,18 +125,18 @@ def proposals(
             front for front in fronts if len(front.points)
         ]  # none where nothing keeps the constraints
         least = _least(models[: values.shape[1]], designs, eligible(values, excess))
-        near = _about(models, designs, least, bounds, rng) if fronts else designs[:0]
+        near = _about(models, designs, least, bounds, rng, snap) if fronts else designs[:0]
     if not fronts:
         assert excess is not None  # only constraints leave a front without designs
         about = _nearer(designs, excess, bounds, rng)
-        return _chosen(designs[:0], about, designs, bounds, count, count)
+        return _chosen(designs[:0], snap(about), designs, bounds, count, count)
     known = [front.points[front.values.argmin(axis=0)] for front in fronts]
     ends = np.concatenate([known[0], near, known[-1]])
     others = np.concatenate([front.points for front in fronts])
     most = (
         count if values.shape[1] == 2 else count // 2
     )  # between the ends of a surface there is more
-    return _chosen(ends, others, designs, bounds, count, most)
+    return _chosen(snap(ends), snap(others), designs, bounds, count, most)
 
 
 def eligible(values: Array, excess: Array | None) -> Booleans:
@@ -169,6 +172,7 @@ def _about(
     ends: Sequence[int],
     bounds: Array,
     rng: np.random.Generator,
+    snap: Callable[[Array], Array],
 ) -> Array:
     """Near the design that is believed to be the end of each objective, the least that may be there, by each of `NEARBY`."""
     width = bounds[:, 1] - bounds[:, 0]
@@ -177,7 +181,7 @@ def _about(
         for column, row in enumerate(ends):
             steps = LOCAL * width * rng.uniform(-1.0, 1.0, (CANDIDATES, len(width)))
             points = np.clip(designs[row] + steps, bounds[:, 0], bounds[:, 1])
-            believed = _believed(models, boldness, len(ends))(points)
+            believed = _believed(models, boldness, len(ends), snap)(points)
             least, broken = (
                 believed if isinstance(believed, tuple) else (believed, np.zeros(len(points)))
             )
@@ -205,12 +209,16 @@ def _best(designs: Array, values: Array, count: int, excess: Array | None) -> Ar
 
 
 def _believed(
-    models: Sequence[TwoScales], boldness: float, objectives: int
+    models: Sequence[TwoScales],
+    boldness: float,
+    objectives: int,
+    snap: Callable[[Array], Array],
 ) -> Callable[[Array], Array | tuple[Array, Array]]:
     """Objectives as the models see them, less `boldness` standard deviations; with more models than objectives, what the last
     says of constraints besides."""
 
     def function(points: Array) -> Array | tuple[Array, Array]:
+        points = snap(points)
         means = [model.predict(points) for model in models]
         if boldness:
             reach = [boldness * np.sqrt(model.variance(points)) for model in models]

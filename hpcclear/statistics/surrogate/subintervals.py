@@ -4,7 +4,7 @@ A box is accepted by R2 and RMAE on test points of its own; a refused one gets m
 then is cut in half across the input that varies fastest, down to a stated depth.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -56,6 +56,7 @@ def fit_subintervals(
     names: Sequence[str] | None = None,
     sample: Sampler = latin_hypercube,
     method: Method = KRIGING,
+    snap: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> Piecewise:
     """Fit models on subintervals until each is accepted or a limit is reached.
 
@@ -76,6 +77,8 @@ def fit_subintervals(
         ``sample(n, bounds, rng)`` draws points in a box.
     method : Method
         What is fitted.
+    snap : callable
+        Points (n, d) to the nearest that exist.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def fit_subintervals(
     done: list[tuple[Leaf, Accuracy, bool]] = []
     counts = settings.samples, settings.test_samples
     for box in pending:
-        box.wanted = [sample(n, box.bounds, box.rng) for n in counts]
+        box.wanted = [snap(sample(n, box.bounds, box.rng)) for n in counts]
     while pending:
         _evaluate_wanted(evaluate, pending)
         following: list[_Box] = []
@@ -100,11 +103,11 @@ def fit_subintervals(
             accepted = reached.meets(settings.r2_min, settings.rmae_max)
             if not accepted and box.resampled < settings.max_resamples:
                 box.resampled += 1
-                box.wanted = [sample(settings.samples, box.bounds, box.rng), box.tests[:0]]
+                box.wanted = [snap(sample(settings.samples, box.bounds, box.rng)), box.tests[:0]]
                 following.append(box)
             elif not accepted and box.depth < settings.max_depth:
                 for half in _halves(box, model.steepest()):
-                    half.wanted = [sample(n, half.bounds, half.rng) for n in counts]
+                    half.wanted = [snap(sample(n, half.bounds, half.rng)) for n in counts]
                     following.append(half)
             else:
                 done.append((model, reached, accepted))

@@ -12,7 +12,7 @@ from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import JOINTS
 from hpcclear.scene import Scene
 from hpcclear.scene.citation import TITLE
-from hpcclear.scene.variables import SHORT_NAMES
+from hpcclear.scene.named import SHORT_NAMES
 
 SYMBOLS = ("m1", "u1", "I1", "m2", "u2", "I2", "m3", "C")
 """Of its Table 3; what each is of the mechanism: `hpcclear.scene.variables.SHORT_NAMES`."""

@@ -21,7 +21,7 @@ def film_of(effects, par, joint, relative, contact, i, W):
     that thin, and goes on damping. Its losses F.w of the squeezed film and of shear are never negative: the moments are
     those that make the power of all that it does to both bodies just that.
     """
-    film = effects.films[joint.place]
+    film = effects.film_at[joint.place]
     if film is not None:
         block = joint.block
         ex, ey, vx, vy, spin_journal, spin_bearing = relative

@@ -10,7 +10,7 @@ not along e but by h'/|e| aside, to first order in h/c.
 from typing import Any, NamedTuple
 
 from hpcclear.base.jit import lane_function
-from hpcclear.base.unrolled import unrolled, written_out
+from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
 
 HIGHER = range(1, at.WAVE_ROWS // 2)
@@ -47,7 +47,6 @@ def counted(waves):
 
 
 @lane_function
-@unrolled
 def depth_and_slope(count, par, row, cosine, sine, i, W):
     """Sum of `count` waves at an angle, m, and its derivative, m/rad.
 

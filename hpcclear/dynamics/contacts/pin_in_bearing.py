@@ -1,0 +1,105 @@
+"""A journal in a round bearing larger than itself: circle in circle, with an oil film and surfaces out of round.
+
+Conventions: e = journal centre - bearing centre; the contact point lies half-way through the overlap, so the pair of contact
+forces exerts no net couple; angles counter-clockwise; gravity towards -y.
+"""
+
+import math
+from typing import Any
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.bits import no_less
+from hpcclear.base.jit import apart, lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.contacts.declared import Geometry, Get, Shape
+from hpcclear.dynamics.contacts.forces import (
+    lost,
+    normal_force,
+    product,
+    store_contact,
+    swept,
+    tangential_force,
+)
+from hpcclear.dynamics.contacts.lubrication import film_of, pressed
+from hpcclear.dynamics.contacts.roundness import less, store_angles, tilted, waves_here
+
+_TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
+
+
+@apart
+@lane_function
+def joint_force(effects, work, par, joint, relative, turns, i, W):
+    """Contact, friction and film in one open joint.
+
+    `relative`: the journal's position and velocity relative to the bearing's centre (ex, ey, vx, vy), and the angular
+    velocities of journal and bearing, None for what never turns; `turns`: cosines and sines of the angles of bearing and
+    journal, for surfaces that are out of round. Gap (|e| - c of round ones), normal force (with a film: the size of both
+    forces) and gap rate go to their rows.
+    Returns the force on the bearing (the journal gets the opposite), the moments of friction force, waves and film on
+    bearing and journal about their own centres, and the dissipated power.
+    """
+    ex, ey, vx, vy, spin_journal, spin_bearing = relative
+    moving = ex, ey, vx, vy, swept(spin_journal, 1.0), swept(spin_bearing, 1.0)
+    block = joint.block
+    square = ex * ex + ey * ey + _TINY
+    distance = math.sqrt(square)
+    inverse = 1.0 / distance
+    nx = ex * inverse
+    ny = ey * inverse
+    round_gap = distance - par[(block + at.CLEARANCE) * W + i]
+    here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
+    gap = less(effects.waves, round_gap, here.bearing + here.journal)
+    rate = less(effects.waves, vx * nx + vy * ny, here.widening)
+    depth = no_less(gap, 0.0)
+    normal = normal_force(effects, work, par, joint, depth, rate, i, W)
+    radius = less(effects.waves, par[(block + at.BEARING_RADIUS) * W + i], -here.bearing)
+    arm_bearing = radius + 0.5 * depth
+    radius = less(effects.waves, par[(block + at.JOURNAL_RADIUS) * W + i], here.journal)
+    arm_journal = radius - 0.5 * depth
+    across = vy * nx - vx * ny
+    sliding = across + swept(spin_journal, arm_journal) - swept(spin_bearing, arm_bearing)
+    rubs = effects.friction
+    tangential = tangential_force(effects, work, par, joint, sliding, normal, i, W)
+    fx = normal * nx - product(rubs, tangential, ny)
+    fy = normal * ny + product(rubs, tangential, nx)
+    moment_bearing = product(rubs, tangential, arm_bearing)
+    moment_journal = product(rubs, tangential, arm_journal)
+    side = tilted(effects.waves, here, (nx, ny, inverse), normal)
+    touch, forces = (depth, rate, sliding), (normal, tangential)
+    loss = lost(effects, work, par, joint, touch, forces, i, W)
+    oil = film_of(effects, par, joint, moving, (nx, ny, gap), i, W)
+    work[(at.RATE_NOW + joint.gap) * W + i] = gap
+    whole = pressed(effects.film_at[joint.place], normal, nx, ny, oil[0], oil[1])
+    work[(at.RATE_NOW + joint.force) * W + i] = whole
+    store_contact(effects, work, par, joint, touch, forces, (nx, ny), i, W)
+    store_angles(effects, work, joint, here, i, W)
+    return (
+        fx + oil[0] + side[0],
+        fy + oil[1] + side[1],
+        moment_bearing + oil[2] + side[2],
+        oil[3] - moment_journal + side[3],
+        loss + oil[4],
+    )
+
+
+def shape(get: Get) -> Shape:
+    """Numbers of a joint's samples."""
+    clearance, bearing = get("clearance"), get("bearing_radius")
+    journal = bearing - clearance
+    radii = (clearance, bearing, journal)
+    return Shape(*radii, radii, bearing * journal / clearance)
+
+
+def reach(parameters: Any, place: int) -> Array:
+    """The clearance, m, shape (...): of samples."""
+    found: Array = parameters.clearance[..., place]
+    return found
+
+
+GEOMETRY = Geometry(
+    name="pin_in_bearing",
+    words="journal in a round bearing",
+    force=joint_force,
+    shape=shape,
+    reach=reach,
+)

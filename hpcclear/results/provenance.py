@@ -1,0 +1,48 @@
+"""Global attributes that say what made a file."""
+
+import functools
+import platform
+from importlib import metadata
+
+from hpcclear.base import host
+
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "xarray", "scikit-learn", "moocore")
+
+
+def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, str]:
+    """Global attributes that say what made a file; no time in them: equal runs, equal bytes.
+
+    Parameters
+    ----------
+    scene, scene_hash : str
+        Its text and the hash of its content.
+    references : str
+        Published work that its numbers are taken from; "" leaves the attribute out.
+    """
+    version = _version()
+    return {
+        "source": f"hpcclear {version}",
+        "history": f"written by hpcclear {version}",
+        **({"references": references} if references else {}),
+        "scene": scene,
+        "scene_hash": scene_hash,
+        "hpcclear_version": version,
+        "versions": _versions(),
+        "processor": _processor(),
+    }
+
+
+@functools.cache
+def _version() -> str:
+    return metadata.version("hpcclear")
+
+
+@functools.cache
+def _versions() -> str:
+    found = [f"python {platform.python_version()}"]
+    return ", ".join(found + [f"{name} {metadata.version(name)}" for name in _PACKAGES])
+
+
+@functools.cache
+def _processor() -> str:
+    return host.processor()

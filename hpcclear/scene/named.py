@@ -1,0 +1,151 @@
+"""What study variables and random inputs share: names, the paths that they drive, numbers in the unit of these."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import model_validator
+from pydantic_core import PydanticCustomError
+
+from hpcclear.base.outcome import JUDGED, ON_REQUEST
+from hpcclear.scene.fields import Quantity, Table, invalid, nearest
+from hpcclear.scene.paths import quantities
+
+SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
+    "m1": ("mechanism.crank.mass",),
+    "u1": ("mechanism.crank.mass_center",),
+    "I1": ("mechanism.crank.inertia",),
+    "m2": ("mechanism.rod.mass",),
+    "u2": ("mechanism.rod.mass_center",),
+    "I2": ("mechanism.rod.inertia",),
+    "m3": ("mechanism.slider.mass",),
+    "C": ("joints.crank_rod.clearance", "joints.rod_slider.clearance"),
+    "C12": ("joints.crank_rod.clearance",),
+    "C23": ("joints.rod_slider.clearance",),
+}
+"""Names that stand for scene entries where no path is given; nothing else depends on a name."""
+
+RESERVED = frozenset(
+    (
+        *("sample", "joint", "objective", "objective_spread", "objective_uncertainty", "mean_gap"),
+        *(
+            "peak_contact_force",
+            "latched",
+            "rhs_evaluations",
+            "status",
+            "flags",
+            *ON_REQUEST,
+            *JUDGED,
+        ),
+        *("case", "run", "solution", "design", "model", "mean", "deviation"),
+        "label",
+        *("searched", "searched_first", "searched_second", "constraints"),
+    )
+)
+"""Names of dimensions and results in the datasets."""
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
+"""What variables, random inputs and cases may be called."""
+Range = tuple[float, float]
+
+
+def resolved_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
+    """The paths a named row drives, from `paths`, `path` or its name."""
+    name = data.get("name")
+    if not isinstance(name, str) or not NAME.fullmatch(name) or name in RESERVED:
+        reason = "is taken by a result" if name in RESERVED else "is not a name"
+        raise invalid(
+            reason, "Use a letter, then letters, digits or _, and give the path as path = ..."
+        )
+    if "path" in data and "paths" in data:
+        raise invalid("path and paths contradict each other", "Keep one of them", key="path")
+    given = data.get("paths", data.get("path"))
+    key = "path" if "path" in data else "paths"
+    if given is None:
+        if name not in SHORT_NAMES:
+            raise invalid(
+                "is not one of the known names, so it needs a path",
+                f'Add path = "drive.speed", say; known names are {", ".join(SHORT_NAMES)}',
+            )
+        return SHORT_NAMES[name]
+    paths = (given,) if isinstance(given, str) else given
+    if (
+        not isinstance(paths, (list, tuple))
+        or not paths
+        or any(not isinstance(p, str) for p in paths)
+    ):
+        raise invalid(
+            "a dotted path, or a list of them, is expected here", "Write it in quotes", key=key
+        )
+    for path in paths:
+        if path not in quantities():
+            raise invalid(
+                f"{path!r} is not a physical number of a scene",
+                nearest(path, tuple(quantities())),
+                key=key,
+            )
+    if len(set(paths)) < len(paths):
+        raise invalid("a path stands there twice", "Remove one", key=key)
+    if len({quantities()[path].unit for path in paths}) > 1:
+        raise invalid("the paths have different units", "Use a variable for each unit", key=key)
+    return tuple(paths)
+
+
+def number_of(value: Any, quantity: Quantity, key: str) -> float:
+    """`Quantity.convert` with the key in its error."""
+    try:
+        return quantity.convert(value)
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise invalid(context["reason"], context["remedy"], key=key) from None
+
+
+def range_of(value: Any, quantity: Quantity, key: str) -> Range:
+    """A pair in rising order."""
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise invalid("two bounds are expected here", "Write [lower, upper]", key=key)
+    lower, upper = (number_of(bound, quantity, key) for bound in value)
+    if not lower < upper:
+        reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
+        raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
+    if quantity.nonzero and lower < 0.0 < upper:
+        raise invalid(
+            "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key=key
+        )
+    return lower, upper
+
+
+def list_of(value: Any, quantity: Quantity, key: str, least: int, most: int) -> tuple[float, ...]:
+    """Numbers, at least and at most so many."""
+    if not isinstance(value, (list, tuple)) or not least <= len(value) <= most:
+        count = f"{least}" if least == most else f"from {least} to {most}"
+        raise invalid(f"{count} numbers are expected here", "Write [first, second]", key=key)
+    return tuple(number_of(one, quantity, key) for one in value)
+
+
+class NamedInput(Table):
+    """A named row of the study and the scene entries that get its value."""
+
+    name: str
+    paths: tuple[str, ...]
+    """Scene entries that all get its value."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _resolve(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        data = cls._without_numbers(data)
+        paths = () if data.get("paths") == () else resolved_paths(data)
+        row = {key: value for key, value in data.items() if key != "path"} | {"paths": paths}
+        return cls._in_si(row, paths)
+
+    @classmethod
+    def _without_numbers(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
+        return data
+
+    @classmethod
+    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
+        """The row with the entries whose unit follows from its paths in SI."""
+        raise NotImplementedError

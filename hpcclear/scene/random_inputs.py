@@ -1,0 +1,212 @@
+"""Random inputs of a study: distributions about the design or wherever it is."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, ClassVar
+
+from pydantic import model_validator
+
+from hpcclear.base import quantiles
+from hpcclear.scene.distributions import OF_LIMITS, converted, form_of, is_ours
+from hpcclear.scene.fields import LONGEST_CURVE, Quantity, invalid
+from hpcclear.scene.fits import Tolerance
+from hpcclear.scene.named import NamedInput, Range, list_of, number_of, range_of
+from hpcclear.scene.paths import quantities
+
+_COMMON = ("name", "paths", "distribution")
+_SHAPE = Quantity("", least=1e-2, most=1e4)
+_LEAST_SHARE = 1e-9
+"""Least probability that a range may leave of a distribution it cuts."""
+
+
+class RandomInput(NamedInput):
+    """A random number of the scene: about the design's value, or wherever the design is
+    (`about_design = false`)."""
+
+    elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "file": ("files are read only where a scene is loaded from a file",
+                 "Give values = [...]"),
+        "column": ("names a column, but there is no file", "Add file = ..."),
+    }  # fmt: skip
+
+    distribution: str
+    """The distribution. "samples" are measured values; "wear" uses the clearances of the service lives of `[wear]`. Further
+    ones: any continuous one of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name" of a
+    file."""
+    range: Range | None = None
+    """Bounds of a "uniform" or "beta" distribution; truncation of others. SI."""
+    mean: float | None = None
+    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the
+    design. Of "lognormal" its mean, before truncation."""
+    half_width: float | None = None
+    """Of "uniform", "truncated-normal" and "beta", SI, or a share such as "3 %" of the number it is about, where the study
+    does not vary that; of "wear", that of the uniform distribution of new clearances about the scene's."""
+    deviation: float | None = None
+    """Standard deviation of "normal", and of "truncated-normal" and "lognormal" before they are cut, SI."""
+    shapes: tuple[float, float] | None = None
+    """Of "beta": a and b of its density x^(a-1) (1-x)^(b-1), x from 0 to 1 over its range."""
+    shape: float | None = None
+    """Of "weibull": k of exp(-((x - location)/scale)^k), the share above x."""
+    scale: float | None = None
+    """Of "weibull", SI."""
+    location: float | None = None
+    """Of "weibull": where it begins, SI; default 0."""
+    values: tuple[float, ...] | None = None
+    """Of "samples": measured values, each with equal chance, SI; in their place `file`, a CSV table beside the scene file, and
+    `column`, as its first row has it."""
+    fit: str | None = None
+    """Of "fit", the clearance of a bore and a pin that are made apart: a fit by ISO 286; left out, that of the joint."""
+    bore: Tolerance | None = None
+    """Of "fit": how the bore is made; left out, normal within the limits of size of the fit, with cp = 1."""
+    pin: Tolerance | None = None
+    """Of "fit": how the pin is made; left out, normal within the limits of size of the fit, with cp = 1."""
+    cycles: Annotated[float, Quantity("", least=0)] | None = None
+    """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
+    parameters: dict[str, float] | None = None
+    """Of distributions from elsewhere, which may stand beside the other entries, too: shapes, loc and scale of one of scipy's;
+    whatever a plug-in takes. Texts are converted to the unit of the input."""
+    relative: bool | None = None
+    """Whether `half_width` and `deviation` are shares of the design's value; `half_width = "3 %"` sets it where the study
+    varies that."""
+    about_design: bool | None = None
+    """Of all but "uniform", "normal", "truncated-normal", "beta", "fit" and "wear": whether what scatters is the
+    difference from the design's value."""
+
+    @classmethod
+    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
+        quantity = quantities()[paths[0]]
+        if not is_ours(row.get("distribution")):
+            row = _gathered(row, quantity.unit)
+        offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
+        if "range" in row:
+            row["range"] = range_of(row["range"], offset, "range")
+        for key in ("mean", "location"):
+            if key in row:
+                row[key] = number_of(
+                    row[key], Quantity(quantity.unit) if key == "location" else offset, key
+                )
+        for key in ("half_width", "deviation", "scale"):
+            if key in row:
+                unit = "" if row.get("relative") and key != "scale" else quantity.unit
+                row[key] = number_of(row[key], Quantity(unit, above=0), key)
+        if "shape" in row:
+            row["shape"] = number_of(row["shape"], _SHAPE, "shape")
+        if "shapes" in row:
+            row["shapes"] = list_of(row["shapes"], _SHAPE, "shapes", 2, 2)
+        if "values" in row:
+            row["values"] = tuple(
+                sorted(list_of(row["values"], offset, "values", 2, LONGEST_CURVE))
+            )
+        return row
+
+    @model_validator(mode="after")
+    def _parameters_fit(self) -> "RandomInput":
+        form = form_of(self.distribution, self.parameters or {})
+        needed, further = form.needs, form.may_have
+        if self.range is not None and self.distribution in ("uniform", "beta"):
+            needed, further = (needed - {"half_width"}) | {"range"}, frozenset()
+        for key in (name for name in type(self).model_fields if name not in _COMMON):
+            value = getattr(self, key)
+            if key in needed and value is None:
+                raise invalid(
+                    f"the distribution {self.distribution!r} needs it", "Add it", key, None
+                )
+            if key not in needed | further | {"relative"} and value not in (None, False):
+                raise invalid(
+                    f"does not belong to this {self.distribution!r} distribution", "Remove it", key
+                )
+        self._check_cut()
+        return self
+
+    def _check_cut(self) -> None:
+        if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:
+            raise invalid(
+                "a lognormal has a mean above 0", "Correct it, or use another distribution", "mean"
+            )
+        if self.distribution == "fit" and any(not p.endswith(".clearance") for p in self.paths):
+            raise invalid(
+                "a fit gives clearances of joints only", "Correct its path", "distribution"
+            )
+        if self.worn:
+            return
+        law = self.law  # of a plug-in found now, while it is known where its file is
+        if isinstance(law, quantiles.Uniform | quantiles.Normal):
+            low, high = law.span
+            cut = isinstance(law, quantiles.Normal) and law.reach < _LEAST_SHARE * law.deviation
+            if cut or not low < high:
+                reason = "is too narrow for numbers of 16 digits, or holds next to nothing of the distribution"
+                raise invalid(
+                    reason, "Widen it", "range" if self.range is not None else "half_width"
+                )
+        if (
+            isinstance(law, quantiles.Cut)
+            and self.range is not None
+            and self.distribution != "beta"
+        ):
+            below, above = law.chances
+            if above - below < _LEAST_SHARE:
+                raise invalid(
+                    f"contains less than {_LEAST_SHARE:g} of the distribution",
+                    "Choose bounds around its values",
+                    "range",
+                )
+
+    @property
+    def absolute(self) -> bool:
+        """Whether the distribution stays where it is when the design moves."""
+        if self.distribution in ("uniform", "normal", "truncated-normal", "beta"):
+            return self.range is not None or self.mean is not None
+        return not self.about_design
+
+    @property
+    def worn(self) -> bool:
+        """Whether its values are known only after a wear simulation."""
+        return self.distribution == "wear"
+
+    @cached_property
+    def law(self) -> quantiles.Quantiles:
+        """Its quantile function: of its value where it is absolute, else of its difference from the design, SI.
+
+        Raises
+        ------
+        InputError
+            Only a wear simulation gives its values.
+        """
+        form = form_of(self.distribution, self.parameters or {})
+        return form.law(self.model_dump(exclude_none=True))
+
+    def changed(self, entries: Mapping[str, Any]) -> quantiles.Quantiles:
+        """Its quantile function with other entries, such as {"half_width": 1e-5, "bore.cp": 1.3}; errors for validators."""
+        own = self.model_dump(exclude_none=True)
+        for key, value in entries.items():
+            table, _, leaf = key.rpartition(".")
+            if table:
+                own[table] = {**own.get(table, {}), leaf: value}
+            else:
+                own[key] = value
+        return form_of(self.distribution, self.parameters or {}).law(own)
+
+    @property
+    def shape_words(self) -> str:
+        """The distribution with its parameters, in words."""
+        given = ", ".join(f"{key} = {value:g}" for key, value in (self.parameters or {}).items())
+        given = self.fit or given
+        return f"{self.distribution}({given})" if given else self.distribution
+
+    @property
+    def span(self) -> Range:
+        """Least and largest value that counts, SI: of the difference from the design, where it follows it."""
+        return self.law.span
+
+
+def _gathered(row: dict[str, Any], unit: str) -> dict[str, Any]:
+    """The row of a distribution from elsewhere, its own parameters in one table."""
+    if "parameters" in row:
+        own, kept = row["parameters"], row
+        if not isinstance(own, Mapping):
+            return row
+    else:
+        rest = {*_COMMON, *OF_LIMITS}
+        own = {key: value for key, value in row.items() if key not in rest}
+        kept = {key: value for key, value in row.items() if key in rest}
+    return {**kept, "parameters": converted(row["distribution"], own, unit)}
