@@ -16,6 +16,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.identify import training
 from hpcclear.identify.advice import advice, noise_of
+from hpcclear.identify.answer import Wanted
+from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter
 from hpcclear.identify.history import DAY, history, seconds_of
 from hpcclear.identify.inputs import Inputs, Unknown, design
@@ -236,6 +238,36 @@ def test_a_signal_that_no_member_has_is_refused_by_its_feature(made):
     verdict = judged(prepared, features, 1, 400)
     assert not verdict.explained
     assert "harmonic 3 " in prepared.labels[verdict.worst]
+
+
+def test_two_clearances_that_only_their_sum_decides_are_not_identified_separately(scene):
+    pin = scene.resolved()["joints"]["crank_rod"]
+    both = scene.with_({"joints.rod_slider": pin})
+    other = UNKNOWN.replace("crank_rod", "rod_slider")
+    whole = Inputs.of(both, [UNKNOWN, other])
+    inputs = Inputs(whole.unknowns)
+    places = design(1, inputs, 128)
+    total = np.column_stack([places[:, :2].mean(axis=1), np.full(len(places), 0.5)])
+    spectra = spectra_of(total, np.random.default_rng(2))
+    ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
+    measured = Measured("crank_moment", ensemble.spectrum("crank_moment"), True, SPEED, ORDERS)
+    layout = Layout.of(measured, Sensor())
+    truth = np.array([0.5, 0.5])
+    values = machine(ensemble, layout, truth, np.random.default_rng(7))
+    variance = np.full(len(values), 0.5 * 0.05 / 20)
+    prepared = prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 32)
+    found = prepared, [judged(prepared, values, 1, 400)]
+    wanted = Wanted((UNKNOWN, other), (Path("a.csv"),))
+    gains = advice(ensemble, ["crank_moment"], Sensor(), SPEED, 0.1, 1)
+    content = identified_dataset(ensemble, found, np.zeros(1), gains, wanted, 1, {})
+    assert float(content["correlation"][0]) < -0.9
+    assert float(content["expected_correlation"][0, 0]) < -0.7  # the bounds cut errors off
+    assert "correlation of errors -0." in lines(content)[-1].text
+    assert any("not identified separately" in text for text in warnings(content))
+    widths = np.ptp(content["interval"][0].values, axis=1)
+    assert (widths > 3e-5).all()  # each is open, though their mean is known to some micrometres
+    mean = content["posterior"][0, :, :2].mean("input")
+    assert float(mean.std()) < 3e-6
 
 
 def test_noise_without_a_signal_leaves_the_unknown_open(made):
