@@ -220,7 +220,8 @@ NO_PROSE = ("base/width.py", "dynamics/linkage/compiled.py")
 """Modules whose long strings are source text."""
 
 DOCSTRINGS = (
-    "accuracy", "base", "cli", "dynamics", "ensemble", "identify", "plugins", "ranks", "report", "results", "scene", "statistics", "study",
+    "accuracy", "base", "cli", "dynamics", "ensemble", "identify", "plugins", "ranks", "report", "results", "scene",
+    "statistics", "study",
 )  # fmt: skip
 """Packages, all of them."""
 
