@@ -207,6 +207,7 @@ def check_outcome(scene: Scene) -> None:
 
 @CI
 @given(plain_scenes)
+@pytest.mark.nightly
 def test_random_scene(content: dict):
     valid_outcome_or_clear_refusal(content)
 

@@ -107,6 +107,21 @@ def test_limits_of_a_rare_failure_hold(name, limit, shift):
     assert values.std() < 0.15
 
 
+@pytest.mark.parametrize(("off", "expected"), [(0.0, 1.0), (0.1, 1.4)])
+def test_limits_of_a_rare_failure_hold_what_the_tolerance_takes(off, expected):
+    """A plane that is too low by a tenth: at 3.1 its probability is 1.37 times larger at a stricter tolerance."""
+    made = estimated(plane, 4, 3.1, 3)
+    before = made.interval(0.95)
+    answered(made.paired(0.0), lambda u: plane(u) + off)
+    found = made.interval(0.95)
+    assert made.factor == pytest.approx(expected, abs=0.15)
+    assert (found.lower, found.upper) == pytest.approx(
+        (before.lower / made.factor, before.upper * made.factor)
+    )
+    if off:
+        assert found.upper > stats.norm.sf(3.1 - off) > before.value
+
+
 def test_what_cannot_fail_has_an_upper_limit_all_the_same():
     """f is bounded below the limit; an upper limit is that of a lower level."""
     made = estimated(lambda u: np.tanh(plane(u)), 3, 1.0 + 1e-9, 1)

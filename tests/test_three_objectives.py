@@ -414,7 +414,7 @@ def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) 
 
 MANY = '["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]'
 REFUSED = {  # what is asked for: the key within the case, and why
-    '["mean"]': ("objectives", "two objectives or more"),
+    "[]": ("objectives", "needs an objective"),
     '["mean", "deviation", "mean"]': ("objectives.2", "already"),
     '[{formula="m2+m3"}, "mean", {formula=" m2 + m3"}]': ("objectives.2", "already"),
     '["quantile", {statistic="quantile", level=0.95}]': ("objectives.1", "already"),

@@ -47,6 +47,7 @@ FILES = (
     "docs/how-to/effects.md",
     "docs/how-to/elastic-rod.md",
     "docs/how-to/gallery.md",
+    "docs/how-to/identify.md",
     "docs/how-to/linkage.md",
     "docs/how-to/mechanism.md",
     "docs/how-to/objective.md",

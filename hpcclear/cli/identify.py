@@ -68,6 +68,10 @@ if TYPE_CHECKING:
     "--noise", type=Amount(min=0.0, min_open=True), metavar="SHARE",
     help="Noise of a sample over the RMS of the signal. With it the scatter between revolutions is used too.",
 )  # fmt: skip
+@click.option(
+    "--pressure", default="", metavar="COLUMN=AREA",
+    help="Measured pressure on the slider as a known load: a column of the first table and the piston's area.",
+)  # fmt: skip
 @flag("--advise", "Compare signals: half-widths to expect, by number of revolutions.")
 @click.option(
     "--members", type=click.IntRange(min=32), metavar="N",
@@ -77,7 +81,7 @@ if TYPE_CHECKING:
 def identify(
     written: Written, output: Path, unknowns: tuple[str, ...], signals: tuple[Path, ...], names: tuple[str, ...],
     dates: tuple[str, ...], limit: str | None, band: str | None, resonance: str | None, gain_error: float,
-    angle_error: str, noise: float | None, advise: bool, members: int | None, how: How,
+    angle_error: str, noise: float | None, pressure: str, advise: bool, members: int | None, how: How,
 ) -> int:  # fmt: skip
     """Identify unknown clearances from a measured signal, with calibrated intervals.
 
@@ -98,7 +102,7 @@ def identify(
         unit = Unknown.of(scene, unknowns[0]).unit
         most = None if limit is None else number_of("--limit", limit, unit)
         wanted = Wanted(
-            unknowns, signals, tuple(names), dates, most, sensor, noise, advise, members
+            unknowns, signals, tuple(names), dates, most, sensor, noise, pressure, advise, members
         )
         return describe(run_identify(scene, place_of(output), ranks, wanted, how.options()))
 

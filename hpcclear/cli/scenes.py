@@ -12,6 +12,7 @@ from hpcclear.cli.options import (
     Written,
     check_free,
     flag,
+    lightly,
     of_one_process,
     on_ranks,
     output_option,
@@ -19,7 +20,6 @@ from hpcclear.cli.options import (
     say,
     show,
     with_scene,
-    without_pint,
 )
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
@@ -171,6 +171,7 @@ def simulate(written: Written, output: Path) -> int:
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
+    lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
@@ -179,7 +180,6 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
 
-    without_pint()
     scene = written.scene()
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):

@@ -90,6 +90,8 @@ def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
         p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
     else:
         p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
+    if GEOMETRIES[scene.clearance_joint(label).geometry].along_a_line:  # a corner is small
+        p[:, at.DEEPEST_VALID] = np.minimum(p[:, at.DEEPEST_VALID], HERTZ_RANGE * shape.radius)
     rubs = scene.effects.friction
     if rubs.law == "none":
         return

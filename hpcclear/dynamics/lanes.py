@@ -88,7 +88,7 @@ class Lanes:
         sliding = None if self._memory is None else 1
         effects = problem.effects._replace(sliding=sliding)
         self._observed = None if observed is None else observed._replace(sliding=sliding)
-        self._rules = at.rules_of(effects)
+        self._rules = at.rules_of(effects._replace(impacts=(observed or effects).impacts))
         measures = at.measures_of(observed or problem.effects)
         self._method = at.Method(
             problem.settings().rows,

@@ -28,6 +28,7 @@ class Effects(NamedTuple):
     energies: Any = None  # energy balance
     series: Any = None  # friction forces and crank moment, for time series
     responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
+    impacts: Any = None  # measures of impact and noise of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
@@ -188,6 +189,18 @@ FOLLOWED_ACCELERATION = WRITTEN(
 )
 FOLLOWED_SQUARE = WRITTEN("of the followed acceleration", "m^2/s^4", asked_by="responses")
 FOLLOWED_ACROSS = WRITTEN("of a point along y", "m/s^2", asked_by="responses")
+IMPACT_POWERS = WRITTEN("lost by the damping of contacts, friction left out", "W", EACH, "impacts")
+FORCE_SQUARES = WRITTEN("of the normal force", "N^2", EACH, "impacts")
+FRAME_X = WRITTEN("force of the mechanism on its frame, along x", "N", asked_by="impacts")
+FRAME_Y = WRITTEN("likewise along y", "N", asked_by="impacts")
+FRAME_SQUARE = WRITTEN("square of its size", "N^2", asked_by="impacts")
+FLIGHTS = WRITTEN(
+    "no rate, its integral is summed up at the ends of steps: time without contact",
+    "s",
+    EACH,
+    "steps",
+)
+BEGUN = WRITTEN("likewise: how many contacts began", "", EACH, "steps")
 SLIDING_POWERS = WRITTEN("F_N |v_t|", "W", EACH, "wear")
 OBJECTIVE_RATES = WRITTEN(
     "of the objective: of each joint, or the first of the whole mechanism", "", EACH, "objective"
@@ -226,16 +239,17 @@ class Integrated(NamedTuple):
 _PLACES = range(MAX_JOINTS)
 GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
 _OTHERS = [row for row in WRITTEN.declared if row.asked_by and row.first != GAP]
-_PROFILES, MEASURES = (
+_STEPPED = {row.asked_by for row in _OTHERS} - {"profile", "steps"}
+_PROFILES, MEASURES, _SUMMED = (
     tuple(
         Integrated(row.first + k, row.asked_by)
         for row in _OTHERS
-        if (row.asked_by == "profile") == of_profiles
+        if row.asked_by in groups
         for k in range(row.size)
     )
-    for of_profiles in (True, False)
+    for groups in (("profile",), _STEPPED, ("steps",))
 )
-INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
+INTEGRATED = (*GAPS, *MEASURES, *_SUMMED, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
 The explicit and implicit steppers, the sums of a lane and its outcome read this."""
 
@@ -323,6 +337,9 @@ PEAK = OF_LANE("largest contact force", "N", EACH)
 DEEPEST = OF_LANE("largest penetration", "m", EACH)
 ENDED = OF_LANE("contacts ended in this revolution", "", EACH)
 LARGEST_RATE = OF_LANE("of the objective's", "", EACH)
+TOUCHES = OF_LANE(
+    "whether there was contact at the end of the last step; below 0 at the start", "", EACH
+)
 WORK = OF_LANE.end
 
 BANK = WORK + PARAMETERS
@@ -364,6 +381,8 @@ OUT_STIFF_STEPS = OF_OUTCOME("implicit steps tried")
 OUT_MOMENT = OF_OUTCOME("largest size of the drive's moment", "N m")
 OUT_ACCELERATION = OF_OUTCOME("standard deviation of the followed acceleration", "m/s^2")
 OUT_FOLLOWED = OF_OUTCOME("its largest size", "m/s^2")
+OUT_PERIOD = OF_OUTCOME("mean length of an averaged revolution", "s")
+OUT_CYCLE = OF_OUTCOME("angle of the drive in a revolution", "rad")
 OUT_PEAK = OF_OUTCOME("largest contact force", "N", EACH)
 OUT_LATCHED = OF_OUTCOME("whole revolutions in contact", "", EACH)
 OUT_DEEPEST = OF_OUTCOME("largest penetration", "m", EACH)
@@ -399,6 +418,8 @@ class Joint(NamedTuple):
     low_kink: int
     high_kink: int
     sliding_power: int
+    impact_power: int
+    force_square: int
     objective_rate: int
     sliding_speed: int
     normal_x: int
@@ -411,7 +432,7 @@ JOINTS = tuple(
     Joint(
         k, JOINT_BLOCKS + JOINT_ROWS * k, FURTHER + FURTHER_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
         FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
-        OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
+        IMPACT_POWERS + k, FORCE_SQUARES + k, OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
         ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
@@ -457,6 +478,7 @@ class Rules(NamedTuple):
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
+    impacts: Any  # contacts are counted
     profile: Any  # where around joints sliding work is done is recorded
     largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
@@ -468,7 +490,7 @@ def rules_of(effects: Effects) -> Rules:
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
-    flags = (e.latched, e.torque, turning, e.responses, e.profile, largest)
+    flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
     places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
     return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
 

@@ -151,7 +151,9 @@ def coordinate_count(scene: Scene) -> int:
     return scene.bristles + len(planar.linkage_of(scene).forest.coordinates)
 
 
-def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = None) -> at.Effects:
+def effects_of(
+    scene: Scene, *, series: bool = False, energies: bool | None = None, impacts: bool | None = None
+) -> at.Effects:
     """Which branches of the kernel are compiled for this scene."""
     e = scene.effects
     count = len(scene.contact_labels())
@@ -170,7 +172,8 @@ def effects_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),
-        responses=_flag(scene.responses_asked()),
+        responses=_flag(scene.responses_asked() or bool(impacts)),
+        impacts=_flag(bool(count) and (scene.impacts_asked() if impacts is None else impacts)),
         wear=_flag(bool(scene.worn_joints())),
         waves=_flag(any(waves.values())),
         bearing_waves=waves["bearing"] or None,

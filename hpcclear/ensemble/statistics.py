@@ -97,6 +97,12 @@ def run_statistics(
             "statistics are streamed for Monte Carlo samples only",
             'Set method = "monte-carlo" in [study]',
         )
+    tables = [one.name for one in scene.study.variables if one.rows]
+    if tables:
+        raise InputError(
+            f"study.variables.{tables[0]}", None, "statistics are not streamed over the rows of a table",
+            "Use `sample` without --statistics, or leave the variable out",
+        )  # fmt: skip
     place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     key = statistics_key(scene, len(points))

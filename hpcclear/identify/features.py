@@ -91,10 +91,14 @@ class Layout:
             *(f"scatter of harmonics {a} to {b} of {self.name}" for a, b in self.scattered),
         )
 
-    def values(self, seen: Spectrum) -> tuple[Array, Array]:
-        """Return the features (..., p) of a spectrum and their variances (..., p)."""
+    def values(self, seen: Spectrum, measured: bool = False) -> tuple[Array, Array]:
+        """Return the features (..., p) of a spectrum and their variances (..., p).
+
+        A `measured` one has the sensor's noise, and its variances are those of few revolutions.
+        """
         mean, between = seen.mean, np.nan_to_num(seen.variance)
-        own = between / seen.revolutions
+        own = (known_scatter(seen).variance if measured else between) / seen.revolutions
+        noise = float(self.noise or 0.0) if measured else 0.0
         power = np.maximum(np.abs(mean) ** 2 - own, 0.0)
         found: list[Array] = []
         spread: list[Array] = []
@@ -114,7 +118,7 @@ class Layout:
         freedom = max(seen.revolutions - 1, 1)
         for a, b in self.scattered:
             width, total = b + 1 - a, between[..., a : b + 1].sum(-1)
-            found.append(np.sqrt(np.maximum(total - width * float(self.noise or 0.0) ** 2, 0.0)))
+            found.append(np.sqrt(np.maximum(total - width * noise**2, 0.0)))
             spread.append(0.5 * total / (freedom * width))
         return np.stack(found, -1), np.stack(spread, -1)
 

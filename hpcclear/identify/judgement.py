@@ -7,7 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from hpcclear.base.arrays import Array
-from hpcclear.identify.features import Choice, Layout, known_scatter, sensed
+from hpcclear.identify.features import Choice, Layout, sensed
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.posterior import LEVELS, Calibration, Model
 from hpcclear.identify.signals import Sensor
@@ -81,7 +81,7 @@ class Verdict:
 def features_of(measured: Sequence[Measured], layouts: Sequence[Layout]) -> tuple[Array, Array]:
     """Return the features (p,) of the signals of one measurement, and their variances (p,)."""
     pairs = [
-        layout.values(known_scatter(one.spectrum))
+        layout.values(one.spectrum, measured=True)
         for one, layout in zip(measured, layouts, strict=True)
     ]
     return np.concatenate([own for own, _ in pairs]), np.concatenate([own for _, own in pairs])

@@ -77,6 +77,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         *([Line("near", near)] if near else []),
         Line("active bounds", bounds(best)),
         *scatter.lines(files, best),
+        *scatter.worst(files, best),
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
         Line("contact model", _left(files, best)),

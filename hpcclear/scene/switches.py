@@ -208,7 +208,8 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
         turns = turns_of(scene.linkage)
-        yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
+        if drive.torque is not None:
+            yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 
 class Off:

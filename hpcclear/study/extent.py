@@ -29,7 +29,9 @@ def samples_of(scene: Scene) -> dict[str, int]:
 
 def _of_stages(scene: Scene) -> dict[str, int]:
     """The same of all stages but the effect screening, whose size goes by theirs."""
-    return {part: count for stage in STAGES for part, count in stage.samples(scene).items()}
+    loads = scene.required_study.load_cases
+    cases = 1 if loads is None else len(loads.options or ())
+    return {part: cases * count for stage in STAGES for part, count in stage.samples(scene).items()}
 
 
 def responses_of(scene: Scene) -> int:

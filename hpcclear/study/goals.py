@@ -14,7 +14,6 @@ from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail
-from hpcclear.statistics.random.replicates import Estimate, student
 
 SMOOTH = 0.1
 """Standard deviations over which an exceedance is smoothed in the search on the surrogate, so that it has a slope near 0."""
@@ -37,7 +36,9 @@ class GoalValue:
 def goal_value(
     goal: Goal, values: Array, design: Mapping[str, float], confidence: float
 ) -> GoalValue:
-    """An objective or constraint from values of f, (replicates, values), NaN where failed, and the design in SI."""
+    """A goal from values of f, (replicates, values), NaN where failed, and the design in SI; or from those of all responses,
+    (k, replicates, values), of which it takes its own."""
+    values = values[goal.place] if values.ndim == 3 else values
     if goal.exact:
         value = float(goal.of_design(design))
         return GoalValue(value, value, value, np.zeros(len(values)))
@@ -48,13 +49,9 @@ def goal_value(
         found = replicates.exceedance(values, goal.limit, confidence)
     else:
         mean, deviation = replicates.moments(values)
-        return _symmetric(mean if goal.statistic == "mean" else deviation, confidence)
+        one = mean if goal.statistic == "mean" else deviation
+        return GoalValue(one.value, *replicates.limits(one, confidence), one.shifts)
     return GoalValue(found.value, found.lower, found.upper, found.shifts)
-
-
-def _symmetric(one: Estimate, confidence: float) -> GoalValue:
-    reach = one.error * student(confidence, one.freedom) if one.freedom > 0 else np.nan
-    return GoalValue(one.value, one.value - reach, one.value + reach, one.shifts)
 
 
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
@@ -71,9 +68,10 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
-    """Whether its confidence interval is as narrow as requested."""
+def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
+    """Whether its limits are as narrow as asked for, or as a part of that."""
     share, relative = wanted(goal, accuracy)
+    share *= part
     half = (one.upper - one.lower) / 2.0
     return bool(half <= share * (abs(one.value) if relative else 1.0))
 
@@ -98,14 +96,15 @@ def shortfall(goal: Goal, most: float, values: Array) -> Array:
 def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, float]) -> float:
     """What steers a search to the constraints, from values of f of a design, NaN where failed: as `excess`, but of
     probabilities the shortfall of their index, which is smooth where counts of exceedances are 0 or jump."""
-    known = values[np.isfinite(values)]
-    if kept and len(known) < replicates.FEWEST:
+    values = values if values.ndim == 3 else values[None]
+    known = [own[np.isfinite(own)] for own in (values[one.place] for one in kept)]
+    if any(len(own) < replicates.FEWEST for own in known):
         return np.nan
     found = [
-        float(shortfall(one, one.most, known[None])[0])
+        float(shortfall(one, one.most, own[None])[0])
         if one.statistic == "exceedance"
         else float(excess([one], np.array([[goal_value(one, values, design, 0.95).value]]))[0])
-        for one in kept
+        for one, own in zip(kept, known, strict=True)
     ]
     return max(found, default=-np.inf)
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
@@ -140,7 +141,7 @@ def search(
         for name, its in met.items()
         if not _stands(run, name, its, patience) and (won := _won(run, name, its[-2:]))
     ]
-    named = [choice for choice in start if choice.name]
+    named = [] if statistics else [choice for choice in start if choice.name]
     finalists = [
         one
         for name, its in met.items()
@@ -154,13 +155,15 @@ def search(
 
 
 def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
-    """Designs of a case in each round. A search by statistics has as many in all as the other one, first designs included."""
+    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included:
+    those of the swarm between its ends are left out."""
     settings = run.study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
     each = length(run.study) * REPLICATES
     cases = len(run.study.cases)
-    left = sum(simulations(run.study)) // each // cases - len(begun["case"]) // cases
+    most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
+    left = (most - len(begun["case"])) // cases
     count = max(settings.infill_designs // PARTS, 1)
     return [count] * (left // count)
 
@@ -178,7 +181,8 @@ def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
         chosen += _distinct(own)
         names = run.study.design_variables(case.name)
         region, rng = box(run.scene, names), run.rng("search", case.name)
-        middle = next(choice for choice in own if choice.name == f"{case.name} best beta")
+        end = ENDS[min(len(case.goals), 2) - 1]
+        middle = next(choice for choice in own if choice.name == f"{case.name} best {end}")
         centre = to_coordinates(run.scene, names, np.array([list(middle.design.values())]))[0]
         for k in range(len(names)):
             ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))
@@ -341,6 +345,7 @@ def _finalists(
     where = tried.coordinates[best[cut(tried.values[best], most)]]
     with contextlib.suppress(InputError):  # too few designs that did not fail for a model
         if statistics:
+            most = run.study.verification.designs
             where = improvement.finalists(*_problem(run, case, tried), most, rng)
         else:
             believed = believed_ends(

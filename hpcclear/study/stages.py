@@ -30,6 +30,7 @@ from hpcclear.study import (
     truth,
     verdicts,
     verification,
+    worst,
 )
 from hpcclear.study.certificate import Extent
 from hpcclear.study.goals import ends_in_all
@@ -106,7 +107,7 @@ def _search(run: StudyRun, models: Models) -> Found:
     fronts.write(run, found, [*ends, *between], models.searched)
     statistics = refinement.by_statistics(run.study, surrogates.checked_r2(run.study, models.kept))
     better, remarks = refinement.search(run, [*ends, *between], statistics)
-    designs = [*ends, *(better or between)]
+    designs = better if better and statistics else [*ends, *(better or between)]
     return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
 
 
@@ -115,10 +116,9 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
     remarks = list(found.remarks)
-    if run.study.paired:
-        text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
-        run.notify(text)
-        remarks += more
+    text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
+    run.notify(text)
+    remarks += more
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:
         run.notify(text)
@@ -126,12 +126,8 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
 
 
 def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Moments of designs to the accuracy that is requested, or to the usual one of the samples alone."""
-    if run.study.paired:
-        true = tolerance.verified(run, designs)
-    else:
-        true = truth.simulate(run, designs, "verification")
-    return rare.decided(run, designs, true, "verification")
+    """Moments of designs, with what the tolerance does to them and with rare failures."""
+    return rare.decided(run, designs, tolerance.verified(run, designs), "verification")
 
 
 def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
@@ -140,6 +136,11 @@ def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result 
     verification.write(
         run, table, true, models.searched, verified.remarks, printed, over_life or {}
     )
+
+
+def _worst(run: StudyRun, verified: Verified) -> None:
+    choices = verified.table.choices
+    worst.write(run, choices, run.stage("worst", worst.of_designs, choices))
 
 
 def _chaos(run: StudyRun, verified: Verified) -> None:
@@ -234,7 +235,7 @@ STAGES = (
             "optimisation": "search on the surrogate",
             "check": "simulation of its designs",
             "infill": "adaptive refinement of the Pareto front",
-            "edge": "search along constraints on rare failures",
+            "edge": "search along constraints",
         },
         files=("front.nc",), samples=_of_search,
     ),
@@ -252,6 +253,11 @@ STAGES = (
     Stage(
         "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
         needs=("verification",), files=("contributions.nc",),
+    ),
+    Stage(
+        "worst", _worst, needs=("verification",), applies=lambda scene: scene.required_study.worst_case,
+        words={"worst": "worst case of the best designs"}, files=("worst.nc",),
+        samples=lambda scene: {"worst": worst.simulations(scene) if scene.required_study.worst_case else 0},
     ),
     Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
     Stage(

@@ -172,9 +172,10 @@ def settled(
     goal: Constraint, values: Array, choice: Choice, settings: Verification, many: int
 ) -> bool:
     """Whether a constraint of a design is decided, as one of `many`."""
-    sure = level(settings, many, values.size)
+    count = values[0].size if values.ndim == 3 else values.size
+    sure = level(settings, many, count)
     one = goals.goal_value(goal, values, choice.design, sure)
-    return of_interval(goal, one, values.size, sure).standing is not Standing.UNDECIDED
+    return of_interval(goal, one, count, sure).standing is not Standing.UNDECIDED
 
 
 def words(case: Case, unit: str, values: Sequence[Array], standings: Array, prices: Array) -> str:

@@ -216,7 +216,7 @@ def write(
     run : StudyRun
     table : Table
     true : dict of arrays, shape (n, ...)
-        Of `hpcclear.study.truth.simulate`, over the same designs.
+        Of `hpcclear.study.tolerance.verified`, over the same designs.
     model : Piecewise
         The surrogate that was searched.
     remarks : sequence of str
@@ -235,7 +235,8 @@ def write(
     data["case"] = np.array([choice.case for choice in choices])
     for column, name in enumerate(("mean", "deviation")):
         data[f"{name}_true"] = true[name]
-        data[f"{name}_lower"] = true[name] - true[f"{name}_reach"]
+        least = 0.0 if name == "deviation" else -np.inf
+        data[f"{name}_lower"] = np.maximum(true[name] - true[f"{name}_reach"], least)
         data[f"{name}_upper"] = true[name] + true[f"{name}_reach"]
         data[f"{name}_surrogate"] = surrogate[:, column]
         data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
@@ -245,7 +246,7 @@ def write(
             data[f"life_{name}_lower"], data[f"life_{name}_upper"] = value - reach, value + reach
         if study.paired:
             data[f"{name}_within"] = true[f"{name}_reach"] / abs(true[name])
-            data[f"{name}_tolerance"] = true["tolerance"][:, column]
+        data[f"{name}_tolerance"] = true["tolerance"][:, column]
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     for name in ("percentile", "percentile_lower", "percentile_upper"):
@@ -266,7 +267,7 @@ def write(
     )
     if "first_goal" in content:
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
-        asked = f"{', '.join(others)} and {last}"
+        asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
             words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)

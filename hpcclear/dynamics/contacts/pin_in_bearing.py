@@ -91,7 +91,7 @@ def shape(get: Get) -> Shape:
 
 
 def reach(parameters: Any, place: int) -> Array:
-    """The clearance."""
+    """The clearance, m, shape (...): of samples."""
     found: Array = parameters.clearance[..., place]
     return found
 

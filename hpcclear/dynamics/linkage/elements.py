@@ -26,6 +26,44 @@ def spring_force(stiffness, damping, length, ex, ey, vx, vy):
 
 
 @lane_function
+def one_sided(side, stiffness, damping, length, ex, ey, vx, vy):
+    """The same of a spring that acts on one side of its length: beyond it (`side` 1) or within it (-1); it never pulls back."""
+    square = ex * ex + ey * ey + _TINY
+    inverse = 1.0 / np.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    rate = vx * nx + vy * ny
+    beyond = side * (square * inverse - length)
+    size = stiffness * beyond + damping * side * rate
+    size = 0.5 * (size + abs(size))
+    tension = side * size * (0.5 + 0.5 * np.sign(beyond))
+    return -tension * nx, -tension * ny, -tension * rate
+
+
+@lane_function
+def along(ex, ey, vx, vy):
+    """Direction, length and rate of the length of an offset."""
+    square = ex * ex + ey * ey + _TINY
+    inverse = 1.0 / np.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    return nx, ny, square * inverse, vx * nx + vy * ny
+
+
+@lane_function
+def hinge(at, start, bend):
+    """A line of slope `bend` beyond `start`, 0 before."""
+    beyond = at - start
+    return bend * (0.5 * (beyond + abs(beyond)))
+
+
+@lane_function
+def drag(linear, quadratic, spin):
+    """Torque against the turning at a speed, N m."""
+    return -(linear + quadratic * abs(spin)) * spin
+
+
+@lane_function
 def sign_of(value):
     """1 for what is not negative, -1 for the rest."""
     return 1.0 if value >= 0.0 else -1.0

@@ -70,6 +70,7 @@ class Linkage:
                     self._text(
                         self._on._replace(energies=energies, series=series, responses=responses)
                     )
+        self._text(_with_impacts(self._on))
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -150,6 +151,7 @@ class Linkage:
         on = self._on._replace(
             energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses)
         )  # fmt: skip
+        on = _with_impacts(on) if effects.impacts else on
         return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
 
     def fill(
@@ -215,6 +217,11 @@ class Linkage:
         if drive is None:
             return main.advance if frame == self.forest.frames[main.body] else 0.0
         return drive.advance * round(main.seconds / drive.seconds)
+
+
+def _with_impacts(on: On) -> On:
+    """What a text that measures impacts has: all that is measured, so that there is one of them."""
+    return on._replace(energies=True, series=True, responses=True, impacts=True)
 
 
 def _curves_of(part: object) -> list[str]:

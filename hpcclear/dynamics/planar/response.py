@@ -11,6 +11,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, as_complex, split
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
@@ -58,6 +59,8 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         "contact_force": seen.rates.force[:, joints],
         "friction_force": seen.rates.friction[:, joints],
     }
+    frame = {"frame_force_x": seen.rates.frame_x, "frame_force_y": seen.rates.frame_y}
+    frame = frame if joints and not scene.modes else {}
     held = {}
     if linkage.cartesian:
         held["constraint_violation"] = violation(linkage, seen.q.T, seen.v.T, seen.turn_time)
@@ -65,8 +68,10 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         **moved(scene, mechanism, places, phase, acceleration),
         **{name: at_places(scene, columns) for name, columns in of_joints.items()},
         "crank_moment": seen.rates.drive_moment,
+        **frame,
         **balance_series(stored, seen.works),
         **mode_series(scene.modes, seen.q, seen.v, strain),
+        **guide_series(mechanism, pose),
         **held,
     }
 
@@ -151,6 +156,31 @@ def mode_series(modes: int, q: Array, v: Array, strain: Array) -> dict[str, Arra
         "mode_velocity": v[:, :modes],
         "strain_energy": strain,
     }
+
+
+def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
+    """Series (t, guides) of the guides with clearance: how far the slider is to the left of the line, and its tilt."""
+    guides = [joint for joint in mechanism.clearances if isinstance(joint, LooseSlide)]
+    if not guides:
+        return {}
+    found = []
+    for joint in guides:
+        (middle, angle), (line, turned) = (_place(mechanism, pose, one) for one in joint.places)
+        along = np.exp(1j * (turned + joint.angle))
+        tilt = np.angle(np.exp(1j * angle) / along)
+        found.append((((middle - line) * along.conjugate()).imag, tilt))
+    offsets, tilts = (np.array(part).T for part in zip(*found, strict=True))
+    return {"guide_offset": offsets, "guide_tilt": tilts}
+
+
+def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Any]:
+    """Where a place is (t,), x + iy, and the angle of its body."""
+    name = split(place)[0]
+    if name == GROUND:
+        return as_complex(mechanism.at(place)), 0.0
+    k = [body.name for body in mechanism.bodies].index(name)
+    arm = as_complex(mechanism.at(place)) - as_complex(mechanism.bodies[k].center)
+    return pose.x[k] + 1j * pose.y[k] + arm * np.exp(1j * pose.angle[k]), pose.angle[k]
 
 
 def contacts_on(scene: Scene, contacts: Array) -> Array:

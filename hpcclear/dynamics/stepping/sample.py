@@ -8,6 +8,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import (
     AVERAGED,
     CHOSEN,
+    CYCLE,
     FINISHED,
     IMPLICIT,
     MAX_STEPS,
@@ -137,6 +138,9 @@ def finish_averages(lane, W, work, book, out, slot, settings):
             gap = settings[CHOSEN + k] * out[slot, at.OUT_MEAN + k]
             total += gap * gap
         out[slot, at.OUT_OBJECTIVE] = math.sqrt(total)
+        out[slot, at.OUT_PERIOD] = time / book[at.COUNT_F * W + lane]
+        cycle = abs(settings[CYCLE])
+        out[slot, at.OUT_CYCLE] = cycle if cycle > 0.0 else at.TURN
         out[slot, at.OUT_MOMENT] = work[at.PEAK_MOMENT * W + lane]
         mean = out[slot, at.OUT_MEAN + ACCELERATION]
         square = out[slot, at.OUT_MEAN + SQUARE]

@@ -11,6 +11,8 @@ from hpcclear.report.figures import (
     accuracy,
     designs,
     effects,
+    guides,
+    identified,
     maps,
     motion,
     portraits,
@@ -36,6 +38,8 @@ class Entry(NamedTuple):
     """Of the file."""
     draw: "Callable[[xr.Dataset], Figure]"
     caption: str
+    along: str = "time"
+    """A dimension that the file must have; any file of a response has instants."""
 
 
 def section_figure(found: xr.Dataset) -> "Figure":
@@ -117,6 +121,24 @@ RESULTS: tuple[Entry, ...] = (
         wear.profile_figure,
         "Depth of wear around bearings and journals, at several ages (medians over all runs).",
     ),
+    Entry(
+        "posterior",
+        "identify",
+        identified.posterior_figure,
+        "Posterior of each unknown with its calibrated 95 % interval.",
+    ),
+    Entry(
+        "features",
+        "identify",
+        identified.features_figure,
+        "Measured less predicted features of the last record, in standard deviations of the prediction.",
+    ),
+    Entry(
+        "growth",
+        "identify",
+        identified.growth_figure,
+        "Unknowns over the dates of the records, with 95 % intervals and the median rate.",
+    ),
     Entry("timing", "timing", timing.timing_figure, "Time of the ranks, by rank and by stage."),
 )
 """Of files other than responses."""
@@ -132,6 +154,7 @@ RESPONSE: tuple[Entry, ...] = (
         "contact force by its direction",
     ),
     Entry("penetration", "response", response.penetration_figure, "penetration"),
+    Entry("guide", "response", guides.guide_figure, "offset, tilt and contacts in guides", "guide"),
     Entry("phase", "response", portraits.phase_figure, "phase portraits"),
     Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
     Entry("spectrum", "response", response.spectrum_figure, "spectra"),
@@ -166,5 +189,7 @@ def drawings(
     if responses:
         one = responses.get("original", next(iter(responses.values())))
         made["response"] = partial(response.response_figure, one)
-        made |= {entry.name: partial(entry.draw, one) for entry in RESPONSE}
+        made |= {
+            entry.name: partial(entry.draw, one) for entry in RESPONSE if entry.along in one.dims
+        }
     return made

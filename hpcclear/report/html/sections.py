@@ -5,7 +5,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.report import failures, spread
+from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
@@ -145,6 +145,16 @@ def claims(content: Content) -> list[object] | None:
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
     header = ["claim", "verdict", "the numbers that decide"]
     return [held, Table(header, rows, "Claims of the paper, tested on this data")]
+
+
+def identified_machine(content: Content) -> list[object] | None:
+    """Unknowns of a machine with their intervals, growth, what to measure, and warnings."""
+    found = content.get("identify")
+    if found is None:
+        return None
+    rows: list[list[object]] = [[line.label, line.text] for line in identified.lines(found)]
+    table = Table(["quantity", "result"], rows, "Unknowns of the machine")
+    return [table, *(f"Warning: {text}." for text in identified.warnings(found))]
 
 
 def statistics(content: Content) -> list[object] | None:
