@@ -14,6 +14,7 @@ import numpy as np
 from dense_mechanism import Touch, touching
 
 from hpcclear.dynamics.linkage import parts as m
+from hpcclear.dynamics.linkage.loads import Cylinder, Drag, TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 
 
@@ -203,7 +204,25 @@ class Dense:
         for load in self.mechanism.loads:
             own = np.zeros(self.n)
             if isinstance(load, m.Force):
-                own = self.motion_of(q, v, load.place)[2].T @ np.array(load.force)
+                force = np.array(load.force)
+                if load.follows:
+                    force = np.array(turned(force, self.angle(q, load.place)))
+                own = self.motion_of(q, v, load.place)[2].T @ force
+            elif isinstance(load, TorsionSpring):
+                signs = np.zeros(self.n)
+                signs[self.first[load.body] + 2] = 1.0
+                if load.other is not None:
+                    signs[self.first[load.other] + 2] = -1.0
+                angle, rate = signs @ q, signs @ v
+                moment = load.stiffness * (load.angle - angle) - load.damping * rate
+                if load.upper is not None and angle > load.upper:
+                    moment += load.stop_stiffness * (load.upper - angle)
+                if load.lower is not None and angle < load.lower:
+                    moment += load.stop_stiffness * (load.lower - angle)
+                own = signs * moment
+            elif isinstance(load, Drag):
+                k = self.first[load.body] + 2
+                own[k] = -load.linear * v[k] - load.quadratic * v[k] * abs(v[k])
             elif isinstance(load, m.Torque):
                 own[self.first[load.body] + 2] = load.torque
             else:
@@ -212,7 +231,16 @@ class Dense:
                 )
                 length = np.linalg.norm(a - b)
                 n = (a - b) / length
-                pull = load.stiffness * (length - load.length) + load.damping * (va - vb) @ n
+                rate = (va - vb) @ n
+                if isinstance(load, Cylinder):
+                    rows = load.force if isinstance(load.force, tuple) else ((0.0, load.force),)
+                    pull = load.damping * rate - np.interp(length, *np.transpose(rows))
+                else:
+                    pull = load.stiffness * (length - load.length) + load.damping * rate
+                    if load.side and (
+                        load.side * (length - load.length) <= 0 or load.side * pull <= 0
+                    ):
+                        pull = 0.0
                 own = (Jb - Ja).T @ (n * pull)
             if getattr(load, "table", False):
                 own = own * self.curve
@@ -237,7 +265,12 @@ class Dense:
         Q[1::3] -= self.masses()[1::3] * self.gravity
         for drive in self.mechanism.drives:
             if not drive.prescribed:
-                Q[self.first[drive.body] + 2] += drive.torque * (self.curve if drive.table else 1.0)
+                k = self.first[drive.body] + 2
+                torque = drive.torque * (self.curve if drive.table else 1.0)
+                if drive.by_speed is not None:
+                    torque = np.interp(v[k], *np.transpose(drive.by_speed))
+                self.seen.setdefault("torques", {})[drive.name] = torque
+                Q[k] += torque
         for joint, laws in zip(self.mechanism.clearances, self.contacts, strict=True):
             Q += self.contact(joint, laws, q, v)
         J = self.jacobian(q, t)

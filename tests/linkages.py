@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from hpcclear.dynamics.linkage.loads import Cylinder, Drag, TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Body,
@@ -255,6 +256,19 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
 
 
 RUB = GuideFriction(0.15, 0.1)
+BLOWER = replace(ENGINE, by_speed=((0.0, 3.0), (12.0, 5.0), (25.0, 1.0), (40.0, -0.5)))
+HELD = (
+    TorsionSpring("coil", "rocker", None, 4.0, 0.3, 0.2, 1.0, 1.4, 30.0),
+    TorsionSpring("between", "rocker", "coupler", 1.5, -0.2, 0.1),
+    Spring("buffer", "coupler.tip", "ground.o", 400.0, 0.09, 3.0, -1),
+    Spring("rope", "coupler.tip", "ground.p", 250.0, 0.05, 1.0, 1),
+)
+MOVED = (
+    Cylinder("ram", "coupler.tip", "ground.p", ((0.03, 20.0), (0.08, 5.0), (0.12, -9.0)), 2.0),
+    Cylinder("jack", "coupler.tip", "ground.o", 12.0),
+    Drag("fan", "rocker", 0.02, 0.003),
+    Force("jet", "coupler.tip", (3.0, -8.0), follows=True),
+)
 PUSH = (Force("push", "slider.top", (-30.0, 7.0)), Torque("twist", "rod", 0.3))
 
 LINKAGES = {
@@ -265,6 +279,8 @@ LINKAGES = {
     "slider-crank, ideal": slider_crank(friction=RUB),
     "slider-crank, ideal, torque": slider_crank(drive=ENGINE, friction=RUB, off=0.002, loads=PUSH),
     "four-bar, none": four_bar(loads=(Force("tip", "coupler.tip", (4.0, -9.0)),)),
+    "four-bar, springs": four_bar("o3", loads=HELD),
+    "four-bar, cylinders": four_bar("o2", "o3", drive=BLOWER, loads=MOVED),
     "four-bar, one": four_bar("o3", off=0.006),
     "four-bar, two": four_bar("o2", "o3", drive=ENGINE),
     "four-bar, four": four_bar("o1", "o2", "o3", "o4"),

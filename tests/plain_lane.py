@@ -20,7 +20,7 @@ from hpcclear.dynamics.physics import angles, friction
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
 GRAVITY, ALPHA, BETA = 9.81, 250.0, 240.0
-EVERYTHING = On(friction=True, gravity=True, energies=True, series=True)
+EVERYTHING = On(friction=True, gravity=True, energies=True, series=True, impacts=True)
 CONTACT = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
 FREE = 500  # rows of what the joints write
 BLOCKS = 700  # of their parameters
@@ -62,7 +62,7 @@ def joints_of(mechanism):
     """Rows of the joints in `work` and `par`."""
     return tuple(
         at.Joint(k, BLOCKS + at.JOINT_ROWS * k, 0,
-                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 14))),
+                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 16))),
                  FREE + 20 * k + 8, FREE + 20 * k + 9)
         for k, _ in enumerate(mechanism.contacts)
     )  # fmt: skip
@@ -82,11 +82,18 @@ class Lane:
             "corner_force": plain(guide.corner_force),
             "sincos": plain(angles.sincos),
             "saturated": plain(friction.saturated),
-            "spring_force": plain(elements.spring_force),
-            "held_inverse": plain(elements.held_inverse),
-            "harmonic": plain(elements.harmonic),
-            "sign_of": plain(elements.sign_of),
         }
+        for name in (
+            "spring_force",
+            "one_sided",
+            "along",
+            "hinge",
+            "drag",
+            "held_inverse",
+            "harmonic",
+            "sign_of",
+        ):
+            names[name] = plain(getattr(elements, name))
         exec(self.text.source, names)
         self.run = names["lane"]
         base = values(

@@ -37,7 +37,9 @@ def check_rates(dense, work, v):
         loss += seen[joint.name]["loss"]
     power = 0.0
     for drive in dense.mechanism.drives:
-        moment = seen["multipliers"].get((drive.name, "drive"), getattr(drive, "torque", 0.0))
+        moment = seen["multipliers"].get(
+            (drive.name, "drive"), seen.get("torques", {}).get(drive.name)
+        )
         power += moment * v[dense.first[drive.body] + 2]
         if drive is dense.mechanism.period:
             np.testing.assert_allclose(work[first + at.DRIVE_MOMENT], moment, rtol=1e-8, atol=1e-8)
@@ -49,6 +51,14 @@ def check_rates(dense, work, v):
         (at.LOAD_POWER, seen["load_power"]),
     ):
         assert work[first + row] == pytest.approx(expected, rel=1e-9, abs=1e-9 * scale)
+
+
+def check_frame(dense, work, a):
+    """Force on the frame against inertia and weight of all bodies."""
+    masses = dense.masses()[::3]
+    found = [work[at.RATE_NOW + 1000 + row] for row in (at.FRAME_X, at.FRAME_Y)]
+    expected = -masses @ a[::3], -masses @ (a[1::3] + GRAVITY)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(
@@ -75,6 +85,7 @@ def test_accelerations_and_rates_equal_the_dense_model(name, cartesian, hoist):
         a, work = lane(states[0], states[1], t)
         np.testing.assert_allclose(a, states[2], rtol=1e-10, atol=1e-10 * np.abs(expected).max())
         check_rates(dense, work, v)
+        check_frame(dense, work, expected)
         touched += any(dense.seen[joint.name]["normal"] > 0 for joint in mechanism.contacts)
     assert touched or len(mechanism.clearances) < 2
 

@@ -13,12 +13,13 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import FIELDS, OUTCOME, RESPONSES
+from hpcclear.base.outcome import FIELDS, IMPACTS, OUTCOME, RESPONSES
 
 Function = Callable[..., Any]
 
 RECORDED = {"objective": "m"} | {
-    name: FIELDS[name].unit for name in ("mean_gap", "peak_contact_force", *RESPONSES)
+    name: FIELDS[name].unit.removeprefix("1")
+    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS)
 }
 """Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
@@ -122,6 +123,11 @@ class Objective:
         """Whether samples have to record more than gaps and peak forces for it."""
         return not self.asks.isdisjoint(RESPONSES)
 
+    @property
+    def needs_impacts(self) -> bool:
+        """Whether samples have to record measures of impact and noise for it."""
+        return not self.asks.isdisjoint(IMPACTS)
+
     def made_of(self, mean: Array, peak: Array, period: Array) -> Array:
         """What is made of the rate, (m, joints): of its mean in time, of its square where that is what is made, its peak
         and the length of a revolution, (m, 1)."""
@@ -196,6 +202,30 @@ OURS = {
     "peak-point-acceleration": Objective(
         "largest acceleration of the followed point", "m/s^2",
         lambda peak_point_acceleration: peak_point_acceleration,
+    ),
+    "impacts": Objective(
+        "number of impacts in a revolution, of the joint where it is larger", "",
+        lambda impacts: impacts.max(),
+    ),
+    "impact-energy": Objective(
+        "energy lost in impacts in a revolution, of all joints", "J",
+        lambda impact_energy: impact_energy.sum(),
+    ),
+    "contact-impulse": Objective(
+        "impulse of the contact force in a revolution, of the joint where it is larger", "N s",
+        lambda contact_impulse: contact_impulse.max(),
+    ),
+    "contact-loss": Objective(
+        "angle of the drive without contact in a revolution, of the joint where it is larger", "rad",
+        lambda contact_loss: contact_loss.max(),
+    ),
+    "rms-contact-force": Objective(
+        "root mean square of the contact force, of the joint where it is larger", "N",
+        lambda rms_contact_force: rms_contact_force.max(),
+    ),
+    "rms-frame-force": Objective(
+        "root mean square about its mean of the force on the frame", "N",
+        lambda rms_frame_force: rms_frame_force,
     ),
 }  # fmt: skip
 OURS = {name: replace(one, name=name) for name, one in OURS.items()}

@@ -148,8 +148,8 @@ class Field(NamedTuple):
     per: str = ""
     """"joint" or "wave": what there is one for each of; "" for one a sample."""
     when: str = ""
-    """What a scene has to require, so that it is no NaN and stands in datasets: "response" (an objective of it), "request"
-    (other effects), "steady" (a target error), "map"; "" of what always does."""
+    """What a scene has to require, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
+    "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
     required: bool = False
     """Whether every file with the outcome of a simulation has it."""
 
@@ -168,6 +168,13 @@ FIELDS = {
     "point_acceleration_deviation": Field(
         "m/s^2", "root mean square of the acceleration of the followed point about its mean", when="response"),
     "peak_point_acceleration": Field("m/s^2", "largest acceleration of the followed point", when="response"),
+    "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact"),
+    "impact_energy": Field(
+        "J", "energy lost by damping of the contact in a revolution", per="joint", when="impact"),
+    "contact_impulse": Field("N s", "impulse of the normal force in a revolution", per="joint", when="impact"),
+    "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact"),
+    "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact"),
+    "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact"),
     "rate_of_objective": Field("rate", "what is made of the objective's own rate", per="joint", when="request"),
     "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
     "sliding_waves": Field(
@@ -197,7 +204,10 @@ def _fields(*when: str) -> tuple[str, ...]:
 RESPONSES = _fields("response")
 """Fields that a study of one of them records."""
 
-ON_REQUEST = _fields("response", "request")
+IMPACTS = _fields("impact")
+"""Fields that measure impact and noise."""
+
+ON_REQUEST = _fields("response", "impact", "request")
 """Fields that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY, MAPPED = _fields("steady"), _fields("map")

@@ -10,8 +10,9 @@ from rich.table import Table
 from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import console, fitting, objective_of, quantity, remark, table
 from hpcclear.dynamics.steady.wording import in_a_line
-from hpcclear.report import bearings
+from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels, motion
+from hpcclear.scene.citation import TITLE
 
 
 def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
@@ -23,7 +24,10 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     status = Status(int(response["status"]))
     loads = bearings.bearings(response)
     if status.valid and loads:
-        out.print(_bearing_table(loads))
+        impacts = noise.joints(response)
+        if impacts:
+            out.print(_impact_table(impacts))
+        out.print(_bearing_table(loads, gaps=response.attrs.get("references") == TITLE))
     out.print(table("Response", [*_status_rows(response), *_rows(response, seconds)]))
     for label, text in bearings.remarks(response):
         out.print(remark(label, text))
@@ -38,15 +42,25 @@ def _status_rows(response: xr.Dataset) -> list[tuple[str, str]]:
     return rows if status is Status.OK else [*rows, ("remedy", status.remedy)]
 
 
-def _bearing_table(found: list[bearings.Bearing]) -> Table:
-    """Peak and mean force, angle of the peak, contact and mean gap of each joint."""
+def _impact_table(rows: list[list[str]]) -> Table:
+    """What a revolution has of impacts, a row for each joint."""
+    made = Table(title=noise.TITLE, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for header in noise.HEADER:
+        made.add_column(header, justify="left" if header == "joint" else "right", overflow="fold")
+    for row in rows:
+        made.add_row(*map(fitting, row))
+    return made
+
+
+def _bearing_table(found: list[bearings.Bearing], *, gaps: bool) -> Table:
+    """Peak and mean force, angle of the peak and contact of each joint, and of the paper's mechanism the mean gap."""
     made = Table(
         title="Bearings, over the averaged revolutions", title_justify="left", box=box.SIMPLE_HEAD,
         pad_edge=False,
     )  # fmt: skip
     pressed = bearings.pressures(found)[-1:]  # one: eighty columns hold no more
     made.add_column("joint", overflow="fold")
-    for header in ("peak force", "at crank angle", "mean force", "contact", "mean gap"):
+    for header in ("peak force", "at crank angle", "mean force", "contact", *["mean gap"] * gaps):
         made.add_column(header, justify="right")
     for header, _ in pressed:
         made.add_column(header, justify="right")
@@ -57,7 +71,7 @@ def _bearing_table(found: list[bearings.Bearing]) -> Table:
             bearings.degrees(one),
             quantity(one.mean, "N"),
             bearings.share(one.contact),
-            quantity(one.gap, "m"),
+            *[quantity(one.gap, "m")] * gaps,
             *(shown(one) for _, shown in pressed),
         ]
         made.add_row(*map(fitting, row))
@@ -71,6 +85,7 @@ def _rows(response: xr.Dataset, seconds: float | None) -> list[tuple[str, str]]:
     if status.valid:
         drive = bearings.torque(response)
         shown = f"largest {quantity(drive.peak, 'N m')}, mean {quantity(drive.mean, 'N m')}"
+        rows += [(name, fitting(text)) for name, text in noise.frame(response)]
         rows += [("torque of the drive", shown), *_crank(response)]
         rows += [("peak between instants", text) for text in _between_instants(response)]
         if bearings.bearings(response):

@@ -10,12 +10,12 @@ from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
-from hpcclear.base.outcome import OUTCOME, RESPONSES, Flag, Status, unknown
-from hpcclear.dynamics import energy
+from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lanes import Lanes, PrescribedSamples
+from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.prescribed_samples import PrescribedSamples
+from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -31,7 +31,7 @@ CACHE_OF_A_VECTOR = 12 * 1024
 parameters do not fit."""
 
 LEAST_LANES = 16
-"""Shorter loops the compiler does not vectorise where it must ask at run time whether arrays overlap."""
+"""Shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap."""
 
 
 def default_lanes() -> int:
@@ -88,9 +88,9 @@ TIGHTEST = 1e-14
 """Tolerance of a copy at least: beyond it all is rounding."""
 
 COVERAGE = 1.7
-"""Stated uncertainty over how far the farthest copy is; `analysis/uncertainty.py` tells how often it holds and how wide it is.
-Copies no stricter than the sample would add errors of their own where its motion is nearly regular: limits that hold as often
-were up to 12 times the error there."""
+"""Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
+holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: equally reliable
+intervals were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
@@ -203,11 +203,19 @@ def responses_reported(problem: Problem) -> tuple[str, ...]:
     """Which of `RESPONSES` samples record: those requested, of a slider or a point only where one is followed."""
     if not problem.effects.responses:
         return ()
-    linkage = problem.linkage
+    linkage, impacts = problem.linkage, impacts_reported(problem)
     if linkage.follow and not linkage.follows_a_point:
-        return tuple(name for name in RESPONSES if "point" not in name)
+        return (*impacts, *(name for name in RESPONSES if "point" not in name))
     followed = "point" if linkage.follows_a_point else "nothing"
-    return tuple(name for name in RESPONSES if followed in name or "acceleration" not in name)
+    names = (name for name in RESPONSES if followed in name or "acceleration" not in name)
+    return (*impacts, *names)
+
+
+def impacts_reported(problem: Problem) -> tuple[str, ...]:
+    """Which of `IMPACTS` samples report: the force on the frame is that of rigid bodies only."""
+    rigid = modes_of(problem.linkage.mechanism) == 0
+    asked = IMPACTS if problem.effects.impacts else ()
+    return tuple(name for name in asked if rigid or name != "rms_frame_force")
 
 
 _ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
@@ -268,7 +276,9 @@ def outcome_records(
     known = {
         "objective": outcome.objective, "objective_spread": outcome.spread,
         "mean_gap": outcome.mean_gap, "peak_contact_force": outcome.peak_force,
-    } | {name: one for name, one in _responses(outcome).items() if name in responses}  # fmt: skip
+    }  # fmt: skip
+    made = {**_responses(outcome), **measures(outcome)}
+    known |= {name: one for name, one in made.items() if name in responses}
     if worn:
         known |= {
             "sliding_work": sliding_work(outcome),
@@ -296,6 +306,23 @@ def _responses(outcome: Outcome) -> dict[str, Array]:
         "slider_acceleration_deviation": scatter, "point_acceleration_deviation": scatter,
         "peak_point_acceleration": outcome.peak_acceleration,
     }  # fmt: skip
+
+
+def measures(outcome: Outcome) -> dict[str, Array]:
+    """Measures of impact and noise (`IMPACTS`) over the averaged revolutions, shape (m, MAX_JOINTS) or (m,).
+
+    Angles without contact go by time.
+    """
+    period = outcome.period[:, None]
+    mean_square = (outcome.frame_force**2).sum(axis=1)
+    return {
+        "impacts": outcome.begun * period,
+        "impact_energy": outcome.impact_power * period,
+        "contact_impulse": outcome.mean_force * period,
+        "contact_loss": outcome.flight * outcome.cycle[:, None],
+        "rms_contact_force": np.sqrt(np.maximum(outcome.square_force, 0.0)),
+        "rms_frame_force": np.sqrt(np.maximum(outcome.square_frame_force - mean_square, 0.0)),
+    }
 
 
 def sliding_work(outcome: Outcome) -> Array:

@@ -1,6 +1,6 @@
 """Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
 
-Rows are numbered as they are declared (`hpcclear.dynamics.rows`). They are module constants, so the compiler sees every
+Rows are numbered as they are declared (`hpcclear.base.numbered`). They are module constants, so the compiler sees every
 distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
 """
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.numbered import Rows
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
-from hpcclear.dynamics.rows import Rows
 
 TURN = 6.283185307179586  # rad
 
@@ -28,6 +28,7 @@ class Effects(NamedTuple):
     energies: Any = None  # energy balance
     series: Any = None  # friction forces and crank moment, for time series
     responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
+    impacts: Any = None  # measures of impact and noise of each sample
     sliding: Any = None  # kinks of the laws, for the implicit method
     swinging: Any = None  # the drive that gives the period does not turn round
     wear: Any = None  # sliding work of the joints with clearance
@@ -43,7 +44,7 @@ class Effects(NamedTuple):
 
     @property
     def latched(self) -> Any:
-        """Whether the normal force's law requires the impact speed, which is latched."""
+        """Whether the normal force's law requires the impact speed, which is `latched`."""
         return None if self.contact is None else self.contact.latched
 
     @property
@@ -57,30 +58,17 @@ class Effects(NamedTuple):
         return None if self.friction is None else self.friction.bristled
 
 
-class Open(NamedTuple):
-    """Which places of joints hold one with clearance (1), and which none (None)."""
-
-    joint_0: Any = None
-    joint_1: Any = None
-    joint_2: Any = None
-    joint_3: Any = None
-    joint_4: Any = None
-    joint_5: Any = None
-    joint_6: Any = None
-    joint_7: Any = None
-
-
 def bristles_of(effects: Effects) -> int:
     """How many coordinates the bristles of friction take: one for each joint with clearance, before those of the mechanism.
 
     A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
     """
-    return 0 if effects.bristled is None else sum(flag is not None for flag in open_of(effects))
+    return 0 if effects.bristled is None else len(places_of(effects))
 
 
-def open_of(effects: Effects) -> Open:
-    """Those of a set of effects."""
-    return Open(*[None] * effects.first, *[1] * (effects.joints or 0))
+def places_of(effects: Effects) -> range:
+    """Places of the joints with clearance."""
+    return range(effects.first, effects.first + (effects.joints or 0))
 
 
 class Waves(NamedTuple):
@@ -100,10 +88,9 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     """Those of each place of joints, up to the last open one."""
     bearing, journal = effects.bearing_waves or 0, effects.journal_waves or 0
     stride = 2 * (bearing + journal)
-    places = [k for k, flag in enumerate(open_of(effects)) if flag is not None]
     return tuple(
         Waves(k * stride, bearing, k * stride + 2 * bearing, journal)
-        for k in range(max(places, default=-1) + 1)
+        for k in range(places_of(effects).stop)
     )
 
 
@@ -188,6 +175,18 @@ FOLLOWED_ACCELERATION = WRITTEN(
 )
 FOLLOWED_SQUARE = WRITTEN("of the followed acceleration", "m^2/s^4", asked_by="responses")
 FOLLOWED_ACROSS = WRITTEN("of a point along y", "m/s^2", asked_by="responses")
+IMPACT_POWERS = WRITTEN("lost by the damping of contacts, friction left out", "W", EACH, "impacts")
+FORCE_SQUARES = WRITTEN("of the normal force", "N^2", EACH, "impacts")
+FRAME_X = WRITTEN("force of the mechanism on its frame, along x", "N", asked_by="impacts")
+FRAME_Y = WRITTEN("likewise along y", "N", asked_by="impacts")
+FRAME_SQUARE = WRITTEN("square of its size", "N^2", asked_by="impacts")
+FLIGHTS = WRITTEN(
+    "no rate, its integral is summed up at the ends of steps: time without contact",
+    "s",
+    EACH,
+    "steps",
+)
+BEGUN = WRITTEN("likewise: how many contacts began", "", EACH, "steps")
 SLIDING_POWERS = WRITTEN("F_N |v_t|", "W", EACH, "wear")
 OBJECTIVE_RATES = WRITTEN(
     "of the objective: of each joint, or the first of the whole mechanism", "", EACH, "objective"
@@ -224,20 +223,21 @@ class Integrated(NamedTuple):
 
 
 _PLACES = range(MAX_JOINTS)
-GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
+GAPS = tuple(Integrated(GAP + k, "joints") for k in _PLACES)
 _OTHERS = [row for row in WRITTEN.declared if row.asked_by and row.first != GAP]
-_PROFILES, MEASURES = (
+_STEPPED = {row.asked_by for row in _OTHERS} - {"profile", "steps"}
+_PROFILES, MEASURES, _SUMMED = (
     tuple(
         Integrated(row.first + k, row.asked_by)
         for row in _OTHERS
-        if (row.asked_by == "profile") == of_profiles
+        if row.asked_by in groups
         for k in range(row.size)
     )
-    for of_profiles in (True, False)
+    for groups in (("profile",), _STEPPED, ("steps",))
 )
-INTEGRATED = (*GAPS, *MEASURES, *_PROFILES)
+INTEGRATED = (*GAPS, *MEASURES, *_SUMMED, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
-The explicit and implicit steppers, the books of a lane and its outcome read this."""
+The explicit and implicit steppers, the sums of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 
@@ -254,14 +254,14 @@ MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
-    there = open_of(effects)
+    there = places_of(effects)
     whole = effects.objective is not None and effects.objective.whole
     closed = {
         row.first + k
         for row in _OTHERS
         if row.size == MAX_JOINTS
-        for k, flag in enumerate(Open(1) if whole and row.first == OBJECTIVE_RATES else there)
-        if flag is None
+        for k in _PLACES
+        if k not in (range(1) if whole and row.first == OBJECTIVE_RATES else there)
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
     return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
@@ -323,6 +323,9 @@ PEAK = OF_LANE("largest contact force", "N", EACH)
 DEEPEST = OF_LANE("largest penetration", "m", EACH)
 ENDED = OF_LANE("contacts ended in this revolution", "", EACH)
 LARGEST_RATE = OF_LANE("of the objective's", "", EACH)
+TOUCHES = OF_LANE(
+    "whether there was contact at the end of the last step; below 0 at the start", "", EACH
+)
 WORK = OF_LANE.end
 
 BANK = WORK + PARAMETERS
@@ -364,6 +367,8 @@ OUT_STIFF_STEPS = OF_OUTCOME("implicit steps tried")
 OUT_MOMENT = OF_OUTCOME("largest size of the drive's moment", "N m")
 OUT_ACCELERATION = OF_OUTCOME("standard deviation of the followed acceleration", "m/s^2")
 OUT_FOLLOWED = OF_OUTCOME("its largest size", "m/s^2")
+OUT_PERIOD = OF_OUTCOME("mean length of an averaged revolution", "s")
+OUT_CYCLE = OF_OUTCOME("angle of the drive in a revolution", "rad")
 OUT_PEAK = OF_OUTCOME("largest contact force", "N", EACH)
 OUT_LATCHED = OF_OUTCOME("whole revolutions in contact", "", EACH)
 OUT_DEEPEST = OF_OUTCOME("largest penetration", "m", EACH)
@@ -399,6 +404,8 @@ class Joint(NamedTuple):
     low_kink: int
     high_kink: int
     sliding_power: int
+    impact_power: int
+    force_square: int
     objective_rate: int
     sliding_speed: int
     normal_x: int
@@ -411,7 +418,7 @@ JOINTS = tuple(
     Joint(
         k, JOINT_BLOCKS + JOINT_ROWS * k, FURTHER + FURTHER_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
         FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
-        OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
+        IMPACT_POWERS + k, FORCE_SQUARES + k, OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
         ACTIVE + k, INVERSE_IMPACT + k,
     )
     for k in _PLACES
@@ -419,7 +426,7 @@ JOINTS = tuple(
 
 
 class Block(NamedTuple):
-    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books.
+    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, sums.
 
     `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
 
@@ -451,12 +458,13 @@ class Method(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What a stepper has to know of the effects, as numbers 0 and 1: none of them has it compiled anew."""
+    """What a stepper has to know of the effects, as numbers 0 and 1: they change no compiled code."""
 
     latched: Any  # impacts are located, and their speed is kept
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
     turning: Any  # its angle is a coordinate, whoever drives it
     responses: Any
+    impacts: Any  # contacts are counted
     profile: Any  # where around joints sliding work is done is recorded
     largest: Any  # the objective is made of the largest value of its rate
     begin: Any  # places of open joints, from `begin` on
@@ -468,9 +476,9 @@ def rules_of(effects: Effects) -> Rules:
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
-    flags = (e.latched, e.torque, turning, e.responses, e.profile, largest)
-    places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
-    return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
+    flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
+    places = places_of(e)
+    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop])
 
 
 class Stepped(NamedTuple):

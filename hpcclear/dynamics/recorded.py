@@ -45,6 +45,7 @@ class Steps:
     revolution: Array
     contacts: Array  # (s, 2 MAX_JOINTS): active flags, then 1/d'_0, valid until the next step
     works: Array  # (s, 4): driving work, its absolute value, dissipated, load work, J
+    measures: Array  # (s, measures): integrals of `record.MEASURES` since the start
     q: Array  # (s, n)
     v: Array
     a: Array
@@ -58,7 +59,8 @@ class Steps:
             rows[:, rec.TURN_TIME],
             rows[:, rec.REVOLUTION],
             rows[:, rec.CONTACTS : rec.DRIVE_WORK],
-            rows[:, rec.DRIVE_WORK : rec.STATE],
+            rows[:, rec.DRIVE_WORK : rec.MEASURED],
+            rows[:, rec.MEASURED : rec.STATE],
             rows[:, s : s + n],
             rows[:, s + n : s + 2 * n],
             rows[:, s + 2 * n :],
@@ -91,7 +93,7 @@ class Recording:
         if copy:
             self._start = perturbed(self._start, scales(scene), range(copy, copy + 1))
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
-        observed = effects_of(scene, series=True, energies=True)
+        observed = effects_of(scene, series=True, energies=True, impacts=True)
         self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed)
         self._evaluator = Evaluator(
             scene, ITSELF, perturbations=perturbations, objective=objective, recorder=self._lanes

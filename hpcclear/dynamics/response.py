@@ -1,5 +1,7 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -7,19 +9,20 @@ from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.base.outcome import STEADY
+from hpcclear.base.outcome import STEADY, Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import alone, outcome_records, responses_reported
+from hpcclear.dynamics.impacts import Turns, measured, spectral
 from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.lanes import PrescribedSamples
 from hpcclear.dynamics.parameters import Numbers, parameters
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
@@ -133,6 +136,7 @@ def simulate(
             scene.numerics.interpolation,
         )
     reported = {name: dataset.at_joints(record[name], labels)[0] for name in names}
+    counted = {name: data.pop(name) for name in _COUNTED if name in data}
     return dataset.response_dataset(
         times,
         {
@@ -147,8 +151,12 @@ def simulate(
         | _reason(scene),
         objective,
         labels,
-        _dimensions(scene),
+        {**(_dimensions(scene) or {}), **counted},
     )
+
+
+_COUNTED = ("revolution", "order", "band")
+"""Coordinates of measures of impact and noise."""
 
 
 def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
@@ -228,19 +236,40 @@ def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Ar
     count = scene.output.instants_per_revolution
     problem = recording.problem
     parts: list[dict[str, Array]] = []
-    taken = 0
+    taken, turns = 0, Turns()
     for piece in pieces(recording.chunks(), count):
         series = {"time": piece.times, **_series_between(scene, recording, piece)}
         # copies: a column that is a view would keep all that was observed
         parts.append({name: one.copy() for name, one in series.items()})
         taken += len(piece.times)
+        turns.take(piece.steps)
         least = max(taken, count * (problem.transient + problem.averaged))
         _refuse_what_does_not_fit(least * _bytes_an_instant(parts[0]), count)
+    turns.finish(piece.steps)
     data = {}
     for name in list(parts[0]):
         data[name] = np.concatenate([part.pop(name) for part in parts])
     data["energy_residual"] -= data["energy_residual"][0]
-    return data.pop("time"), data, recording.record()
+    record = recording.record()
+    if Status(int(record["status"][0])).valid and problem.effects.joints:
+        data |= _measured(scene, recording, turns, data)
+    return data.pop("time"), data, record
+
+
+def _measured(
+    scene: Scene, recording: Recording, turns: Turns, data: dict[str, Array]
+) -> dict[str, Any]:
+    """Measures of impact and noise of the averaged revolutions, and the coordinates that go with them."""
+    problem = recording.problem
+    periods, integrals = turns.averaged(problem.transient)
+    cycle = abs(problem.cycle) or at.TURN
+    joints = len(scene.joint_labels)
+    first = problem.transient + 1
+    return {
+        "revolution": np.arange(float(first), first + len(periods)),
+        **measured(periods, integrals, cycle, joints, rigid=not scene.modes),
+        **spectral(data, periods, scene.output.instants_per_revolution),
+    }
 
 
 def _bytes_an_instant(part: dict[str, Array]) -> float:

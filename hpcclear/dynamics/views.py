@@ -125,6 +125,8 @@ class Outcome(View):
     status = Column(at.OUT_STATUS)
     objective = Column(at.OUT_OBJECTIVE)  # m
     spread = Column(at.OUT_SPREAD)  # m, between averaged revolutions
+    period = Column(at.OUT_PERIOD)  # s, mean of the averaged revolutions
+    cycle = Column(at.OUT_CYCLE)  # rad of a revolution
     mean_gap = _of_joints(at.OUT_MEAN)  # m
     peak_force = _of_joints(at.OUT_PEAK)  # N
     latched = _of_joints(at.OUT_LATCHED)
@@ -141,6 +143,12 @@ class Outcome(View):
     attempts = Column(at.OUT_ATTEMPTS)
     stiff_steps = Column(at.OUT_STIFF_STEPS)
     mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE))  # N
+    impact_power = _of_joints(at.OUT_MEAN + at.place(at.IMPACT_POWERS))  # W
+    square_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE_SQUARES))  # N^2, mean square
+    flight = _of_joints(at.OUT_MEAN + at.place(at.FLIGHTS))  # share of the time without contact
+    begun = _of_joints(at.OUT_MEAN + at.place(at.BEGUN))  # 1/s, contacts that begin
+    frame_force = Column([at.OUT_MEAN + at.place(row) for row in (at.FRAME_X, at.FRAME_Y)])  # N
+    square_frame_force = _mean(at.FRAME_SQUARE)  # N^2
     sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
     mean_rate = _of_joints(at.OUT_MEAN + at.place(at.OBJECTIVE_RATES))  # of the objective
     largest_rate = _of_joints(at.OUT_LARGEST_RATE)
@@ -247,4 +255,6 @@ class Rates(View):
     drive_moment = Column(at.DRIVE_MOMENT)  # N m
     followed_x = Column(at.FOLLOWED_ACCELERATION)  # m/s^2, of the followed point
     followed_y = Column(at.FOLLOWED_ACROSS)
+    frame_x = Column(at.FRAME_X)  # N
+    frame_y = Column(at.FRAME_Y)
     powers = Column(slice(at.DRIVE_POWER, at.LOAD_POWER + 1))  # W: drive, its size, losses, load

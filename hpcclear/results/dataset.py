@@ -288,14 +288,17 @@ def response_dataset(
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
-    linkage: Mapping[str, Sequence[str]] | None = None,
+    linkage: Mapping[str, Sequence[str] | np.ndarray] | None = None,
 ) -> xr.Dataset:
     """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
 
-    `linkage`: labels along the dimensions ``body``, ``point`` and ``mode``, of series that have these.
+    `linkage`: labels or numbers along further dimensions, of what has these.
     """
     coords = {"time": time, "joint": np.array(joints, dtype=str)}
-    coords |= {name: np.array(words, dtype=str) for name, words in (linkage or {}).items()}
+    coords |= {
+        name: words if isinstance(words, np.ndarray) else np.array(words, dtype=str)
+        for name, words in (linkage or {}).items()
+    }
     attrs = {**(attributes or {}), **_checked(data)}
     return dataset("response", coords, data, attrs, objective=objective)
 

@@ -152,7 +152,7 @@ KINDS = {
 
 FURTHER_DIMS = {
     *("body", "point", "pin", "wave", "angle", "mode", "guide"),
-    *("record", "particle", "feature", "candidate", "revolutions"),
+    *("revolution", "order", "band", "record", "particle", "feature", "candidate", "revolutions"),
 }
 """Coordinates that only some files have."""
 
@@ -162,7 +162,7 @@ LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
 
 def designs_in(samples: xr.Dataset) -> dict[str, np.ndarray]:
-    """The design variables in a dataset, by their names or scene paths."""
+    """The design variables in a dataset, each of the shape of its dimensions, by their names or scene paths."""
     return {
         str(variable.attrs["scene_path"]): variable.to_numpy()
         for variable in samples.data_vars.values()

@@ -8,7 +8,7 @@ Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^
 from typing import NamedTuple
 
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import FIELDS
+from hpcclear.base.outcome import FIELDS, IMPACTS
 
 Dims = tuple[str, ...]
 
@@ -65,6 +65,33 @@ def outcome(*per_sample: str) -> Columns:
         for name, one in FIELDS.items()
         if name != "sample" and (per_sample or one.per != "wave")
     }  # fmt: skip
+
+
+def by_revolution() -> Columns:
+    """Measures of impact and noise of each averaged revolution, and half-widths of their means."""
+    found = {}
+    means = outcome()
+    for name in IMPACTS:
+        row = means[name]
+        dims = ("revolution", *row.dims)
+        found[f"{name}_by_revolution"] = number(dims, row.units, f"{row.long_name}: of each")
+        words = f"half-width of the 95 % confidence interval of {name}"
+        found[f"{name}_limit"] = number(row.dims, row.units, words)
+    return found
+
+
+def spectrum(name: str, words: str, *dims: str) -> Columns:
+    """Orders and third-octave levels of a force."""
+    found = {
+        f"{name}_orders": number(
+            ("order", *dims), "N", f"root mean square of the order in the {words}"
+        )
+    }
+    level = f"third-octave level of the {words}, dB re 1e-6 N; NaN of a band without an order"
+    for end, which in (("", ""), ("_lower", ": lower end"), ("_upper", ": upper end")):
+        interval = f"{which} of its 95 % confidence interval" if which else ""
+        found[f"{name}_level{end}"] = number(("band", *dims), "1", level + interval)
+    return found
 
 
 def fit(*dims: str) -> Columns:

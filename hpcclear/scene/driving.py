@@ -14,6 +14,7 @@ from hpcclear.scene.fields import (
     check_one_of,
     invalid,
 )
+from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad
 from hpcclear.scene.places import Angle, PairTable
 
 Turns = Annotated[int, Count(least=1, most=64)]
@@ -33,6 +34,21 @@ def check_start(drive: Any) -> None:
             'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
             key="expected_speed",
         )
+
+
+def check_torque(drive: Any) -> None:
+    """Refuse a drive without a torque, or with two; raises PydanticCustomError."""
+    check_one_of(
+        "torque",
+        drive.torque,
+        drive.torque_by_speed,
+        "Write torque, or torque_by_speed = [[speed, torque], ...]",
+    )
+    if drive.torque_by_speed is not None and drive.no_load_speed is not None:
+        raise invalid(
+            "torque_by_speed says already how the torque falls", "Remove it",
+            key="no_load_speed", value=drive.no_load_speed,
+        )  # fmt: skip
 
 
 def speed_entry(drive: Any) -> str:
@@ -98,8 +114,11 @@ class PlanarTorque(Table):
     kind: Literal["torque"]
     body: str
     """That the torque turns, against the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """N m, constant or against the angle of the body that gives the period."""
+    torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
+    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m, straight from row
+    to row and level beyond."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
@@ -117,6 +136,7 @@ class PlanarTorque(Table):
     @model_validator(mode="after")
     def _started(self) -> "PlanarTorque":
         check_start(self)
+        check_torque(self)
         return self
 
 
@@ -147,6 +167,8 @@ class ForceLoad(Table):
     `start_angle` included, whichever way it turns."""
     direction: Angle = 0.0
     """From the ground's x axis, rad."""
+    follows: Annotated[bool, Field(strict=True)] = False
+    """Whether the force turns with the body: components and direction are then those in its own axes."""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "ForceLoad":
@@ -181,6 +203,11 @@ class SpringLoad(Table):
     """At which it pulls and pushes nothing, m."""
     damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
     """N s/m, along the line between both points."""
+    acts: Literal["both", "pushing", "pulling"] = "both"
+    """Whether it acts on both sides of its length, only within it, as a buffer or an end stop, or only beyond it, as a rope."""
 
 
-PlanarLoad = Annotated[ForceLoad | TorqueLoad | SpringLoad, Field(discriminator="kind")]
+PlanarLoad = Annotated[
+    ForceLoad | TorqueLoad | SpringLoad | TorsionSpringLoad | CylinderLoad | DragLoad,
+    Field(discriminator="kind"),
+]

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.bending import Bending
-from hpcclear.scene.driving import Turns, check_start
+from hpcclear.scene.driving import Turns, check_start, check_torque
 from hpcclear.scene.fields import (
     Curve,
     CurveOf,
@@ -21,6 +21,7 @@ from hpcclear.scene.fields import (
 from hpcclear.scene.film import Film, check_film
 from hpcclear.scene.fits import with_clearance
 from hpcclear.scene.guides import SliderGuide
+from hpcclear.scene.loads import Law
 from hpcclear.scene.materials import Material
 from hpcclear.scene.roundness import OutOfRound, check_waves
 from hpcclear.scene.wear import Wear
@@ -111,8 +112,11 @@ class TorqueDrive(Table):
     """A torque acts on the free crank; its speed is part of the motion."""
 
     kind: Literal["torque"]
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """N m, constant or ``[[crank angle, torque], ...]`` over the turns of a revolution."""
+    torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
+    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m, straight from row
+    to row and level beyond."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
@@ -134,6 +138,7 @@ class TorqueDrive(Table):
     @model_validator(mode="after")
     def _started(self) -> "TorqueDrive":
         check_start(self)
+        check_torque(self)
         return self
 
 

@@ -56,6 +56,11 @@ class Numerics(Table):
     """Whether each sample also records mean contact forces, peak torque of the drive and standard deviation of the
     slider acceleration. A study of one of these enables it."""
 
+    impacts: Annotated[bool, Field(strict=True)] = False
+    """Whether each sample also records measures of impact and noise. Of each joint in a revolution: number of impacts, energy
+    lost in them, impulse, angle without contact; root mean squares of contact forces and of the force on the frame. A study of
+    one of these enables it."""
+
     @field_validator("method", mode="before")
     @classmethod
     def _method_that_was(cls, value: Any) -> Any:

@@ -149,7 +149,9 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
         kept = [floor]
         if table.geometry is not None:
             names = [one.name for one in table.declared.geometry.parameters]
-            elastic |= {"geometry": table.geometry} | {name: table.value(name) for name in names}
+            elastic |= {"geometry": table.geometry, "curve": table.curve} | {
+                name: table.value(name) for name in names
+            }
             kept += [f"effects.contact.{name}" for name in names]
         moved = {path: path for path in kept}
         yield Switch("contact damping", {"effects.contact": elastic}, moved)
@@ -208,7 +210,8 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
         turns = turns_of(scene.linkage)
-        yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
+        if drive.torque is not None:
+            yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
 
 
 class Off:

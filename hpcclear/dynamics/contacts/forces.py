@@ -43,16 +43,33 @@ def tangential_force(effects, work, par, joint, sliding, normal, i, W):
 
 
 @lane_function
-def lost(effects, work, par, joint, touch, forces, i, W):
-    """Power that a contact loses, W; `touch`: depth, rate, sliding speed; `forces`: normal and tangential."""
-    depth, rate, sliding = touch
-    normal, tangential = forces
+def damped(effects, work, par, joint, touch, normal, i, W):
+    """Power that the damping of a contact loses, W; `touch`: depth, rate, sliding speed."""
+    depth, rate, _ = touch
     active = work[joint.active * W + i]
     inverse_impact = work[joint.inverse_impact * W + i]
     row = joint.block + at.CONTACT_NUMBERS
     elastic = effects.contact.elastic(par, row, depth, rate, inverse_impact, active, i, W)
     elastic = switched(effects.latched, elastic, active)
-    return (normal - elastic) * rate + product(effects.friction, tangential, sliding)
+    return (normal - elastic) * rate
+
+
+@lane_function
+def lost(effects, work, par, joint, touch, forces, i, W):
+    """Power that a contact loses, W; `touch`: depth, rate, sliding speed; `forces`: normal and tangential."""
+    normal, tangential = forces
+    damping = damped(effects, work, par, joint, touch, normal, i, W)
+    return damping + product(effects.friction, tangential, touch[2])
+
+
+@lane_function
+def store_impacts(effects, work, par, joint, touch, normal, i, W):
+    """Write down what measures of impact are made of; the contact's force stands in its row already, a film's with it."""
+    if effects.impacts is not None:
+        force = work[(at.RATE_NOW + joint.force) * W + i]
+        work[(at.RATE_NOW + joint.force_square) * W + i] = force * force
+        lost_now = damped(effects, work, par, joint, touch, normal, i, W)
+        work[(at.RATE_NOW + joint.impact_power) * W + i] = lost_now
 
 
 @lane_function
@@ -67,6 +84,7 @@ def store_contact(effects, work, par, joint, touch, forces, direction, i, W):
     store_rate(effects.objective, work, joint.sliding_speed, sliding, i, W)
     store_rate(effects.objective, work, joint.normal_x, nx, i, W)
     store_rate(effects.objective, work, joint.normal_y, ny, i, W)
+    store_impacts(effects, work, par, joint, touch, normal, i, W)
     store_kinks(effects, work, par, joint, touch, i, W)
     wearing = force_that_wears(effects.threshold, par, joint, normal, i, W)
     store_rate(effects.wear, work, joint.sliding_power, wearing * abs(sliding), i, W)
@@ -108,7 +126,7 @@ def store_rate(flag, work, row, value, i, W):
 
 @lane_function
 def switched(latched, force, active):
-    """A latched contact is on or off for a whole step, so that a step ends exactly at an impact."""
+    """A `latched` contact is on or off for a whole step, so that a step ends exactly at an impact."""
     if latched is not None:
         return force * active
     else:

@@ -17,7 +17,9 @@ from numba import carray
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-{geometries}from hpcclear.dynamics.linkage.elements import harmonic, held_inverse, sign_of, spring_force, table_value
+{geometries}from hpcclear.dynamics.linkage.elements import (
+    along, drag, harmonic, held_inverse, hinge, one_sided, sign_of, spring_force, table_value,
+)
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated
 '''

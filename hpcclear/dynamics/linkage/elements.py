@@ -1,4 +1,4 @@
-"""What generated motions call besides the contact law: springs, drives, tables, loops that fold flat. Plain, of arrays."""
+"""Functions of generated motions besides the contact law: springs, drives, tables, near-singular loops. Plain, of arrays."""
 
 import math
 
@@ -26,6 +26,44 @@ def spring_force(stiffness, damping, length, ex, ey, vx, vy):
 
 
 @lane_function
+def one_sided(side, stiffness, damping, length, ex, ey, vx, vy):
+    """The same of a spring that acts on one side of its length: beyond it (`side` 1) or within it (-1); it never pulls back."""
+    square = ex * ex + ey * ey + _TINY
+    inverse = 1.0 / np.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    rate = vx * nx + vy * ny
+    beyond = side * (square * inverse - length)
+    size = stiffness * beyond + damping * side * rate
+    size = 0.5 * (size + abs(size))
+    tension = side * size * (0.5 + 0.5 * np.sign(beyond))
+    return -tension * nx, -tension * ny, -tension * rate
+
+
+@lane_function
+def along(ex, ey, vx, vy):
+    """Direction, length and rate of the length of an offset."""
+    square = ex * ex + ey * ey + _TINY
+    inverse = 1.0 / np.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    return nx, ny, square * inverse, vx * nx + vy * ny
+
+
+@lane_function
+def hinge(at, start, bend):
+    """A line of slope `bend` beyond `start`, 0 before."""
+    beyond = at - start
+    return bend * (0.5 * (beyond + abs(beyond)))
+
+
+@lane_function
+def drag(linear, quadratic, spin):
+    """Torque against the turning at a speed, N m."""
+    return -(linear + quadratic * abs(spin)) * spin
+
+
+@lane_function
 def sign_of(value):
     """1 for what is not negative, -1 for the rest."""
     return 1.0 if value >= 0.0 else -1.0
@@ -39,7 +77,7 @@ def harmonic(mean, amplitude, rate, sine, cosine):
 
 @lane_function
 def held_inverse(pivot, scale):
-    """1 / pivot of a multiplier, both negative; where a loop folds flat no more than 1e8 / scale.
+    """1 / pivot of a multiplier, both negative; in a singular configuration no more than 1e8 / scale.
 
     There one direction of the loop is not held, neither by geometry nor by its forces, which would be zero by zero: a
     free linkage goes on as its inertia has it until the loop holds again, some 1e-4 rad further on.

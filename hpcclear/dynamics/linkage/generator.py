@@ -5,7 +5,7 @@ accelerations, gaps, forces and powers; an effect that is off is not in it. It i
 contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -13,12 +13,15 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
-from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
+from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.loads import piecewise
+from hpcclear.dynamics.linkage.loads.writing import Writing
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Acting,
     Contact,
     Drive,
     Force,
@@ -40,6 +43,7 @@ class On(NamedTuple):
     energies: bool = False  # energy balance
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
+    impacts: bool = False  # force on the frame
     follow: str = ""  # a guided body, or body.point
     objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
@@ -222,8 +226,12 @@ class _Generator:
             found += [*kin.rotated(self.forest.frames[body], own)]
         return f"({', '.join(self.writer.text(term) for term in found)})"
 
-    def _load(self, load: Force | Torque | Spring) -> None:
+    def _load(self, load: Force | Torque | Spring | Acting) -> None:
         kin, write, power = self.kinematics, self.writer, ZERO
+        if isinstance(load, Acting):
+            power = load.act(Writing(kin, write, self.balance))
+            self.load_power = self.load_power + power
+            return
         if isinstance(load, Spring):
             self._spring(load)
             return
@@ -238,6 +246,17 @@ class _Generator:
                 for axis, value in zip("xy", load.force, strict=True)
             )
             force = Vector(*parts)
+            if load.follows:
+                body = split(load.place)[0]
+                cosine, sine = kin.offset(body)
+                own = Vector(cosine * force.x - sine * force.y, sine * force.x + cosine * force.y)
+                turned_force = kin.rotated(self.forest.frames[body], own)
+                force = Vector(
+                    *(
+                        write.let(f"{load.name}_{axis}", one)
+                        for axis, one in zip("xy", turned_force, strict=True)
+                    )
+                )
             self.balance.pulls.append(Pull(load.place, force))
             for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
                 power = power + part * speed
@@ -261,7 +280,8 @@ class _Generator:
         numbers = [write.parameter(f"{load.name}_{n}") for n in ("stiffness", "damping", "length")]
         texts = [write.text(t) for t in (*numbers, *apart, *moving)]
         made = [write.fresh(f"{name}_{load.name}") for name in ("fx", "fy", "power")]
-        write.line(f"{', '.join(made)} = spring_force({', '.join(texts)})")
+        call = "spring_force(" if load.side == 0 else f"one_sided({float(load.side)}, "
+        write.line(f"{', '.join(made)} = {call}{', '.join(texts)})")
         fx, fy, power = map(named, made)
         force = Vector(fx, fy)
         self.balance.pulls += [Pull(load.first, force), Pull(load.second, -force)]
@@ -269,6 +289,11 @@ class _Generator:
 
     def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:
         write = self.writer
+        if drive.by_speed is not None:
+            speed = self.kinematics.spin(self.forest.frames[drive.body])
+            name = f"{drive.name}_by_speed"
+            torque = piecewise.term(write, name, len(drive.by_speed), speed)
+            return Column("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
             torque = write.let(drive.name, torque * self._turned(drive.name))
@@ -354,7 +379,7 @@ class _Generator:
         return coupled(moving, factored, found) if moving else found
 
     def _passed(self, block: list[int]) -> dict[int, list[int]]:
-        """Multipliers of pins in a free linkage, which may fold flat, with those of the same pin.
+        """Multipliers of pins in a free linkage, which may become singular, with those of the same pin.
 
         What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
         """
@@ -400,6 +425,8 @@ class _Generator:
             self._rate(at.LOAD_POWER, self.load_power)
         if on.follow and (on.series or on.responses or on.objective):
             self._follow(found)
+        if on.impacts and not self.kinematics.bends:
+            self._shaking(found)
         if on.objective:
             self._objective()
 
@@ -417,8 +444,8 @@ class _Generator:
             call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
             self.writer.line(f"work[{where} * W + i] = {call}")
 
-    def _follow(self, found: dict[int, Term]) -> None:
-        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
+    def _second(self, found: dict[int, Term]) -> Callable[[Column], Term]:
+        """Accelerations of coordinates, by their columns; 0 of what is none."""
 
         def second(column: Column) -> Term:
             term = found[self.number[column]] if column in self.number else ZERO
@@ -426,6 +453,28 @@ class _Generator:
                 return term - self.writer.parameter("gravity")
             return term
 
+        return second
+
+    def _shaking(self, found: dict[int, Term]) -> None:
+        """Force of the mechanism on its frame, weight included, of rigid bodies only.
+
+        Loads act between bodies and the frame, so that of all forces inertia and weight are left.
+        """
+        kin, write, second = self.kinematics, self.writer, self._second(found)
+        total = NOWHERE
+        for body in self.mechanism.bodies:
+            moved = kin.acceleration(kin.center(body.name), second)
+            if self.on.gravity:
+                moved = moved + Vector(ZERO, write.parameter("gravity"))
+            total = total - moved.times(self.balance.mass_of(body))
+        x, y = (write.let(f"frame_{axis}", term) for axis, term in zip("xy", total, strict=True))
+        self._rate(at.FRAME_X, x)
+        self._rate(at.FRAME_Y, y)
+        self._rate(at.FRAME_SQUARE, x * x + y * y)
+
+    def _follow(self, found: dict[int, Term]) -> None:
+        """Acceleration of a guided body along its guide, or of the followed point along both axes, and its square."""
+        second = self._second(found)
         kin, follow = self.kinematics, self.on.follow
         if "." not in follow:
             if (k := self.number.get(Column("slide", follow))) is not None:

@@ -36,7 +36,7 @@ class Linkage:
     waves : bool
         Whether surfaces of joints with clearance are out of round.
     follow : str
-        A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
+        A guided body, or a point ``body.point``, whose acceleration is a response; "" for none.
     objective : str
         The objective's own rate: "joints", or "whole" of the mechanism; "" for none.
     bristled : bool
@@ -47,7 +47,7 @@ class Linkage:
     Raises
     ------
     InputError
-        If it needs more parameters than there is room for.
+        If it needs more parameters than the kernel holds.
     """
 
     def __init__(
@@ -70,6 +70,7 @@ class Linkage:
                     self._text(
                         self._on._replace(energies=energies, series=series, responses=responses)
                     )
+        self._text(_with_impacts(self._on))
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -117,7 +118,7 @@ class Linkage:
 
     @property
     def follows_a_point(self) -> bool:
-        """Whether it is a point that responses tell of."""
+        """Whether it is a point that responses follow."""
         return "." in self.follow
 
     @property
@@ -150,6 +151,7 @@ class Linkage:
         on = self._on._replace(
             energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses)
         )  # fmt: skip
+        on = _with_impacts(on) if effects.impacts else on
         return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
 
     def fill(
@@ -215,6 +217,11 @@ class Linkage:
         if drive is None:
             return main.advance if frame == self.forest.frames[main.body] else 0.0
         return drive.advance * round(main.seconds / drive.seconds)
+
+
+def _with_impacts(on: On) -> On:
+    """What a text that measures impacts has: all that is measured, so that there is one of them."""
+    return on._replace(energies=True, series=True, responses=True, impacts=True)
 
 
 def _curves_of(part: object) -> list[str]:

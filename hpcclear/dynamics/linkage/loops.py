@@ -39,7 +39,10 @@ WORDS: dict[str, Callable[..., Any]] = {
     "sincos": sincos,
     "sign_of": sign_of,
     "harmonic": elements.harmonic.py_func,
-    "spring_force": elements.spring_force.py_func,
+    **{
+        name: getattr(elements, name).py_func
+        for name in ("spring_force", "one_sided", "along", "hinge", "drag")
+    },
     "saturated": saturated,
 }
 """What texts call, for arrays."""

@@ -8,6 +8,7 @@ from typing import Any
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Acting,
     Body,
     Clearance,
     Contact,
@@ -114,7 +115,7 @@ def modes_of(mechanism: Mechanism) -> int:
 def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> list[set[str]]:
     """Which bodies hang together by joints of some kinds: sets of names, the ground's first.
 
-    Guides with clearance, which let their sliders turn, are none of a kind that is named.
+    Guides with clearance, which let their sliders turn, have no kind of their own.
     """
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
     for joint in mechanism.joints if kinds is object else mechanism.ideal:
@@ -168,12 +169,14 @@ def _places(m: Mechanism) -> None:
                 continue
             listed = ", ".join(sorted(words)) or "none yet"
             raise InputError(f"{key}.{entry}", place, reason, f"Known are: {listed}")
-        acted_on = getattr(one, "body", None)
-        if acted_on is not None and acted_on not in known.keys() - {GROUND}:
-            raise InputError(
-                f"{key}.body", acted_on, "there is no such moving body",
-                f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
-            )  # fmt: skip
+        for entry in ("body", "other"):
+            acted_on = getattr(one, entry, None)
+            if acted_on is not None and acted_on not in known.keys() - {GROUND}:
+                raise InputError(
+                    f"{key}.{entry}", acted_on, "there is no such moving body",
+                    f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
+                )  # fmt: skip
+    _turned(m)
     for joint in m.joints:
         first, second = (split(place)[0] for place in joint.places)
         if first == second:
@@ -190,6 +193,31 @@ def _places(m: Mechanism) -> None:
                 f"joints.{joint.name}.point", joint.point, "the ground cannot be the sliding body",
                 "Swap point and line",
             )  # fmt: skip
+
+
+def _turned(m: Mechanism) -> None:
+    """Bodies whose angles loads act by can turn, and do not go round and round with the revolutions."""
+    groups = joined(m, (Slide, Fixed))
+    still = next((names for names in groups if GROUND in names), set())
+    round_ = next((names for names in groups if m.drives and m.period.body in names), set())
+    for load in m.loads:
+        if not isinstance(load, Acting):
+            continue
+        for entry in ("body", "other"):
+            body = getattr(load, entry, None)
+            if body in still:
+                raise InputError(
+                    f"loads.{load.name}.{entry}",
+                    body,
+                    "this body cannot rotate",
+                    "Name a body that does",
+                )
+            if load.by_angle and body in round_ and m.period.advance:
+                raise InputError(
+                    f"loads.{load.name}.{entry}", body,
+                    "this body goes round with every revolution, so that its angle has no end",
+                    "Name a body that swings",
+                )  # fmt: skip
 
 
 def _numbers(m: Mechanism) -> None:

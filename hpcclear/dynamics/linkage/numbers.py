@@ -8,8 +8,10 @@ import numpy as np
 from hpcclear.dynamics.linkage import bending
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
+from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
+    Acting,
     ConstantSpeed,
     Force,
     Harmonic,
@@ -99,6 +101,8 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
                 found[f"{drive.name}_shift"] = trees.offsets[drive.body]
             case TorqueDrive():
                 found[f"{drive.name}_torque"] = drive.torque
+                if drive.by_speed is not None:
+                    found |= piecewise.numbers(f"{drive.name}_by_speed", drive.by_speed)
                 if drive.no_load_speed is not None:
                     found[f"{drive.name}_fall"] = 1.0 / drive.no_load_speed
                 found[f"{drive.name}_speed"] = drive.initial_speed
@@ -112,6 +116,8 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
                 found[f"{load.name}_stiffness"] = load.stiffness
                 found[f"{load.name}_damping"] = load.damping
                 found[f"{load.name}_length"] = load.length
+            case Acting():
+                found |= load.numbers()
 
 
 def row_of(motion: Motion, base: dict[str, Any]) -> dict[int, Any]:

@@ -6,8 +6,8 @@ angles count counter-clockwise.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -102,7 +102,7 @@ class Clearance(Revolute):
         return (np.hypot(*self.start_eccentricity) - self.clearance,)
 
     @property
-    def without_play(self) -> Revolute:
+    def without_clearance(self) -> Revolute:
         """The same without clearance."""
         return Revolute(self.name, self.journal, self.bearing)
 
@@ -186,7 +186,7 @@ class LooseSlide(Slide):
         }
 
     @property
-    def without_play(self) -> Slide:
+    def without_clearance(self) -> Slide:
         """The same without clearance."""
         return Slide(self.name, self.point, self.line, self.angle)
 
@@ -275,7 +275,8 @@ class TorqueDrive:
     """A torque (N m) acts on a free body with `inertia` (kg m2) turning along; `table`: times a curve over the angle of the
     period's body.
 
-    Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one.
+    Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one. `by_speed`:
+    rows (rad/s, N m) in place of the torque, straight between and level beyond.
     """
 
     name: str
@@ -288,6 +289,7 @@ class TorqueDrive:
     turns: int = 1
     expected_speed: float | None = None
     no_load_speed: float | None = None
+    by_speed: tuple[Pair, ...] | None = None
     prescribed: ClassVar[bool] = False
 
     @property
@@ -311,12 +313,16 @@ Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 @dataclass(frozen=True)
 class Force:
-    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body."""
+    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body.
+
+    `follows`: along the axes of its body instead.
+    """
 
     name: str
     place: str
     force: Pair
     table: bool = False
+    follows: bool = False
 
 
 @dataclass(frozen=True)
@@ -331,7 +337,10 @@ class Torque:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring (N/m, free length in m) and damper (N s/m) between two places."""
+    """A spring (N/m, free length in m) and damper (N s/m) between two places.
+
+    `side`: 1 acts beyond the length only, as a rope, -1 within it only, as a buffer; 0 on both sides.
+    """
 
     name: str
     first: str
@@ -339,9 +348,35 @@ class Spring:
     stiffness: float
     length: float = 0.0
     damping: float = 0.0
+    side: int = 0
 
 
-Load = Force | Torque | Spring
+@dataclass(frozen=True)
+class Acting:
+    """A load that writes itself, one of `hpcclear.dynamics.linkage.loads`.
+
+    Its fields `first` and `second` are places, `body` and `other` bodies; the mechanism checks that there are such.
+    """
+
+    name: str
+    by_angle: ClassVar[bool] = False
+    """Whether it goes by the angle of a body, which must not go round with the revolutions."""
+
+    @classmethod
+    def of(cls, table: Any) -> Self:
+        """That of a table of the scene, whose entries have the names of the fields."""
+        return cls(**{one.name: getattr(table, one.name) for one in fields(cls)})
+
+    def numbers(self) -> dict[str, Any]:
+        """Its parameters by the names that `act` reads, SI; numbers or arrays of samples."""
+        raise NotImplementedError
+
+    def act(self, on: Any) -> Any:
+        """Add its forces and moments to a motion (`loads.writing.Writing`); return the power that it gives, W, as a term."""
+        raise NotImplementedError
+
+
+Load = Force | Torque | Spring | Acting
 
 
 def split(place: str) -> tuple[str, str]:

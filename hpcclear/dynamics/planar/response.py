@@ -59,6 +59,8 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         "contact_force": seen.rates.force[:, joints],
         "friction_force": seen.rates.friction[:, joints],
     }
+    frame = {"frame_force_x": seen.rates.frame_x, "frame_force_y": seen.rates.frame_y}
+    frame = frame if joints and not scene.modes else {}
     held = {}
     if linkage.cartesian:
         held["constraint_violation"] = violation(linkage, seen.q.T, seen.v.T, seen.turn_time)
@@ -66,6 +68,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         **moved(scene, mechanism, places, phase, acceleration),
         **{name: at_places(scene, columns) for name, columns in of_joints.items()},
         "crank_moment": seen.rates.drive_moment,
+        **frame,
         **balance_series(stored, seen.works),
         **mode_series(scene.modes, seen.q, seen.v, strain),
         **guide_series(mechanism, pose),
@@ -181,7 +184,7 @@ def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Any]:
 
 
 def contacts_on(scene: Scene, contacts: Array) -> Array:
-    """Whether a penetration of each open joint counts, (t, joints): under latched laws only while in contact."""
+    """Whether a penetration of each open joint counts, (t, joints): under `latched` laws only while in contact."""
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     joints = list(scene.open_places)
     return contacts[:, joints] if latched else np.ones((len(contacts), len(joints)))

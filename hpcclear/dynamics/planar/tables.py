@@ -7,14 +7,15 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.curves import angle_cells
 from hpcclear.dynamics.laws.hertz_contact import (
     contact_stiffness,
     reduced_compliance,
     sphere_stiffness,
 )
 from hpcclear.dynamics.linkage import parts
+from hpcclear.dynamics.linkage.loads import KINDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
+from hpcclear.dynamics.planar.curves import angle_cells
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,
@@ -159,17 +160,19 @@ def _drive(drive: Any) -> parts.Drive:
         )
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
+    torque = 1.0 if table or drive.torque is None else drive.torque
     return parts.TorqueDrive(
-        drive.name, drive.body, 1.0 if table else drive.torque,  # type: ignore[arg-type]
+        drive.name, drive.body, torque,  # type: ignore[arg-type]
         drive.initial_speed, drive.flywheel_inertia, table, drive.period, drive.turns,
-        drive.expected_speed, drive.no_load_speed,
+        drive.expected_speed, drive.no_load_speed, drive.torque_by_speed,
     )  # fmt: skip
 
 
 def _load(load: Any) -> parts.Load:
     if isinstance(load, ForceLoad):
         if load.force is not None:
-            return parts.Force(load.name, load.place, (load.force.x, load.force.y))
+            pair = (load.force.x, load.force.y)
+            return parts.Force(load.name, load.place, pair, follows=load.follows)
         table = isinstance(load.size, tuple)
         size: Any = 1.0 if table else load.size
         # a quarter turn is one, to the last bit
@@ -177,11 +180,14 @@ def _load(load: Any) -> parts.Load:
             np.where(np.abs(part) < 1e-15, 0.0, part)[()]
             for part in (np.cos(load.direction), np.sin(load.direction))
         )
-        return parts.Force(load.name, load.place, (size * cosine, size * sine), table)
+        return parts.Force(load.name, load.place, (size * cosine, size * sine), table, load.follows)
     if isinstance(load, SpringLoad):
         return parts.Spring(
-            load.name, load.first, load.second, load.stiffness, load.length, load.damping
-        )
+            load.name, load.first, load.second, load.stiffness, load.length, load.damping,
+            {"both": 0, "pushing": -1, "pulling": 1}[load.acts],
+        )  # fmt: skip
+    if load.kind in KINDS:
+        return KINDS[load.kind].of(load)
     table = isinstance(load.torque, tuple)
     return parts.Torque(load.name, load.body, 1.0 if table else load.torque, table)
 

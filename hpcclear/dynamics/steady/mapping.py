@@ -6,10 +6,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import LENGTH, perturbed
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 RTOL = 1e-8
@@ -125,7 +125,7 @@ def _set_back(start: Start, shadow: Start, scale: Array) -> tuple[Array, Start]:
 
 
 def _exponent(logs: Array) -> tuple[float, float]:
-    """Mean and half-width of its confidence interval, of logarithms (revolutions, copies): copies times four segments of revolutions."""
+    """Mean and half-width of its confidence interval, of logarithms (revolutions, copies) in four segments of each copy."""
     pieces = np.concatenate([piece.mean(axis=0) for piece in np.array_split(logs, 4)])
     mean, _, limit = judging.student(pieces)
     return mean, limit

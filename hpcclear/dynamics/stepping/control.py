@@ -1,14 +1,14 @@
 """Step-size control, acceptance and commit of a step over all lanes, without branches in the lane loop.
 
 Proportional-integral control after Gustafsson 1991 (doi:10.1145/210232.210242) with the exponents of Hairer, Norsett
-and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair at hand.
+and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair available.
 """
 
 import math
 
 from numba import njit
 
-from hpcclear.base.bits import rough_exp2, rough_log2
+from hpcclear.base.bits import no_less, rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
@@ -158,6 +158,26 @@ def add_integral(work, rate, mean, yes, i, W):
 
 
 @lane_function
+def count_contact(work, p, i, W):
+    """Add the time that joint p was without contact in the step, and a contact that began.
+
+    Explicit steps end at either end of a contact; within implicit ones the gap is taken as linear.
+    """
+    yes = work[at.ACCEPT * W + i] == 1.0
+    d0 = work[(at.RATE_OLD + at.GAP + p) * W + i]
+    d1 = work[(at.RATE_NOW + at.GAP + p) * W + i]
+    inside = no_less(d0, 0.0) + no_less(d1, 0.0)
+    share = 1.0 - inside / (abs(d0) + abs(d1) + 1e-300)
+    flown = work[(at.INTEGRAL + at.FLIGHTS + p) * W + i] + work[at.STEP * W + i] * share
+    keep(work, at.INTEGRAL + at.FLIGHTS + p, flown, yes, i, W)
+    touches = 1.0 if d1 > 0.0 else 0.0
+    begins = touches if work[(at.TOUCHES + p) * W + i] == 0.0 else 0.0
+    begun = work[(at.INTEGRAL + at.BEGUN + p) * W + i] + begins
+    keep(work, at.INTEGRAL + at.BEGUN + p, begun, yes, i, W)
+    keep(work, at.TOUCHES + p, touches, yes, i, W)
+
+
+@lane_function
 def commit_joint(latched, work, p, i, W):
     """Contact state, integral and extremes of joint p after a step."""
     accept = work[at.ACCEPT * W + i]
@@ -241,6 +261,9 @@ def commit(effects, work, stages, n, W):
     latched = 1.0 * effects.rules.latched
     for joint in range(effects.rules.begin, effects.rules.end):
         p = place(joint)
+        if effects.rules.impacts:
+            for i in range(W):
+                count_contact(work, p, i, W)
         for i in range(W):
             commit_joint(latched, work, p, i, W)
     for number in range(n):

@@ -1,14 +1,27 @@
 """The accepted steps of one sample, of which time series are made. Ensembles pass a record without rows, which keeps none."""
 
+import numpy as np
+
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.settings import RECORDED
 
-# one row: time since the start of the run and of the revolution, contact state, integrals, then q, v, a
+# one row: time since the start of the run and of the revolution, contact state, works, measures, then q, v, a
 (TIME, TURN_TIME, REVOLUTION, CONTACTS) = range(4)
 JOINTS = at.MAX_JOINTS
 DRIVE_WORK = CONTACTS + 2 * JOINTS
-(ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, STATE) = range(DRIVE_WORK + 1, DRIVE_WORK + 5)
+(ABS_DRIVE_WORK, DISSIPATED, LOAD_WORK, MEASURED) = range(DRIVE_WORK + 1, DRIVE_WORK + 5)
+MEASURES = np.array([
+    row + k
+    for row, size in (
+        (at.FORCE, JOINTS), (at.FORCE_SQUARES, JOINTS), (at.IMPACT_POWERS, JOINTS), (at.FLIGHTS, JOINTS),
+        (at.BEGUN, JOINTS), (at.FRAME_X, 1), (at.FRAME_Y, 1), (at.FRAME_SQUARE, 1),
+    )
+    for k in range(size)
+])  # fmt: skip
+"""Measures of impact and noise whose integrals stand in a row."""
+STATE = MEASURED + len(MEASURES)
+_PLACES = np.array([at.place(int(rate)) for rate in MEASURES])
 
 
 def columns(n: int) -> int:
@@ -33,6 +46,9 @@ def record_step(record, counters, work, stages, book, n, W):
             for r in range(4):
                 done = book[(at.TOTAL + at.WORKS + r) * W]
                 record[row, DRIVE_WORK + r] = done + work[(at.INTEGRAL + at.DRIVE_POWER + r) * W]
+            for r in range(len(MEASURES)):
+                done = book[(at.TOTAL + _PLACES[r]) * W]
+                record[row, MEASURED + r] = done + work[(at.INTEGRAL + MEASURES[r]) * W]
             for k in range(n):
                 record[row, STATE + k] = work[(at.Q + k) * W]
                 record[row, STATE + n + k] = work[(at.V + k) * W]

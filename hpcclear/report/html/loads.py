@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import xarray as xr
 
 from hpcclear.base.outcome import Status
-from hpcclear.report import bearings
+from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels
 from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.report.html.content import Content
@@ -21,6 +21,18 @@ def loads(content: Content) -> list[object] | None:
     }
     found = {name: bearings.bearings(one) for name, one in valid.items()}
     parts: list[object] = []
+    impacts = [
+        [name, joint, *map(Number, cells)]
+        for name, one in valid.items()
+        for joint, *cells in noise.joints(one)
+    ]
+    if impacts:
+        parts.append(Table(["response", *noise.HEADER], impacts, noise.TITLE))
+        parts += [
+            f"{name}: " + "; ".join(f"{words} {text}" for words, text in frame) + "."
+            for name, one in valid.items()
+            if (frame := noise.frame(one))
+        ]
     if any(found.values()):
         parts.append(_bearings(found))
     if any(bearings.degrees(one) == "–" for each in found.values() for one in each):

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import moocore
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.cached import cached
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def best_subset(values: Array, size: int) -> NDArray[np.intp]:
     return np.sort(_best_of_two(values, size))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@cached
 def _best_of_two(values, size):  # type: ignore[no-untyped-def]
     """Rows of the largest area below the first row's second objective, from the last row to the first."""
     order = np.argsort(values[:, 0])
@@ -171,7 +171,7 @@ def _best_of_two(values, size):  # type: ignore[no-untyped-def]
     return order[kept]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@cached
 def _cut_two(values, size):  # type: ignore[no-untyped-def]
     """Rows to keep of a two-objective front: the least rectangle between neighbours goes first.
 
@@ -188,7 +188,7 @@ def _cut_two(values, size):  # type: ignore[no-untyped-def]
     return alive
 
 
-@numba.njit(cache=True, error_model="numpy")
+@cached
 def _thin(values, capacity):  # type: ignore[no-untyped-def]
     """Drop the most crowded rows until `capacity` are left; the best of each objective stays.
 
@@ -228,14 +228,14 @@ def _thin(values, capacity):  # type: ignore[no-untyped-def]
     return alive, np.sqrt(distance[alive, 0])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@cached
 def _closer(distance, i, j):  # type: ignore[no-untyped-def]
     if distance[i, 0] != distance[j, 0]:
         return distance[i, 0] < distance[j, 0]
     return distance[i, 1] < distance[j, 1]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@cached
 def _nearest(square, alive, i, distance, neighbour):  # type: ignore[no-untyped-def]
     """Write the two nearest living neighbours of row i."""
     distance[i, :] = np.inf

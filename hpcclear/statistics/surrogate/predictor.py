@@ -5,10 +5,12 @@ not depend on which other designs are in the batch. Numba has no vectorised expo
 the polynomial one of `hpcclear.base.bits` lets LLVM keep these loops in vector registers.
 """
 
+from functools import partial
+
 import numpy as np
-from numba import njit
 
 from hpcclear.base.bits import falling
+from hpcclear.base.cached import cached
 
 REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
@@ -20,20 +22,20 @@ LANES = 8
 """Training points are padded to a multiple of this, so that vectorised loops have no tail."""
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(cached, fastmath={"contract"})
 def gaussian(square: float) -> float:
     """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise."""
     return falling(0.5 * square, STEEPEST)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(cached, fastmath={"contract"})
 def matern(square: float) -> float:
     """Matern 5/2 for the squared distance >= 0, as accurate and as free of branches as `gaussian`."""
     step = np.sqrt(5.0 * square)
     return (1.0 + step + step * step / 3.0) * falling(step, STEEPEST)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(cached, fastmath={"contract"})
 def _squares_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
     """Fill `row` with squared distances over the inputs `dims`, a place against all training points."""
     count = row.size
@@ -46,7 +48,7 @@ def _squares_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-un
             row[i] += step * step
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(cached, fastmath={"contract"})
 def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
     """The same with the squared exponential of these distances."""
     _squares_row(scaled, lengths, dims, coordinates, row)
@@ -54,7 +56,7 @@ def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-unt
         row[i] = gaussian(row[i])
 
 
-@njit(cache=True, error_model="numpy", fastmath=REORDER)
+@partial(cached, fastmath=REORDER)
 def _dot(a, b):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(a.size):
@@ -62,7 +64,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@cached
 def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
     """Kriging means ``level + sum_i weights_i k(x, x_i)``.
 
@@ -92,7 +94,7 @@ def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untype
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@cached
 def matern_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
     """`kernel_sum` with the Matern function of order 5/2; takes and returns the same."""
     dims = np.arange(lengths.size)
@@ -115,13 +117,13 @@ def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return transposed, filled
 
 
-@njit(cache=True, error_model="numpy")
+@cached
 def _multiply(a, b, out):  # type: ignore[no-untyped-def]
     for i in range(out.size):  # written out: an array expression would allocate
         out[i] = a[i] * b[i]
 
 
-@njit(cache=True, error_model="numpy", fastmath=REORDER)
+@partial(cached, fastmath=REORDER)
 def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
     """``out[at + k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -134,7 +136,7 @@ def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
     out[at], out[at + 1], out[at + 2], out[at + 3] = a, b, c, d
 
 
-@njit(cache=True, error_model="numpy", fastmath=REORDER)
+@partial(cached, fastmath=REORDER)
 def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
     """Mean, and variance about it: the difference E[f^2] - E[f]^2 would cancel."""
     mean, variance = 0.0, 0.0
@@ -145,7 +147,7 @@ def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
     return mean, variance
 
 
-@njit(cache=True, error_model="numpy")
+@cached
 def tensor_moments(  # type: ignore[no-untyped-def]
     places, shares, counts, starts, dims, steady, steady_shares, scaled, lengths
 ):

@@ -1,0 +1,198 @@
+"""Springs, stops, cylinders, drag and motors by their curves, in closed form; `test_generated` has them on linkages against the
+dense model."""
+
+import numpy as np
+import pytest
+
+from hpcclear import load_scene, simulate
+from hpcclear.base.errors import InputError
+
+INERTIA, STIFFNESS, START = 2e-3, 0.8, 0.4
+PIN = {"kind": "revolute", "bearing": "ground.o"}
+
+
+def machine(loads, bodies=None, joints=None, drive=None, turns=3, **numerics):
+    """A wheel that turns once a second, and beside it a pendulum whose mass centre is its pin."""
+    wheel = {"mass": 1.0, "inertia": 1e-2, "points": {"o": [0.0, 0.0]}}
+    pendulum = {"mass": 0.5, "inertia": INERTIA, "points": {"o": [0.0, 0.0]}, "start_angle": START}
+    clock = {"kind": "constant-speed", "body": "wheel", "speed": 2 * np.pi}
+    return load_scene(
+        {
+            "format_version": 2,
+            "mechanism": {
+                "kind": "planar",
+                "bodies": {"wheel": wheel, **({"pendulum": pendulum} if bodies is None else bodies)},
+                "joints": {
+                    "wheel_pin": {**PIN, "journal": "wheel.o"},
+                    **({"pivot": {**PIN, "journal": "pendulum.o"}} if joints is None else joints),
+                },
+                "drives": {"clock": clock if drive is None else drive},
+                "loads": loads,
+            },
+            "effects": {"gravity": 0.0},
+            "numerics": {
+                "rtol": 1e-11, "transient_revolutions": 0, "averaged_revolutions": turns, **numerics,
+            },
+            "output": {"instants_per_revolution": 200},
+        }
+    )  # fmt: skip
+
+
+def angle_of(found, body):
+    return found["body_angle"].sel(body=body).to_numpy()
+
+
+def test_a_torsion_spring_swings_with_its_period():
+    spring = {"kind": "torsion-spring", "body": "pendulum", "stiffness": STIFFNESS, "angle": 0.1}
+    found = simulate(machine({"coil": spring}))
+    time = found["time"].to_numpy()
+    expected = 0.1 + (START - 0.1) * np.cos(np.sqrt(STIFFNESS / INERTIA) * time)
+    np.testing.assert_allclose(angle_of(found, "pendulum"), expected, atol=1e-8 * START)
+
+
+def test_a_damped_torsion_spring_loses_what_its_damper_takes():
+    damping = 4e-3
+    spring = {
+        "kind": "torsion-spring", "body": "pendulum", "stiffness": STIFFNESS, "damping": damping,
+    }  # fmt: skip
+    found = simulate(machine({"coil": spring}))
+    time, decay = found["time"].to_numpy(), damping / (2 * INERTIA)
+    w = np.sqrt(STIFFNESS / INERTIA - decay**2)
+    expected = START * np.exp(-decay * time) * (np.cos(w * time) + decay / w * np.sin(w * time))
+    np.testing.assert_allclose(angle_of(found, "pendulum"), expected, atol=1e-8 * START)
+    stored = 0.5 * STIFFNESS * (START**2 - angle_of(found, "pendulum") ** 2)
+    kinetic = found["kinetic_energy"].to_numpy() - found["kinetic_energy"].to_numpy()[0]
+    spin = found["body_spin"].sel(body="pendulum").to_numpy()
+    np.testing.assert_allclose(kinetic, 0.5 * INERTIA * spin**2, atol=1e-10)
+    assert (found["load_work"].to_numpy() <= stored + 1e-10).all()
+
+
+def test_a_stop_shortens_the_swing_behind_it():
+    """A stop at rest: half a period with the spring alone, half with both, amplitudes by the energy."""
+    stop = 3.0
+    spring = {
+        "kind": "torsion-spring", "body": "pendulum", "stiffness": STIFFNESS, "lower": 0.0,
+        "stop_stiffness": stop,
+    }  # fmt: skip
+    found = simulate(machine({"coil": spring}))
+    time = found["time"].to_numpy()
+    free, stopped = np.sqrt(STIFFNESS / INERTIA), np.sqrt((STIFFNESS + stop) / INERTIA)
+    period = np.pi / free + np.pi / stopped
+    phase = (time + np.pi / (2 * free)) % period  # 0 where it leaves the stop
+    deep = START * free / stopped
+    expected = np.where(
+        phase < np.pi / free,
+        START * np.sin(free * phase),
+        -deep * np.sin(stopped * (phase - np.pi / free)),
+    )
+    np.testing.assert_allclose(angle_of(found, "pendulum"), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("acts", ["pulling", "pushing"])
+def test_a_one_sided_spring_lets_go(acts):
+    """A mass on a line, thrown by a spring that only pulls (or pushes), goes on at a constant speed."""
+    mass, stiffness, length, start = 0.3, 500.0, 0.1, 0.12 if acts == "pulling" else 0.08
+    bodies = {"block": {"mass": mass, "points": {"o": [0.0, 0.0]}}}
+    ground = {"points": {"o": [0.0, 0.0], "wall": [0.0, 0.2], "start": [start, 0.2]}}
+    joints = {"rail": {"kind": "slide", "point": "block.o", "line": "ground.start"}}
+    spring = {
+        "kind": "spring", "first": "block.o", "second": "ground.wall", "stiffness": stiffness,
+        "length": length, "acts": acts,
+    }  # fmt: skip
+    scene = machine({"band": spring}, bodies, joints).with_({"mechanism.ground": ground})
+    found = simulate(scene)
+    time, w = found["time"].to_numpy(), np.sqrt(stiffness / mass)
+    quarter = np.pi / (2 * w)
+    swung = (start - length) * np.cos(w * time)
+    expected = np.where(time < quarter, swung, -(start - length) * w * (time - quarter))
+    there = np.abs(expected) < 0.05  # before it is on the other side of the wall
+    moved = found["body_x"].sel(body="block").to_numpy() - length
+    np.testing.assert_allclose(moved[there], expected[there], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "force", [6.0, [[0.05, 6.0], [5.0, 6.0]], [["100 mm", "8 N"], ["300 mm", "4 N"]]]
+)
+def test_a_cylinder_pushes_by_its_stroke(force):
+    """Constant: x = x0 + F t^2/(2 m); falling with the stroke: a swing about where it would be nought."""
+    mass, start = 0.3, 0.1
+    bodies = {"block": {"mass": mass, "points": {"o": [0.0, 0.0]}}}
+    ground = {"points": {"o": [0.0, 0.0], "wall": [0.0, 0.2], "start": [start, 0.2]}}
+    joints = {"rail": {"kind": "slide", "point": "block.o", "line": "ground.start"}}
+    ram = {"kind": "cylinder", "first": "block.o", "second": "ground.wall", "force": force}
+    scene = machine({"ram": ram}, bodies, joints).with_({"mechanism.ground": ground})
+    found = simulate(scene)
+    time = found["time"].to_numpy()
+    moved = found["body_x"].sel(body="block").to_numpy()
+    if isinstance(force, list) and force[0][0] == "100 mm":
+        w = np.sqrt(20.0 / mass)  # 4 N over 0.2 m
+        expected = 0.5 - 0.4 * np.cos(w * time)  # nought at 0.5 m
+        inside = expected < 0.3
+        inside &= time < 2.0 / w
+    else:
+        expected = start + 6.0 * time**2 / (2 * mass)
+        inside = expected < 5.0
+        done = 6.0 * (moved - start)
+        work = found["load_work"].to_numpy()
+        np.testing.assert_allclose(work[inside], done[inside], rtol=1e-8, atol=1e-9)
+    assert inside.sum() > 10
+    np.testing.assert_allclose(moved[inside], expected[inside], rtol=1e-8)
+
+
+def test_a_fan_settles_where_the_motor_and_its_drag_meet():
+    """T (1 - w/w0) = a w + b w^2, of a motor given as a table; with a pull-out behind which it is not."""
+    top, pull_out, fastest, linear, quadratic = 4.0, 100.0, 150.0, 2e-3, 1.5e-4
+    motor = {
+        "kind": "torque", "body": "wheel", "initial_speed": 10.0, "turns": 4,
+        "torque_by_speed": [[0.0, 2.0], [pull_out, top], [fastest, 0.0]],
+    }  # fmt: skip
+    fan = {"kind": "drag", "body": "wheel", "linear": linear, "quadratic": quadratic}
+    found = simulate(machine({"fan": fan}, {}, {}, motor, turns=60))
+    slope = top / (fastest - pull_out)
+    roots = np.roots([-quadratic, -linear - slope, slope * fastest])
+    expected = float(roots[roots > 0.0][0])
+    assert pull_out < expected < fastest
+    assert float(found["crank_speed"][-1]) == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_run_up_by_a_table_takes_its_time():
+    """J dw/dt = T0 + s w between two rows: w = (T0/s) (exp(s t/J) - 1) + w0 exp(s t/J)."""
+    motor = {
+        "kind": "torque", "body": "wheel", "initial_speed": 5.0,
+        "torque_by_speed": [["0 rpm", "2 N m"], ["100 rad/s", "0 N m"]],
+    }  # fmt: skip
+    found = simulate(machine({}, {}, {}, motor, turns=20))
+    time, grown = found["time"].to_numpy(), None
+    grown = np.exp(-0.02 * time / 1e-2)
+    expected = 100.0 * (1.0 - grown) + 5.0 * grown
+    np.testing.assert_allclose(found["crank_speed"].to_numpy(), expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("loads", "key"),
+    [
+        ({"coil": {"kind": "torsion-spring", "body": "wheel", "stiffness": 1.0}}, "loads.coil.body"),
+        ({"coil": {"kind": "torsion-spring", "body": "pendulum", "lower": 0.1}}, "loads.coil.stop_stiffness"),
+        ({"coil": {"kind": "torsion-spring", "body": "pendulum", "other": "nobody"}}, "loads.coil.other"),
+        ({"fan": {"kind": "drag", "body": "ground"}}, "loads.fan.body"),
+        ({"ram": {"kind": "cylinder", "first": "pendulum.o", "second": "ground.o", "force": [[1, 2]]}},
+         "loads.ram.force"),
+        ({"ram": {"kind": "cylinder", "first": "pendulum.o", "second": "ground.o", "force": [[2, 2], [1, 2]]}},
+         "loads.ram.force"),
+    ],
+)  # fmt: skip
+def test_loads_at_fault_are_named(loads, key):
+    with pytest.raises(InputError) as told:
+        simulate(machine(loads))
+    assert told.value.key == f"mechanism.{key}"
+
+
+def test_a_motor_has_one_torque():
+    both = {
+        "kind": "torque", "body": "wheel", "initial_speed": 5.0, "torque": 1.0,
+        "torque_by_speed": [[0.0, 2.0], [100.0, 0.0]],
+    }  # fmt: skip
+    for drive in (both, {k: v for k, v in both.items() if "torque" not in k} | {"kind": "torque"}):
+        with pytest.raises(InputError) as told:
+            machine({}, {}, {}, drive)
+        assert told.value.key == "mechanism.drives.clock.torque"
