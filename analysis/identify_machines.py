@@ -42,11 +42,13 @@ def uniform(path: str, half_width: float) -> dict[str, Any]:
     return {"path": path, "distribution": "uniform", "half_width": half_width}
 
 
-def linkage(name: str, first: str, random: dict[str, Any], changes: dict[str, Any]) -> Any:
+def linkage(name: str, first: str, random: dict[str, Any]) -> Any:
     scene = load_scene(JOBS / "linkages" / f"{name}.toml")
     study = {"seed": 1, "variables": {"C": {"range": [1e-5, 2e-4]}}, "random": random}
     softer = {f"mechanism.joints.{first}.materials.bearing.{k}": v for k, v in SOFT.items()}
-    return scene.with_({"study": study, "numerics.rtol": 1e-5, **softer, **changes})
+    numerics = {"rtol": 1e-5, "averaged_revolutions": 20, "max_steps": 10_000_000}
+    own = {f"numerics.{name}": value for name, value in numerics.items()}
+    return scene.with_({"study": study, **own, **softer})
 
 
 def mechanisms() -> dict[str, dict[str, Any]]:
@@ -61,11 +63,11 @@ def mechanisms() -> dict[str, dict[str, Any]]:
     rocker = linkage("crank_rocker", "o2", {
         "m": normal("mechanism.bodies.rocker.mass", 1.25e-3), "mu": uniform(friction, 0.015),
         "d": uniform("effects.contact.damping", 0.1),
-    }, {})  # fmt: skip
+    })  # fmt: skip
     press = linkage("press", "o3", {
         "m": normal("mechanism.bodies.ram.mass", 7.5e-3), "mu": uniform(friction, 0.009),
         "d": uniform("effects.contact.damping", 0.1),
-    }, {})  # fmt: skip
+    })  # fmt: skip
     drag = {"mechanism.loads.drag": {"kind": "torque", "body": "rocker", "torque": -0.3}}
     return {
         "slider-crank": {

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from commands import overrides, run
 from doc_pages import ROOT
 
 import hpcclear
@@ -15,6 +16,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.identify import training
 from hpcclear.identify.advice import advice, noise_of
+from hpcclear.identify.answer import Wanted
+from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter
 from hpcclear.identify.history import DAY, history, seconds_of
 from hpcclear.identify.inputs import Inputs, Unknown, design
@@ -22,7 +25,7 @@ from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.posterior import sequential
-from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
@@ -117,6 +120,36 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
         Layout.of(Measured("a", Spectrum(np.zeros(9), np.zeros(9), 5), True, SPEED, 9), Sensor((0.0, 40.0)))  # fmt: skip
 
 
+def without_clearance(name: str, *joints: str, **tables: dict[str, str]):
+    """A shipped scene whose joints are ideal, over one revolution."""
+    scene = hpcclear.load_scene(ROOT / "jobs" / name).with_({"study": None})
+    changes = {joint: tables.get(joint.rpartition(".")[2], {"kind": "ideal"}) for joint in joints}
+    return scene.with_({**changes, "effects": {}, "numerics.averaged_revolutions": 1})
+
+
+def test_the_frame_force_is_the_reaction_of_all_masses():
+    rigid = without_clearance("slider_crank.toml", "joints.crank_rod", "joints.rod_slider")
+    response = hpcclear.simulate(rigid)
+    reaction = {"x": response["bearing_x"], "y": response["bearing_y"] + response["guide_force"]}
+    for axis in "xy":
+        size = float(np.abs(reaction[axis]).max())
+        found = series_of(rigid, response, f"frame_force_{axis}")
+        np.testing.assert_allclose(found, -reaction[axis], atol=1e-3 * size)
+
+
+def test_a_point_of_a_linkage_has_an_acceleration():
+    pins = {
+        "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+        "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "rocker.b"},
+    }
+    joints = ("mechanism.joints.o2", "mechanism.joints.o3")
+    rigid = without_clearance("linkages/crank_rocker.toml", *joints, **pins)
+    response = hpcclear.simulate(rigid)
+    found = series_of(rigid, response, "acceleration_x crank.b")
+    expected = -((2.0 * np.pi * 15.0) ** 2) * response["point_x"].sel(point="crank.b")
+    np.testing.assert_allclose(found, expected, atol=1e-3 * float(np.abs(expected).max()))
+
+
 def test_a_sensor_has_a_band_and_a_resonance():
     sensor = Sensor((100.0, 1000.0), resonance=2000.0, quality=10.0)
     response = sensor.response(np.array([0.0, 1000.0, 2000.0]))
@@ -207,6 +240,36 @@ def test_a_signal_that_no_member_has_is_refused_by_its_feature(made):
     assert "harmonic 3 " in prepared.labels[verdict.worst]
 
 
+def test_two_clearances_that_only_their_sum_decides_are_not_identified_separately(scene):
+    pin = scene.resolved()["joints"]["crank_rod"]
+    both = scene.with_({"joints.rod_slider": pin})
+    other = UNKNOWN.replace("crank_rod", "rod_slider")
+    whole = Inputs.of(both, [UNKNOWN, other])
+    inputs = Inputs(whole.unknowns)
+    places = design(1, inputs, 128)
+    total = np.column_stack([places[:, :2].mean(axis=1), np.full(len(places), 0.5)])
+    spectra = spectra_of(total, np.random.default_rng(2))
+    ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
+    measured = Measured("crank_moment", ensemble.spectrum("crank_moment"), True, SPEED, ORDERS)
+    layout = Layout.of(measured, Sensor())
+    truth = np.array([0.5, 0.5])
+    values = machine(ensemble, layout, truth, np.random.default_rng(7))
+    variance = np.full(len(values), 0.5 * 0.05 / 20)
+    prepared = prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 32)
+    found = prepared, [judged(prepared, values, 1, 400)]
+    wanted = Wanted((UNKNOWN, other), (Path("a.csv"),))
+    gains = advice(ensemble, ["crank_moment"], Sensor(), SPEED, 0.1, 1)
+    content = identified_dataset(ensemble, found, np.zeros(1), gains, wanted, 1, {})
+    assert float(content["correlation"][0]) < -0.9
+    assert float(content["expected_correlation"][0, 0]) < -0.7  # the bounds cut errors off
+    assert "correlation of errors -0." in lines(content)[-1].text
+    assert any("not identified separately" in text for text in warnings(content))
+    widths = np.ptp(content["interval"][0].values, axis=1)
+    assert (widths > 3e-5).all()  # each is open, though their mean is known
+    each = content["posterior"][0, :, :2]
+    assert float(each.mean("input").std()) < 0.3 * float(each.std("particle").min())
+
+
 def test_noise_without_a_signal_leaves_the_unknown_open(made):
     ensemble, layout, _ = made
     size = len(layout.labels)
@@ -223,6 +286,24 @@ def test_advice_ranks_more_revolutions_and_less_noise(made):
     assert (widths[1] > widths[0]).all()
     quiet = noise_of(ensemble.spectrum("crank_moment"), 0.1, 512.0)
     assert quiet[0] == pytest.approx(0.25 * quiet[1])
+
+
+def test_amplitudes_and_scatter_have_no_bias_from_noise():
+    """Without a crank angle harmonics have amplitudes only; what noise adds to them and to the scatter is taken off."""
+    rng = np.random.default_rng(4)
+    noise = rng.standard_normal((400, 30, ORDERS + 1, 2)) @ np.array([1.0, 1.0j]) * 0.5**0.5
+    true = np.full(ORDERS + 1, 0.4)
+    found = []
+    for own in noise:
+        measured = Measured("crank_moment", Spectrum.of(true + own), False, SPEED, ORDERS)
+        layout = Layout.of(measured, Sensor(), noise=1.0)
+        found.append(features_of([measured], [layout])[0])
+    means = dict(zip(layout.labels, np.mean(found, axis=0), strict=True))
+    assert means["amplitude of harmonic 5 of crank_moment"] == pytest.approx(0.4, abs=0.03)
+    assert means["harmonics 41 to 51 of crank_moment"] == pytest.approx(0.4 * 11**0.5, rel=0.03)
+    scatter = [value for name, value in means.items() if name.startswith("scatter")]
+    assert max(scatter) < 0.6  # of 1.0 a harmonic before the noise is taken off
+    assert layout.values(Spectrum(true, np.ones(ORDERS + 1), 30))[0][-1] == pytest.approx(5**0.5)  # fmt: skip
 
 
 def test_few_revolutions_enlarge_their_scatter():
@@ -352,6 +433,22 @@ def test_it_resumes_and_ends_with_the_same_bytes(measured, tmp_path, monkeypatch
     xr.testing.assert_identical(first, again)
     with pytest.raises(InputError, match="another run"):
         hpcclear.identify(*words, members=64, output=place)
+
+
+@pytest.mark.mpi
+@pytest.mark.full
+def test_ranks_and_a_kill_change_no_byte(measured, tmp_path):
+    """`pytest -m full tests/test_identify.py`."""
+    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "--signal", str(measured[0]), "--members", "64"]  # fmt: skip
+    words += overrides(*SHORT)
+    files = []
+    for ranks in (0, 2):
+        out = tmp_path / str(ranks) / "identify.nc"
+        out.parent.mkdir()
+        code, printed = run([*words, "-o", str(out)], ranks)
+        assert code in (0, 4), printed
+        files.append(out.read_bytes())
+    assert files[0] == files[1]
 
 
 def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, scene):

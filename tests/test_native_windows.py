@@ -34,6 +34,7 @@ STOPS = [
     "map",
     "wear",
     "effects",
+    "identify",
     "run",
     "accuracy",
 ]  # by their time limit, so that the test is short

@@ -3,7 +3,7 @@
 The folder is this package's alone: of the host process, what Numba keeps where and compiles for what stays as it is.
 
 Before Numba loads machine code it imports its own library for compiled programs: arrays, strings, random numbers, linear
-algebra. That took a third of the start of a command, and code that is compiled already calls none of it. Numba imports it
+algebra. That took a third of the start of a command, and code that is compiled already calls nothing of it. Numba imports it
 itself where it compiles.
 """
 

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -192,9 +193,17 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
         ("objective", f"{study.objective}: {scene.objective.words}"),
     ]
     for variable in study.variables:
-        if variable.range is not None:
+        loads = "" if variable.over is None else f" (load cases, {_over(variable.over)})"
+        if variable.rows:
+            named = ", ".join(row.name for row in variable.rows)
+            rows.append((variable.name, f"{named}: {variable.words}{loads}"))
+        elif variable.values is not None:
+            listed = ", ".join(turning(one, variable.unit) for one in variable.values)
+            rows.append((variable.name, f"{listed}: {variable.words}{loads}"))
+        elif variable.range is not None:
             lower, upper = (turning(end, variable.unit) for end in variable.range)
-            rows.append((variable.name, f"{lower} to {upper}: {variable.words}"))
+            step = "" if variable.step is None else f" by {turning(variable.step, variable.unit)}"
+            rows.append((variable.name, f"{lower} to {upper}{step}: {variable.words}"))
         elif variable.ratio is not None:
             rows.append(
                 (
@@ -224,6 +233,12 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     return rows
 
 
+def _over(over: str | tuple[float, ...]) -> str:
+    """How load cases make one f, in words."""
+    weights = "" if over == "worst" else ", ".join(f"{float(one):g}" for one in over)
+    return f"weights {weights}" if weights else "f of the worst"
+
+
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
     from hpcclear.dynamics.evaluation import evaluate_records
@@ -245,12 +260,15 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         ("run time per sample", f"{each * 1e3:.3g} ms on one core ({DEFAULT_LANES} per batch)"),
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
     ]
-    if scene.study is not None:
-        rows.append(("hpcclear sample", _all(scene.study.samples, each)))
-    if scene.study is not None and scene.study.cases:
-        from hpcclear.study.extent import samples_of
+    if scene.study is None:
+        return rows
+    whole = 0
+    if scene.study.cases:
+        from hpcclear.study.forecast import expected
 
-        whole = sum(samples_of(scene).values())
+        whole, each = expected(scene, partial(evaluate_records, scene), each)
+    rows.append(("hpcclear sample", _all(scene.study.samples, each)))
+    if whole:
         rows.append(("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear plan"))
     return rows
 

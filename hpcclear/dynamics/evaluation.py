@@ -26,7 +26,7 @@ def evaluator_of(
 def evaluate_records(
     scene: Scene, points: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = ()
 ) -> Records:
-    """Simulate all points here and now, by replicas beside them (`Evaluator`) if requested; records in the points' order (n,)."""
+    """Simulate all points at once, with replicas (`Evaluator`) if requested; records in the points' order (n,)."""
     evaluator = evaluator_of(scene, points, lanes, perturbations)
     evaluator.submit(np.arange(len(points)), points.values)
     done = []

@@ -31,7 +31,7 @@ CACHE_OF_A_VECTOR = 12 * 1024
 parameters do not fit."""
 
 LEAST_LANES = 16
-"""Shorter loops the compiler does not vectorise where it must ask at run time whether arrays overlap."""
+"""Shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap."""
 
 
 def default_lanes() -> int:
@@ -88,9 +88,9 @@ TIGHTEST = 1e-14
 """Tolerance of a copy at least: beyond it all is rounding."""
 
 COVERAGE = 1.7
-"""Stated uncertainty over how far the farthest copy is; `analysis/uncertainty.py` tells how often it holds and how wide it is.
-Copies no stricter than the sample would add errors of their own where its motion is nearly regular: limits that hold as often
-were up to 12 times the error there."""
+"""Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
+holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: equally reliable
+intervals were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this

@@ -133,7 +133,7 @@ def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
 
 def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: Any) -> Array:
     """Energy stored in the contacts at `places`, J, (t,); parameters (PARAMETERS,) or (t, PARAMETERS), gaps and contact flags
-    (t, places): under latched laws a penetration counts only while in contact."""
+    (t, places): under `latched` laws a penetration counts only while in contact."""
     table = scene.effects.contact
     if table is None or not len(places):
         return np.zeros(len(gaps))

@@ -338,7 +338,7 @@ class PrescribedSamples:
 
 
 def _outcomes(problem: Problem, par: Array) -> Array:
-    """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, no contact, and no work, of which one response tells."""
+    """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, contact or work, which only a response has."""
     rows = np.zeros((len(par), at.OUT))
     revolutions = problem.transient + problem.averaged
     rows[:, at.OUT_SPREAD] = 0.0 if problem.averaged > 1 else np.nan

@@ -44,7 +44,7 @@ class Effects(NamedTuple):
 
     @property
     def latched(self) -> Any:
-        """Whether the normal force's law requires the impact speed, which is latched."""
+        """Whether the normal force's law requires the impact speed, which is `latched`."""
         return None if self.contact is None else self.contact.latched
 
     @property
@@ -237,7 +237,7 @@ _PROFILES, MEASURES, _SUMMED = (
 )
 INTEGRATED = (*GAPS, *MEASURES, *_SUMMED, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
-The explicit and implicit steppers, the books of a lane and its outcome read this."""
+The explicit and implicit steppers, the sums of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 
@@ -426,7 +426,7 @@ JOINTS = tuple(
 
 
 class Block(NamedTuple):
-    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books.
+    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, sums.
 
     `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
 
@@ -458,7 +458,7 @@ class Method(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What a stepper has to know of the effects, as numbers 0 and 1: none of them has it compiled anew."""
+    """What a stepper has to know of the effects, as numbers 0 and 1: they change no compiled code."""
 
     latched: Any  # impacts are located, and their speed is kept
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution

@@ -70,7 +70,7 @@ class Problem:
     atol: tuple[float, ...]
     """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
     impact_floor: float
-    """Least latched impact speed, m/s."""
+    """Least `latched` impact speed, m/s."""
     transient: int
     averaged: int
     max_steps: int
@@ -130,7 +130,7 @@ class Problem:
 
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
         """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
-        their starts (m), or were torn through."""
+        their starts (m), or were penetrated too deep."""
         p, failed = Parameters(par), start.failed
         outcome.status[failed != Status.OK] = failed[failed != Status.OK]
         torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)

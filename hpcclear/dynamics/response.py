@@ -1,5 +1,7 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -149,7 +151,7 @@ def simulate(
         | _reason(scene),
         objective,
         labels,
-        (_dimensions(scene) or {}) | counted,
+        {**(_dimensions(scene) or {}), **counted},
     )
 
 
@@ -256,7 +258,7 @@ def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Ar
 
 def _measured(
     scene: Scene, recording: Recording, turns: Turns, data: dict[str, Array]
-) -> dict[str, Array]:
+) -> dict[str, Any]:
     """Measures of impact and noise of the averaged revolutions, and the coordinates that go with them."""
     problem = recording.problem
     periods, integrals = turns.averaged(problem.transient)
@@ -264,7 +266,7 @@ def _measured(
     joints = len(scene.joint_labels)
     first = problem.transient + 1
     return {
-        "revolution": np.arange(first, first + len(periods)),
+        "revolution": np.arange(float(first), first + len(periods)),
         **measured(periods, integrals, cycle, joints, rigid=not scene.modes),
         **spectral(data, periods, scene.output.instants_per_revolution),
     }

@@ -79,13 +79,13 @@ def _expected(
     measured = Measured(name, typical, True, frequency, ORDERS)
     layout = Layout.of(measured, sensor)
     features, _ = members_of(ensemble, [layout], sensor, frequency)
-    noise = layout.values(typical)[1]
+    noise = layout.values(typical, measured=True)[1]
     rng = np.random.default_rng([seed, 0x6164])
     choice = Choice.of(features, noise)
     seen_features = features + rng.standard_normal(features.shape) * np.sqrt(noise)
     kept = predictable(ensemble.places, choice.scores(seen_features), rng)
     choice = choice.only(kept)
-    scores = choice.scores(seen_features) / np.sqrt(choice.information)
+    scores = choice.scores(seen_features) / np.sqrt(np.maximum(choice.information, 1e-12))
     unknowns = ensemble.inputs.unknowns
     truth = ensemble.places[:, : len(unknowns)]
     errors = [truth - _cross_validated(scores, truth, penalty) for penalty in PENALTIES]

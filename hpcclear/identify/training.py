@@ -123,8 +123,8 @@ def simulated(
         known = None if checkpoint is None else checkpoint.load_stage(stage)
         if known is None:
             rows = variants[first : first + CHUNK]
-            told = partial(spectra, names=tuple(names))
-            found = responses_of(scene, rows, told, shape, ranks, "ensemble")[:, 0]
+            reduced = partial(spectra, names=tuple(names))
+            found = responses_of(scene, rows, reduced, shape, ranks, "ensemble")[:, 0]
             known = {"spectra": found}
             if checkpoint is not None:
                 checkpoint.save_stage(stage, known)

@@ -12,6 +12,10 @@ HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
 
 
+TIGHTENED = 3
+"""Inputs that are named as those to tighten first."""
+
+
 def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
     they are not known."""
@@ -43,6 +47,24 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
         "tolerances",
         f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}",
     )
+    prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
+    if len(rows) > 1:
+        yield Line("tighten first", _first(list(map(str, names)), *falls, prices))
+
+
+def _first(names: list[str], falls: np.ndarray, errors: np.ndarray, prices: np.ndarray) -> str:
+    """Which inputs to tighten first, three at most: those that bring most, or most for what it costs where that is known."""
+    brings = falls > HALF_WIDTH * errors
+    known = prices.size and bool((prices[brings] > 0.0).all())
+    merit = falls / np.where(prices > 0.0, prices, 1.0) if known else falls
+    chosen = [k for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED]
+    if not chosen:
+        return "none: no single input makes a significant part of the scatter"
+    left = 1.0 - (1.0 - (1.0 - falls[chosen]) ** 2).sum()  # variances of inputs add up
+    together = 1.0 - np.sqrt(max(left, 0.0))
+    listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
+    text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "
+    return text + f"{together:.0%}" + (", most for its cost" if known else "")
 
 
 def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:

@@ -248,6 +248,14 @@ class Study(Moving, Table):
                             key=f"cases.{case.name}.{table}.{k}.formula",
                             value=goal.formula,
                         )
+                if goal.of is not None and goal.of != self.objective:
+                    why = self._not_recorded(goal.of)
+                    if why:
+                        raise invalid(
+                            why, f"Make it study.objective, and name {self.objective!r} in `of` in its place",
+                            key=f"cases.{case.name}.{table}.{k}.of", value=goal.of,
+                        )  # fmt: skip
+                    goal.placed(2 + self.further.index(goal.of))
                 if goal.statistic == "cost":
                     priced = tuple(one for one in self.variables if one.name in own and one.priced)
                     if not priced:
@@ -257,6 +265,22 @@ class Study(Moving, Table):
                             key=f"cases.{case.name}.{table}.{k}.statistic",
                         )
                     goal.priced_by(priced)
+
+    @property
+    def further(self) -> Names:
+        """Responses besides its objective that objectives and constraints of cases are of."""
+        asked = (goal.of for case in self.cases for goal in (*case.goals, *case.kept))
+        return tuple(dict.fromkeys(one for one in asked if one not in (None, self.objective)))  # type: ignore[arg-type]
+
+    @staticmethod
+    def _not_recorded(name: str) -> str:
+        """Why samples of a study do not record a response besides its objective; "" if they do."""
+        found = OBJECTIVES.get(name)
+        if found.rate is not None:
+            return "is made of a rate, and a simulation integrates that of its own objective only"
+        if "objective" in found.asks:
+            return "is made of the mean gap, which samples with another objective do not keep"
+        return ""
 
     def _check_names(self) -> None:
         of_loads = [one.name for one in self.variables if one.over is not None]

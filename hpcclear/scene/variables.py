@@ -222,7 +222,7 @@ class Variable(NamedInput):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Rows of a catalogue or of fits; none of other variables."""
+        """Rows of a catalogue or of fits; empty for other variables."""
         if self.fits is not None:
             return choices.rows_of_fits(self.fits, self.follows)
         return self.catalogue or ()
@@ -246,7 +246,7 @@ class Variable(NamedInput):
 
     @cached_property
     def options(self) -> tuple[float, ...] | None:
-        """All that its column may be, in rising order; None of a variable that is continuous."""
+        """All that its column may be, in rising order; None for a continuous variable."""
         if self.rows:
             return tuple(map(float, range(len(self.rows))))
         if self.step is not None:

@@ -20,7 +20,7 @@ Extent = Callable[[Scene, int | None], tuple[int, float]]
 
 
 def certify(run: StudyRun, extent: Extent) -> None:
-    """Simulate with effects on and off, each design of it kept by itself; write effects.nc and tell what can be left out.
+    """Simulate with effects on and off, each design of it kept by itself; write effects.nc and report what can be left out.
 
     Parameters
     ----------

@@ -70,13 +70,13 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
     ----------
     run : StudyRun
     known : mapping of case to arrays
-        Sampling coordinates (n, d), what the case makes small (n, goals), what steers to its constraints (n,).
+        Sampling coordinates (n, d), what the case makes small (n, objectives), what steers to its constraints (n,).
 
     Returns
     -------
     dict of arrays
-        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that significantly
-        break a constraint left out.
+        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is not the case's), without
+        those that significantly break a constraint.
     """
     found: list[Choice] = []
     for case in cases_of(run.study):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hpcclear.base.arrays import Records
+from hpcclear.base.arrays import Array, Records
 from hpcclear.base.outcome import Status
 from hpcclear.scene.points import Points
 from hpcclear.scene.variables import Variable
@@ -16,19 +16,24 @@ def at_all(loads: Variable, points: Points) -> Points:
     return Points(points.names, values, points.paths)
 
 
-def combined(records: Records, over: str | tuple[float, ...] | None, cases: int) -> Records:
-    """A record for each design, (n,), of those at its load cases, (n * cases,): the one with the largest objective, whose place
-    is taken by the mean where there are weights. One that failed counts as failed."""
-    table = records.reshape(-1, cases)
+def combined(records: Records, responses: Array, loads: Variable) -> tuple[Records, Array]:
+    """A record for each design, (n,), of those at its load cases, (n * cases,), and its responses, (k, n), of theirs.
+
+    Each response is the largest or the weighted mean of the load cases; the record is that with the largest objective, whose
+    place is taken by what is made of them. A design that failed at one of them counts as failed.
+    """
+    cases = len(loads.options or ())
+    table, each = records.reshape(-1, cases), responses.reshape(len(responses), -1, cases)
     failed = table["status"] != Status.OK
-    values = np.where(failed, np.inf, table["objective"])
-    values = np.where(np.isnan(values), np.inf, values)
-    rows = np.arange(len(table))
-    found: Records = table[rows, values.argmax(axis=1)].copy()
-    if over is not None and over != "worst":
-        weights = np.array(over, dtype=float)
-        mean = table["objective"] @ (weights / weights.sum())
-        found["objective"] = np.where(failed.any(axis=1), found["objective"], mean)
+    values = np.where(failed | np.isnan(each[0]), np.inf, each[0])
+    found: Records = table[np.arange(len(table)), values.argmax(axis=1)].copy()
+    if loads.over == "worst":
+        made = each.max(axis=2)
+    else:
+        weights = np.array(loads.over, dtype=float)
+        made = each @ (weights / weights.sum())
+    made = np.where(failed.any(axis=1), np.nan, made)
+    found["objective"] = np.where(failed.any(axis=1), found["objective"], made[0])
     found["flags"] = np.bitwise_or.reduce(table["flags"], axis=1)
     found["rhs_evaluations"] = table["rhs_evaluations"].sum(axis=1)
-    return found
+    return found, made

@@ -3,7 +3,7 @@
 Of a probability of 1e-4 a hundred thousand samples show ten. Where a constraint allows less than `RARE`, designs that plain
 samples do not decide are sampled where they fail (`hpcclear.statistics.random.importance`), for all of them at once; longer and
 longer while a verdict is open and `most_samples` allows. A few of their draws are taken again at a stricter tolerance, and what
-that changes is part of the limits. Where plain and weighted samples contradict each other, both count.
+that changes is part of the interval. Where plain and weighted samples contradict each other, both count.
 """
 
 from collections.abc import Generator, Sequence
@@ -79,7 +79,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
-    """Limits by weighted samples in place of those by plain ones; both together where they do not meet."""
+    """Intervals by weighted samples in place of those by plain ones; both together where they do not meet."""
     lower, upper = (true[name][row, column] for name in names)
     apart = one.lower > upper or one.upper < lower
     ends = (min(one.lower, lower), max(one.upper, upper)) if apart else (one.lower, one.upper)
@@ -173,14 +173,15 @@ def _together(
         fresh = {}
         for k, part in zip(wanted, parts, strict=True):
             try:
-                fresh[k] = going[k].send(part)
+                fresh[k] = going[k].send(part[max(asked[k].goal.place - 1, 0)])
             except StopIteration:
                 continue
         wanted = fresh
 
 
 def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
-    """f of designs at standard normals, (n,) each; NaN where it failed, or where inputs so far out make no mechanism."""
+    """Responses of designs at standard normals, (k, n) each: f, and `Study.further`; NaN where it failed, or where inputs so
+    far out make no mechanism."""
     rows = [rows_of(run, choice, u) for choice, u in where]
     makes = [_valid(run, names, values) for names, values in rows]
     batches = [
@@ -189,14 +190,14 @@ def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) 
     ]
     values = np.concatenate([one.values for one in batches])
     points = Points(batches[0].names, values, batches[0].paths)
-    f = np.empty(0)
+    f = np.empty((1 + len(run.study.further), 0))
     if len(values):
-        f = run.simulations.objective(run.simulations.records(points, stage))
-    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1])
+        f = run.simulations.judged(points, stage)[1]
+    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1], axis=1)
     found = []
     for good, part in zip(makes, parts, strict=True):
-        whole = np.full(len(good), np.nan)
-        whole[good] = part
+        whole = np.full((len(f), len(good)), np.nan)
+        whole[:, good] = part
         found.append(whole)
     return found
 

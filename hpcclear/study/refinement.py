@@ -1,6 +1,6 @@
 """The front by direct simulation: the swarm's designs and others are simulated, and where it is decided, more.
 
-A surrogate of f that is good to a percent is no judge of deviations that differ by less: the swarm
+A surrogate of f that is good to a percent is no judge of standard deviations that differ by less: the swarm
 finds what its errors flatter. So its designs are only where the search begins. Every design here
 is simulated; models of the moments themselves say where to look next, until some rounds
 win nothing or all are spent.
@@ -57,11 +57,11 @@ class Tried:
         Design variables.
     coordinates : array, shape (n, d)
         Sampling coordinates.
-    values : array, shape (n, goals)
+    values : array, shape (n, objectives)
         What its case makes small: mean and standard deviation, if nothing else is requested.
     excess : array, shape (n,)
         By how much its constraints are broken (`hpcclear.study.goals.steered`).
-    errors : array, shape (n, goals)
+    errors : array, shape (n, objectives)
         Standard errors of the values.
     """
 
@@ -96,7 +96,7 @@ def length(study: Study) -> int:
 
 
 def by_statistics(study: Study, r2: float) -> bool:
-    """Whether statistics over designs are modelled in place of f: as the study requires, or where a surrogate of f has less than
+    """Whether statistics over designs are modelled in place of f: if the study says so, or if a surrogate of f has less than
     `ROUGH` on fresh points."""
     asked = study.surrogate.of
     return not r2 >= ROUGH if asked is None else asked == "statistics"
@@ -257,7 +257,7 @@ def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
 
 
 def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
-    """Cases, designs (NaN where a variable is none of the case's), what they make small, by how much they break constraints."""
+    """Cases, designs (NaN where a variable is not the case's), what they make small, by how much they break constraints."""
     names = run.study.optimisation
     most = most_of(run.study.cases)
     if not choices:
@@ -325,7 +325,7 @@ def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
 
 
 def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
-    """What each new design wins over each old one, (old, new, goals): relative, or as it is."""
+    """What each new design wins over each old one, (old, new, objectives): relative, or as it is."""
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.sign(old[:, None]) * (1.0 - new / old[:, None])
     return np.asarray(np.where(relative, shares, old[:, None] - new))

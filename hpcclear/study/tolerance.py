@@ -1,9 +1,9 @@
-"""What the tolerance of the integration does to verified designs: part of all their intervals, and of an accuracy that is requested.
+"""Effect of the integration tolerance on verified designs: part of all their intervals, and of a requested accuracy.
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
-tolerance does. That is added to all limits of the case. Where a study asks for an accuracy (`study.accuracy`), the samples have
-to meet what it leaves; elsewhere pairs take no more than `COST` of the study.
+tolerance does. That is added to all confidence intervals of the case. With `study.accuracy`, the samples have to meet what it
+leaves; elsewhere pairs take no more than `COST` of the study.
 
 Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
 variance of paired samples).
@@ -40,13 +40,13 @@ ROOM = 0.75
 """Share of an accuracy from which on the tolerance dominates: the samples then have to meet the accuracy by themselves."""
 
 COST = 0.02
-"""Of a study's simulations that pairs may take where no accuracy is asked, beyond the first of them."""
+"""Of a study's simulations that pairs may take where no accuracy is requested, beyond the first of them."""
 
 DRAWS = 16
 """Of independent draws pairs are made of one in so many, and of so many at least."""
 
 NOTHING = 1e-9
-"""Share of the mean below which a deviation is round-off."""
+"""Share of the mean below which a standard deviation is round-off."""
 
 Taken = tuple[Array, Array]
 """Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
@@ -78,13 +78,13 @@ def stricter(scene: Scene) -> tuple[Scene, float]:
 
 
 def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """What `truth.results_of` returns, with what the tolerance takes in all limits.
+    """What `truth.results_of` returns, with what the tolerance takes in all confidence intervals.
 
     Returns
     -------
     dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and standard deviation of the designs of
-        its case, at worst, relative; and to what standard error that is known.
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): largest relative error of mean and standard deviation by the
+        tolerance, of the designs of its case; and its standard error.
     """
     made = truth.begun(run, designs) if run.study.paired else truth.made(run, designs)
     taken: dict[int, Taken] = {}
@@ -146,9 +146,9 @@ def _sequences(
     made: Sequence[Array],
     rows: Sequence[int],
 ) -> dict[int, Array]:
-    """Points of each scrambling of some designs at the stricter tolerance, (2, replicates, values) each."""
+    """Points of each replicate of some designs at the stricter tolerance, (k, replicates, values) each."""
     asked = HIDDEN * np.array([run.study.wanted.mean, run.study.wanted.deviation])
-    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
+    strict = [truth.nothing(run)] * len(designs)
     open_, length = list(rows), _first(min(made[k].shape[2] for k in rows))
     _, left = stricter(run.scene)
     most = np.inf if run.study.paired else COST * run.simulations.next
@@ -167,16 +167,16 @@ def _sequences(
 
 
 def _known(run: StudyRun, choice: Choice, made: Array, strict: Array, left: float) -> Taken:
-    """What the tolerance takes of a design, from values (2, replicates, n) and the first of them at the stricter one."""
+    """What the tolerance takes of a design, from values (k, replicates, n) and the first of them at the stricter one."""
     _, replicates, length = strict.shape
-    bias, error = _apart(run, choice, made[0][:replicates, :length], strict[0])
+    bias, error = _apart(run, choice, made[:, :replicates, :length], strict)
     bias, error = bias / (1.0 - left), error / (1.0 - left)
     # a bias that chance may have made counts for nothing
     return np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0))), error
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (k, replicates, n), and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
     one, other = (
         truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
@@ -200,7 +200,7 @@ def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
 def _widened(
     run: StudyRun, designs: Sequence[Choice], true: Result, taken: dict[int, Taken]
 ) -> Result:
-    """All limits with what the tolerance takes, the worst of the ends of a case for all its designs."""
+    """All intervals with what the tolerance takes, the worst of the ends of a case for all its designs."""
     true["tolerance"], true["tolerance_error"] = np.zeros((2, len(designs), 2))
     for k, choice in enumerate(designs):
         ends = [one for row, one in taken.items() if designs[row].case == choice.case]

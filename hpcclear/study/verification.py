@@ -140,8 +140,8 @@ def _name_case(
 
 
 def _nearest(rows: Sequence[int], standing: Array, broken: Array) -> list[int]:
-    """Of some designs those that significantly satisfy all constraints; if none does, those that may, first those whose estimates do;
-    else the one that comes nearest. `standing`, `broken`: the worst standing and excess of all designs, (n,)."""
+    """Designs that significantly satisfy all constraints; if none does, those that may, first those whose estimates do; else
+    the nearest one. `standing`, `broken`: the worst standing and excess of all designs, (n,)."""
     best = min((standing[k] for k in rows), default=np.nan)
     level = [k for k in rows if standing[k] == best]
     if best == Standing.KEPT or not level:
@@ -165,7 +165,7 @@ def _on_bounds(run: StudyRun, choice: Choice) -> str:
 
 
 def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
-    """What cases make small and keep, with confidence intervals, in words and numbers; empty where all require mean and standard deviation."""
+    """Objectives and constraints of the cases with confidence intervals; empty if all have mean and standard deviation only."""
     if all(case.plain for case in run.study.cases):
         return {}
     unit, data = run.scene.objective.unit, {}

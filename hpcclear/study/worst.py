@@ -135,7 +135,7 @@ def _largest(f: Array) -> float:
 def _simulated(run: StudyRun, choices: Sequence[Choice], places: Sequence[Array]) -> list[Array]:
     """f of designs at points of the unit box, (n, d) each."""
     where = [(one, _normals(run, one, place)) for one, place in zip(choices, places, strict=True)]
-    return rare.simulated(run, where, "worst")
+    return [responses[0] for responses in rare.simulated(run, where, "worst")]
 
 
 def _normals(run: StudyRun, choice: Choice, places: Array) -> Array:

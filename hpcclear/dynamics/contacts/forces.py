@@ -126,7 +126,7 @@ def store_rate(flag, work, row, value, i, W):
 
 @lane_function
 def switched(latched, force, active):
-    """A latched contact is on or off for a whole step, so that a step ends exactly at an impact."""
+    """A `latched` contact is on or off for a whole step, so that a step ends exactly at an impact."""
     if latched is not None:
         return force * active
     else:

@@ -73,7 +73,7 @@ def fit_to_ramp(par, lane, W, m, i, settings):
     """Relative tolerance of implicit steps and reach of the Jacobian's differences: both keep well within friction's ramp.
 
     Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
-    and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
+    and every step would begin off the slow motion and end at a kink. A looser one costs more. A difference taken across the
     ramp's end would hide its slope. A film is squeezed as slowly where it carries: an error of that speed would be one of all
     forces, and the energy balance would not close.
     """

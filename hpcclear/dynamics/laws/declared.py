@@ -37,7 +37,7 @@ VARYING = {
     "friction": {"speed": "m/s", "force": "N", "deflection": "m", "deflection_rate": "m/s"},
 }
 """What varies from instant to instant, by the kind of law, with units: penetration, its rate, the rate at the start of this
-contact (a law that requires it is latched) and one over it; the sliding speed, the normal force, and the deflection of
+contact (a law that requires it is `latched`) and one over it; the sliding speed, the normal force, and the deflection of
 bristles with its rate."""
 
 
@@ -171,6 +171,8 @@ class Geometry:
     """Half of the angle over which the surfaces touch, rad, of depth and force."""
     has_length: bool = False
     """Whether the bearing's length is needed."""
+    of_rows: Function | None = None
+    """From the rows of a table (depth in m, force in N) in the scene to the geometry that they make; None: it has no table."""
     name: str = ""
 
 
@@ -195,7 +197,7 @@ class ContactLaw(Law):
     exponent: Function | None = None
     """Of the depth in the elastic part, near a depth; by default by differences."""
     damping: Function | None = None
-    """Factor of the rate (latched: of the rate over the impact speed), s/m or 1; by default by differences."""
+    """Factor of the rate (`latched`: of the rate over the impact speed), s/m or 1; by default by differences."""
     deepest: Function | None = None
     """Depth beyond which a result is flagged, m; by default where theories of small contacts end (`parameters.HERTZ_RANGE`)."""
     without_loss: str = ""

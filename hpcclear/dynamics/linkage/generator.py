@@ -379,7 +379,7 @@ class _Generator:
         return coupled(moving, factored, found) if moving else found
 
     def _passed(self, block: list[int]) -> dict[int, list[int]]:
-        """Multipliers of pins in a free linkage, which may fold flat, with those of the same pin.
+        """Multipliers of pins in a free linkage, which may become singular, with those of the same pin.
 
         What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
         """

@@ -38,7 +38,7 @@ OF_CONTACTS = (
 
 
 def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
-    """Largest moment of the drive (N m), deviation of the followed acceleration (m/s2) and its largest size, of samples (m, 3).
+    """Samples (m, 3): largest torque of the drive (N m), standard deviation and largest size of followed acceleration (m/s2).
 
     NaN of those that do not turn, and where nothing is followed.
     """

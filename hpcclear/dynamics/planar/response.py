@@ -184,7 +184,7 @@ def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Any]:
 
 
 def contacts_on(scene: Scene, contacts: Array) -> Array:
-    """Whether a penetration of each open joint counts, (t, joints): under latched laws only while in contact."""
+    """Whether a penetration of each open joint counts, (t, joints): under `latched` laws only while in contact."""
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     joints = list(scene.open_places)
     return contacts[:, joints] if latched else np.ones((len(contacts), len(joints)))

@@ -58,7 +58,7 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
     return tuple(
-        joint.without_play if isinstance(joint, Loose) else joint for joint in mechanism.joints
+        joint.without_clearance if isinstance(joint, Loose) else joint for joint in mechanism.joints
     )
 
 
@@ -134,7 +134,7 @@ def _narrowest(walk: Passage) -> Node | None:
 
 
 def _closes(assembly: Assembly, walk: Passage, node: Node) -> bool:
-    """Whether the loops close at a pose where they change branch, to rounding: else they pass beside it, too near to tell."""
+    """Whether the loops close, to rounding, at a pose where they change branch; else they pass very near to it."""
     ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time]))
     error = np.abs(assembly.loops.at(q, v, node.time).error).max()
     return bool(error <= CLOSED * np.abs(q).max())

@@ -1,4 +1,4 @@
-"""An irregular motion's mean: perturbed copies at two tolerances, as many revolutions as its limits take."""
+"""An irregular motion's mean: perturbed copies at two tolerances, as many revolutions as its interval needs."""
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -57,15 +57,15 @@ FIRST = 4, 6
 
 MEMORY, LONG_MEMORY = 3.0, 10.0
 """Revolutions over which a start that differs from the steady motion by the scatter of one may still be felt, unseen in what
-copies scatter by; longer with a latched damping or a free crank. On six of nine scenes whose limits had missed the mean,
+copies scatter by; longer with a `latched` damping or a free crank. On six of nine scenes whose intervals had missed the mean,
 means of the first 24 revolutions were off by 1 to 12 of them times that scatter: by memory, or by what weak chaos makes of a
-tolerance. Limits are widened by it as far as the target allows: no revolution is simulated for what cannot be seen."""
+tolerance. Intervals are widened by it as far as the target allows: no revolution is simulated for what cannot be seen."""
 
 LASTING = 40
 """Segments before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
 
 APPROACH = 0.85
-"""Revolutions until the next look over those that seem to be needed: limits scatter, and what is too much is not undone."""
+"""Revolutions until the next look over those that seem to be needed: intervals scatter, and what is too much is not undone."""
 
 LEAST = 0.05
 """Revolutions until the next look over those so far, at least: each look is another chance to stop too early."""
@@ -122,7 +122,7 @@ class _Interval:
 def ensemble(
     effort: Effort, target: float, rtol: float, growth: float
 ) -> Generator[Segment, Outcome, Mean]:
-    """Go on with copies from perturbed starts until the confidence interval of their mean is narrow enough, or the budget is spent."""
+    """Simulate perturbed copies until the confidence interval of their mean is narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
     segments, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
@@ -159,7 +159,7 @@ def ensemble(
 
 
 def _first(sample: Sample, growth: float) -> int:
-    """Segments before the first look: fewer if perturbations grow fast, unless a speed or a latched damping lasts longer."""
+    """Segments before the first look: fewer if perturbations grow fast, unless a speed or a `latched` damping lasts longer."""
     if sample.free or sample.latched or not growth > 0.0:
         return FIRST[1]
     parting = -np.log(PERTURBATION) / growth

@@ -8,10 +8,10 @@ from hpcclear.base.arrays import Array
 
 LEVEL = 0.97
 """Of intervals that are called 95 %: a mean is looked at until its interval is narrow enough, and each look is
-one more chance to stop on limits that are too narrow."""
+one more chance to stop on intervals that are too narrow."""
 
 PARTS = 8
-"""Of a copy's segments, at most, whose scatter tells that of its mean: each as long as it can be."""
+"""Of a copy's segments, at most, whose scatter gives that of its mean: each as long as it can be."""
 
 APART = 1.5
 """Variance between means of copies over that which their parts explain, from which on it alone counts."""
@@ -117,7 +117,7 @@ def student(values: Array) -> tuple[float, float, float]:
 
 
 def quantile(freedom: float, level: float) -> float:
-    """Of Student's distribution with so many degrees of freedom: half-width of limits over the standard error."""
+    """Of Student's distribution with so many degrees of freedom: half-width of an interval over the standard error."""
     # here, as it is loaded for a quarter of a second that a first result need not wait
     from scipy.special import stdtrit
 
@@ -161,7 +161,7 @@ def projected(gaps: Array) -> Array:
 
 
 def spin_up(series: Array, noise: float = 0.0) -> int:
-    """Values at the start of a series (n,) to leave out, at most half of them: those that widen the confidence interval of its mean.
+    """Values at the start of a series (n,) to leave out, at most half: those that widen the confidence interval of its mean.
 
     MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601); the
     first that makes it nearly so, since in noise the least is anywhere. No cut makes the scatter of what is left less than

@@ -33,7 +33,7 @@ PATIENCE = 16
 
 SWINGS = 2.0
 """What an average may still be off by, over the larger of its two latest movements: an approach that swings, or slows down
-as a slower one takes over, comes to a rest for a quarter and goes on. Limits that knew the last movement alone missed by
+as a slower one takes over, comes to a rest for a quarter and goes on. Intervals from the last movement alone missed by
 up to nine times their width."""
 
 TOLERANCES = 10.0
@@ -42,7 +42,7 @@ TOLERANCES = 10.0
 ORBITS, COARSE = 6e-3, 3e-3
 """Likewise, relative, with a damping that keeps the impact speed, where the target is no stricter than the second: at the
 tolerances that serve it all copies may be caught by one orbit of several. Of 40 such scenes four had means that were off by
-0.1 to 0.6 % so. As with irregular motions, what is unseen widens stated limits as far as the target allows and buys no
+0.1 to 0.6 % so. As with irregular motions, what is unseen widens stated intervals as far as the target allows and buys no
 revolution."""
 
 

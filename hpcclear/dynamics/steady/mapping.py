@@ -125,7 +125,7 @@ def _set_back(start: Start, shadow: Start, scale: Array) -> tuple[Array, Start]:
 
 
 def _exponent(logs: Array) -> tuple[float, float]:
-    """Mean and half-width of its confidence interval, of logarithms (revolutions, copies): copies times four segments of revolutions."""
+    """Mean and half-width of its confidence interval, of logarithms (revolutions, copies) in four segments of each copy."""
     pieces = np.concatenate([piece.mean(axis=0) for piece in np.array_split(logs, 4)])
     mean, _, limit = judging.student(pieces)
     return mean, limit

@@ -13,7 +13,7 @@ off by 1 %, more than their difference from 1e-5."""
 
 
 def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Segment, Outcome, Mean]:
-    """Find the steady mean of a design to a relative error, 95 % confidence intervals, or say that it is missed or does not exist.
+    """Find the steady mean of a design to a relative error (95 % CI), or report that it is missed or does not exist.
 
     Parameters
     ----------

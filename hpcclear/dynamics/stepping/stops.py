@@ -31,7 +31,7 @@ LONG_AT_REST = 1e3
 def meet_impact(lane, W, work, settings, p):
     """Where in this step joint p, in flight, strikes, as a fraction; 2 if it does not or is in contact, 1 if at the end.
 
-    At the start of the step the contact is latched here.
+    At the start of the step the contact is `latched` here.
     """
     if work[(at.ACTIVE + p) * W + lane] == 1.0:
         return 2.0

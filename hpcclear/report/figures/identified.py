@@ -116,7 +116,7 @@ def growth_figure(content: xr.Dataset) -> "Figure":
         if "limit" in content.attrs:
             limit = scale.factor * float(content.attrs["limit"])
             panel.axhline(limit, color=style.PALETTE["orange"], ls="--", label="limit")
-        panel.set_xlabel("days since the first record")
+        panel.set_xlabel("time since the first record (days)")
         panel.set_ylabel(scale.label(str(content["unknown"].to_numpy()[u])))
         panel.legend(loc="best")
     style.settle(axes)

@@ -206,10 +206,7 @@ def _design(one: xr.Dataset) -> dict[str, Any]:
 
 def _values(one: xr.Dataset) -> list[list[str]]:
     """Design variables with units; those the case does not have are left out."""
-    rows = [
-        (labels.words(v), quantity(float(v), str(v.attrs["units"])))
-        for v in labels.design_variables(one)
-    ]
+    rows = [(labels.words(v), labels.value(v)) for v in labels.design_variables(one)]
     return [[name, str(value)] for name, value in rows if value != "–"]
 
 

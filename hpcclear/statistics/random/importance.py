@@ -33,7 +33,7 @@ PARTS, STEPS = 4, 20
 """Normal densities of a mixture, and steps of its fit."""
 
 WIDE = 2.0
-"""Deviations of the wide density, and of a pilot's first."""
+"""Standard deviations of the wide density, and of a pilot's first."""
 
 OWN, SPREAD = 0.1, 0.2
 """Shares of the draws from the inputs' own density and from the wide one; the others come from the fitted one."""
@@ -58,7 +58,7 @@ MOST = 100.0
 """Largest factor that this widens an interval by: nothing is known where no failure is left at the stricter one."""
 
 ENOUGH = 20.0
-"""Equally weighted draws that those beyond a level are worth, at least, for limits of its probability."""
+"""Equally weighted draws that those beyond a level are worth, at least, for an interval of its probability."""
 
 
 class Density:
@@ -185,7 +185,7 @@ class Rare:
     weights: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
     simulations: int = 0
     factor: float = 1.0
-    """What the tolerance of f may change the probability by, part of all limits."""
+    """What the tolerance of f may change the probability by, part of all intervals."""
     _first: Array = field(default_factory=lambda: np.empty((0, 0)))
     _failing: list[tuple[Array, Array]] = field(default_factory=list)
     _anew: int = 0
@@ -270,7 +270,7 @@ def _worth(f: Array, weights: Array, level: float) -> float:
 
 
 def weighted(f: Array, weights: Array, level: float, confidence: float) -> Limited:
-    """The probability of exceeding a level from weighted draws, (repeats, n): mean of the repeats, limits symmetric in its
+    """The probability of exceeding a level from weighted draws, (repeats, n): mean of the repeats, interval symmetric in its
     logarithm."""
     known = np.isfinite(f)
     counts = known.sum(axis=1)

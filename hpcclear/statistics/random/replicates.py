@@ -2,7 +2,7 @@
 
 A replicate is one randomised Sobol sequence, or one draw of plain Monte Carlo: what differs
 between replicates is all that is known about the error, whatever is inside them. So one
-set of formulas serves both, and the limits take Student's t by the number of replicates.
+set of formulas serves both, and the intervals take Student's t by the number of replicates.
 
 Sources: A. B. Owen, "Monte Carlo variance of scrambled net quadrature", SIAM J. Numer. Anal. 34
 (1997), doi:10.1137/S0036142994277468; P. L'Ecuyer and C. Lemieux, "Recent advances in randomized
@@ -44,7 +44,7 @@ class Estimate:
 
 
 FEW = 100.0
-"""Values that carry a standard deviation, below which its limits are widened: what few carry their scatter does not show."""
+"""Values that carry a standard deviation, below which its interval is widened: few values do not show their scatter."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def moments(values: Array) -> tuple[Estimate, Deviation]:
 
     Returns
     -------
-    (Estimate, Deviation)
+    `Estimate`, `Deviation`
         All NaN where fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
@@ -180,7 +180,7 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
         As in `moments`.
     limit : float
     confidence : float
-        Level of the limits.
+        Level of the interval.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
 def _interval_of_share(
     share: float, shifts: Array, counts: Array, confidence: float
 ) -> tuple[float, float]:
-    """Limits of a probability: those of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
+    """Interval of a probability: that of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
     total = int(counts.sum())
     error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
     # as many independent draws, fewer for an error of few degrees of freedom

@@ -117,7 +117,7 @@ def _(law: Samples, centres: Array, length: float) -> Array:
 def pieces(law: Quantiles, count: int, lower: Array, upper: Array) -> Rule:
     """Rules over the part of the span between bounds (n,): ``(n, count)`` nodes and weights.
 
-    The weights of a row add up to the probability of its part: 0 where the limits leave nothing. The highest of some values
+    The weights of a row add up to the probability of its part: 0 where the bounds leave nothing. The highest of some values
     belongs to the piece that ends with it.
 
     Raises
@@ -243,7 +243,7 @@ def _mass(law: Normal) -> float:
 
 @lru_cache(maxsize=256)
 def _truncated_rule(low: float, high: float, count: int) -> Rule:
-    """Gauss rule of the standard normal cut off at two limits (discretised Stieltjes)."""
+    """Gauss rule of the standard normal truncated at two bounds (discretised Stieltjes)."""
     low, high = max(low, -TAIL - 3), min(high, TAIL + 3)
     nodes, weights = legendre(FINE)
     x = low + (high - low) * nodes

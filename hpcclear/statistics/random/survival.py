@@ -61,7 +61,7 @@ def order_interval(values: Array, level: float, unknown: int = 0) -> tuple[float
     level : float
         Probability of staying below, strictly between 0 and 1.
     unknown : int
-        Further values of which nothing is known, such as failed simulations: the limits hold wherever these lie.
+        Further values of which nothing is known, such as failed simulations: the interval holds wherever these lie.
 
     References
     ----------
