@@ -24,7 +24,7 @@ TIED = 0.4
 """Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
 
 CLOSE = 0.25
-"""Of the accuracy asked for: what a constraint that is not decided is known to, unless it is a probability."""
+"""Of the accuracy required: what a constraint that is not decided is known to, unless it is a probability."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
@@ -263,8 +263,8 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all confidence intervals are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
-    breaks its threshold, as one of `many` designs. What does neither is known better, so that it may be decided."""
+    """Whether all confidence intervals are as narrow as required; that of scatter by round-off alone is, and so is what is decided
+    about its threshold, as one of `many` designs. What is not decided is known better, so that it may be."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values[0]))
     reach = _reaches(settings, values[0])
