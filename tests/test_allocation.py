@@ -1,4 +1,4 @@
-"""Studies of the new kinds of variables: allocation against closed forms, fits by enumeration, load cases, worst cases,
+"""Studies of these variables: allocation against closed forms, fits by enumeration, load cases, worst cases,
 constraints on other responses, and the same bytes on any number of ranks."""
 
 import itertools
