@@ -132,7 +132,11 @@ def all_kinds():
             {"statistic": "quantile", "most": "0.62 mm"},
         ],
     }
-    return scene_with(variables, random, case, physics, worst_case=True)
+    swarm = {"particles": 16, "iterations": 15, "runs": 1, "archive": 12}
+    few = {**SMALL["verification"], "infill_designs": 3, "designs": 1, "most_samples": 1024}
+    return scene_with(
+        variables, random, case, physics, worst_case=True, swarm=swarm, verification=few
+    )
 
 
 @pytest.fixture(scope="module")
