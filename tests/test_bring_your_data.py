@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.curves import curve_at
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.ensemble.session import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene

@@ -16,6 +16,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.identify import training
 from hpcclear.identify.advice import advice, noise_of
+from hpcclear.identify.answer import Wanted
+from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter
 from hpcclear.identify.history import DAY, history, seconds_of
 from hpcclear.identify.inputs import Inputs, Unknown, design
@@ -23,7 +25,7 @@ from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.posterior import sequential
-from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
@@ -118,6 +120,36 @@ def test_bad_tables_and_words_are_refused(tmp_path, scene):
         Layout.of(Measured("a", Spectrum(np.zeros(9), np.zeros(9), 5), True, SPEED, 9), Sensor((0.0, 40.0)))  # fmt: skip
 
 
+def without_clearance(name: str, *joints: str, **tables: dict[str, str]):
+    """A shipped scene whose joints are ideal, over one revolution."""
+    scene = hpcclear.load_scene(ROOT / "jobs" / name).with_({"study": None})
+    changes = {joint: tables.get(joint.rpartition(".")[2], {"kind": "ideal"}) for joint in joints}
+    return scene.with_({**changes, "effects": {}, "numerics.averaged_revolutions": 1})
+
+
+def test_the_frame_force_is_the_reaction_of_all_masses():
+    rigid = without_clearance("slider_crank.toml", "joints.crank_rod", "joints.rod_slider")
+    response = hpcclear.simulate(rigid)
+    reaction = {"x": response["bearing_x"], "y": response["bearing_y"] + response["guide_force"]}
+    for axis in "xy":
+        size = float(np.abs(reaction[axis]).max())
+        found = series_of(rigid, response, f"frame_force_{axis}")
+        np.testing.assert_allclose(found, -reaction[axis], atol=1e-3 * size)
+
+
+def test_a_point_of_a_linkage_has_an_acceleration():
+    pins = {
+        "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+        "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "rocker.b"},
+    }
+    joints = ("mechanism.joints.o2", "mechanism.joints.o3")
+    rigid = without_clearance("linkages/crank_rocker.toml", *joints, **pins)
+    response = hpcclear.simulate(rigid)
+    found = series_of(rigid, response, "acceleration_x crank.b")
+    expected = -((2.0 * np.pi * 15.0) ** 2) * response["point_x"].sel(point="crank.b")
+    np.testing.assert_allclose(found, expected, atol=1e-3 * float(np.abs(expected).max()))
+
+
 def test_a_sensor_has_a_band_and_a_resonance():
     sensor = Sensor((100.0, 1000.0), resonance=2000.0, quality=10.0)
     response = sensor.response(np.array([0.0, 1000.0, 2000.0]))
@@ -206,6 +238,36 @@ def test_a_signal_that_no_member_has_is_refused_by_its_feature(made):
     verdict = judged(prepared, features, 1, 400)
     assert not verdict.explained
     assert "harmonic 3 " in prepared.labels[verdict.worst]
+
+
+def test_two_clearances_that_only_their_sum_decides_are_not_identified_separately(scene):
+    pin = scene.resolved()["joints"]["crank_rod"]
+    both = scene.with_({"joints.rod_slider": pin})
+    other = UNKNOWN.replace("crank_rod", "rod_slider")
+    whole = Inputs.of(both, [UNKNOWN, other])
+    inputs = Inputs(whole.unknowns)
+    places = design(1, inputs, 128)
+    total = np.column_stack([places[:, :2].mean(axis=1), np.full(len(places), 0.5)])
+    spectra = spectra_of(total, np.random.default_rng(2))
+    ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
+    measured = Measured("crank_moment", ensemble.spectrum("crank_moment"), True, SPEED, ORDERS)
+    layout = Layout.of(measured, Sensor())
+    truth = np.array([0.5, 0.5])
+    values = machine(ensemble, layout, truth, np.random.default_rng(7))
+    variance = np.full(len(values), 0.5 * 0.05 / 20)
+    prepared = prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 32)
+    found = prepared, [judged(prepared, values, 1, 400)]
+    wanted = Wanted((UNKNOWN, other), (Path("a.csv"),))
+    gains = advice(ensemble, ["crank_moment"], Sensor(), SPEED, 0.1, 1)
+    content = identified_dataset(ensemble, found, np.zeros(1), gains, wanted, 1, {})
+    assert float(content["correlation"][0]) < -0.9
+    assert float(content["expected_correlation"][0, 0]) < -0.7  # the bounds cut errors off
+    assert "correlation of errors -0." in lines(content)[-1].text
+    assert any("not identified separately" in text for text in warnings(content))
+    widths = np.ptp(content["interval"][0].values, axis=1)
+    assert (widths > 3e-5).all()  # each is open, though their mean is known
+    each = content["posterior"][0, :, :2]
+    assert float(each.mean("input").std()) < 0.3 * float(each.std("particle").min())
 
 
 def test_noise_without_a_signal_leaves_the_unknown_open(made):

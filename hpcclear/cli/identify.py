@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
-import xarray as xr
 
 from hpcclear.cli.options import (
     PATH,
@@ -102,7 +100,16 @@ def identify(
         unit = Unknown.of(scene, unknowns[0]).unit
         most = None if limit is None else number_of("--limit", limit, unit)
         wanted = Wanted(
-            unknowns, signals, tuple(names), dates, most, sensor, noise, pressure, advise, members
+            unknowns,
+            signals,
+            tuple(dict.fromkeys(names)),
+            dates,
+            most,
+            sensor,
+            noise,
+            pressure,
+            advise,
+            members,
         )
         return describe(run_identify(scene, place_of(output), ranks, wanted, how.options()))
 
@@ -134,8 +141,5 @@ def describe(found: "Finished") -> int:
     for text in identified.warnings(content):
         out.print(remark("warning", fitting(text)))
     out.print(f"written  {found.output}")
-    return Exit.DONE if _explained(content) else Exit.TARGET_MISSED
-
-
-def _explained(content: xr.Dataset) -> bool:
-    return "explained" not in content or bool(np.all(content["explained"].to_numpy() == 1))
+    explained = "explained" not in content or bool((content["explained"] == 1).all())
+    return Exit.DONE if explained else Exit.TARGET_MISSED

@@ -85,7 +85,7 @@ def _expected(
     seen_features = features + rng.standard_normal(features.shape) * np.sqrt(noise)
     kept = predictable(ensemble.places, choice.scores(seen_features), rng)
     choice = choice.only(kept)
-    scores = choice.scores(seen_features) / np.sqrt(choice.information)
+    scores = choice.scores(seen_features) / np.sqrt(np.maximum(choice.information, 1e-12))
     unknowns = ensemble.inputs.unknowns
     truth = ensemble.places[:, : len(unknowns)]
     errors = [truth - _cross_validated(scores, truth, penalty) for penalty in PENALTIES]

@@ -145,12 +145,13 @@ def _identified(
         [read_measured(path, name, units[name], frequency, turns, sense) for name in wanted.names]
         for path in wanted.signals
     ]
+    layouts = _layouts(tables, wanted) if tables else []  # refuses before anything is simulated
     quiet = session.options.style == "quiet"
     ensemble = simulated(
         plain, inputs, every, wanted.size(), seed, session.ranks, session.opened(), quiet
     )
     with session.ranks.stage("posterior"):
-        found = _verdicts(ensemble, tables, wanted, seed) if tables else None
+        found = _verdicts(ensemble, tables, layouts, wanted, seed) if tables else None
         gains = None
         if wanted.advise:
             share = wanted.noise or NOISE
@@ -171,13 +172,16 @@ def _driven(scene: Scene) -> tuple[float, int, list[str]]:
 Found = tuple[Prepared, list[Verdict]]
 
 
+def _layouts(tables: Sequence[Sequence[Measured]], wanted: Wanted) -> list[Layout]:
+    """The features that all tables have."""
+    return [Layout.of(one, wanted.sensor, _noise(one, wanted.noise)) for one in _narrowest(tables)]
+
+
 def _verdicts(
-    ensemble: Ensemble, tables: Sequence[Sequence[Measured]], wanted: Wanted, seed: int
-) -> Found:
+    ensemble: Ensemble, tables: Sequence[Sequence[Measured]], layouts: Sequence[Layout], wanted: Wanted,
+    seed: int,
+) -> Found:  # fmt: skip
     """What each table says, by models for the noisiest of them."""
-    layouts = [
-        Layout.of(one, wanted.sensor, _noise(one, wanted.noise)) for one in _narrowest(tables)
-    ]
     pairs = [features_of(row, layouts) for row in tables]
     variance = np.max([own for _, own in pairs], axis=0)
     made = prepare(ensemble, layouts, wanted.sensor, tables[0][0].frequency, variance, seed)

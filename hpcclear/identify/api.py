@@ -78,7 +78,7 @@ def identify(
         return [str(one)] if isinstance(one, str | Path) else [str(each) for each in one]
 
     wanted = Wanted(
-        tuple(several(unknown)), tuple(map(Path, several(signal))), tuple(several(of)), tuple(dates), limit,
+        tuple(several(unknown)), tuple(map(Path, several(signal))), tuple(dict.fromkeys(several(of))), tuple(dates), limit,
         sensor or Sensor(), noise, pressure, advise, members,
     )  # fmt: skip
     return in_process(

@@ -65,8 +65,13 @@ class Layout:
         lowest = max(int(bare), int(np.ceil(sensor.band[0] / frequency - 1e-9)))
         highest = min(measured.highest, int(min(sensor.band[1] / frequency, ORDERS)))
         if highest <= max(lowest, 1):
-            reason = f"no harmonic of {frequency:.4g} Hz passes"
-            raise InputError("--band", name, reason, "Widen the band, or sample faster")
+            reason = f"no harmonic of {frequency:.4g} Hz in {name} passes"
+            raise InputError(
+                "--band",
+                "{:g}:{:g}".format(*sensor.band),
+                reason,
+                "Widen the band, or sample faster",
+            )
         orders = tuple(range(lowest, min(highest, SINGLE) + 1))
         return cls(name, orders, _thirds(SINGLE + 1, highest), measured.synchronised, noise)
 

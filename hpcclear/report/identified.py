@@ -108,6 +108,9 @@ def _advice(content: xr.Dataset) -> list[Line]:
                 for width, count in zip(widths, counts, strict=True)
             )
             parts.append(f"{_short(unknown)} ± {shown}")
+        if len(parts) > 1:
+            related = float(content["expected_correlation"][k, -1])
+            parts.append(f"correlation of errors {related:.2f} ({counts[-1]})")
         found.append(Line(f"by {name}", f"{'; '.join(parts)} revolutions"))
     return found
 
