@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from directly import run_of
 
-from hpcclear.report.answer import recommended
+from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.random.replicates import student

@@ -22,7 +22,7 @@ import numpy as np
 from directly import run_of
 
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.report.answer import recommended
+from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -199,6 +199,8 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("studies", nargs="*", default=list(STUDIES))
     parser.add_argument("--seed", type=int, help="another seed than the study's")
+    parser.add_argument("--rounds", type=int, default=ROUNDS, help="of the reference")
+    parser.add_argument("--judged", type=int, default=JUDGED, help="simulations of each design")
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
     print(
@@ -209,10 +211,10 @@ def main() -> None:
         if words.seed is not None:
             scene = scene.with_({"study.seed": words.seed})
         label = Path(name).stem + ("" if words.seed is None else f"_{words.seed}")
-        measured(words.out / label, label, scene)
+        measured(words.out / label, label, scene, words.rounds, words.judged)
 
 
-def measured(place: Path, label: str, scene: Scene) -> None:
+def measured(place: Path, label: str, scene: Scene, rounds: int, judged: int) -> None:
     """Carry out a study both ways, and print the regret of each."""
     place.mkdir(exist_ok=True)
     runs = {}
@@ -228,10 +230,10 @@ def measured(place: Path, label: str, scene: Scene) -> None:
         taken.append({name: float(best[name]) for name in names})
     kept = place / "reference.npy"
     if not kept.exists():
-        np.save(kept, reference(scene, case))
+        np.save(kept, reference(scene, case, rounds))
     rows = [list(one.values()) for one in taken] + np.load(kept).tolist()
     choices = [Choice("", case, dict(zip(names, row, strict=True))) for row in rows]
-    found = told(scene, choices, JUDGED // REPLICATES, "judge")
+    found = told(scene, choices, judged // REPLICATES, "judge")
     values, shifts = found["goal"][:, 0], found["goal_shifts"][:, 0]
     broken = found["excess"] > 0.0
     least = int(np.where(broken, np.inf, values).argmin())
@@ -271,7 +273,7 @@ def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict
     return truth.sequences(run_of(scene), choices, purpose, purpose, length, length * REPLICATES)
 
 
-def reference(scene: Scene, case: str) -> np.ndarray:
+def reference(scene: Scene, case: str, rounds: int) -> np.ndarray:
     """The best designs of a long search, (k, d)."""
     run = run_of(scene)
     names = scene.required_study.design_variables(case)
@@ -280,7 +282,7 @@ def reference(scene: Scene, case: str) -> np.ndarray:
     tried = None
     unit = unit_lhs(WIDE, len(names), rng)
     where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
-    for _ in range(ROUNDS + 1):
+    for _ in range(rounds + 1):
         choices = refinement._choices(run, case, where)
         found = told(scene, choices, POINTS // REPLICATES, "reference")
         count = len(scene.required_study.case(case).goals)

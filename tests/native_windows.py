@@ -28,9 +28,11 @@ SIGNALS = (
     "SIGUSR1",
     "SIGUSR2",
     "SIGALRM",
+    "SIGPROF",
     "SIGHUP",
     "SIGKILL",
     "setitimer",
+    "ITIMER_PROF",
     "ITIMER_REAL",
     "alarm",
 )

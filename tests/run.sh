@@ -88,6 +88,15 @@ tests() { # what pytest says is kept, for the reasons of skips at the end
     python -m pytest "$@" | tee "$said"
     return "${PIPESTATUS[0]}"
 }
+ahead() {
+    local code=0 other
+    python tests/compile_ahead.py 1 & other=$!
+    python tests/compile_ahead.py || code=1
+    wait "$other" || code=1
+    return "$code"
+}
+# Named files compile what they need.
+if [ "${#words[@]}" -eq 0 ] && [ -f tests/compile_ahead.py ]; then step "compile" ahead; fi
 # Three at a time on two cores: many tests wait for mpiexec, for a kill or for a stop. The limit is for what hangs, on a busy machine too.
 step "tests, serial and under mpiexec" tests -q -ra --timeout 3600 -n 3 --dist loadfile --no-loadscope-reorder --durations=20 \
     ${choice[@]+"${choice[@]}"} ${words[@]+"${words[@]}"}

@@ -138,6 +138,11 @@ def test_our_laws_pass_the_checks_of_users_laws(kind):
 
 
 VALUES = {
+    "force_at": 1e3,
+    "depth_at": 2e-6,
+    "exponent": 1.5,
+    "greatest_damping": 50.0,
+    "full_depth": 1e-6,
     "restitution": 0.8,
     "damping": 0.5,
     "coefficient": 0.1,

@@ -123,6 +123,7 @@ def test_a_geometry_holds_what_laws_have_to_hold(name, law):
     values = {
         "damping": 0.5, "restitution": 0.9, "liner_thickness": 2e-3, "liner_modulus": 1e9,
         "liner_poisson_ratio": 0.4, "force_at": 1e3, "depth_at": 2e-6, "exponent": 1.1,
+        "depth_scale": 1.0, "force_scale": 1.0,
     }  # fmt: skip
     check(made, {one.name: values[one.name] for one in made.parameters})
 

@@ -278,7 +278,11 @@ def test_samples_are_the_scenes_with_their_numbers():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in ("press", "four_stroke") else pytest.mark.full) for n in NAMES]
+    "name", [
+        pytest.param("press"),
+        pytest.param("four_stroke", marks=pytest.mark.nightly),
+        *(pytest.param(n, marks=pytest.mark.full) for n in NAMES if n not in ("press", "four_stroke")),
+    ]
 )  # fmt: skip
 def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
     """And a sample comes to the bits of a single response by the same method."""

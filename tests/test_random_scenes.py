@@ -205,9 +205,9 @@ def check_outcome(scene: Scene) -> None:
     assert run.outcome["rhs_evaluations"] < 2 * 20 * 100_000
 
 
+@pytest.mark.nightly
 @CI
 @given(plain_scenes)
-@pytest.mark.nightly
 def test_random_scene(content: dict):
     valid_outcome_or_clear_refusal(content)
 

@@ -152,16 +152,16 @@ def test_inputs_too_far_out_to_make_a_mechanism_count_as_failed():
             raise InputError("C", -1.0, "is negative", "Narrow its distribution")
         return Points(names, values, (("joints.crank_rod.clearance",),))
 
-    def records(points: Points, stage: str) -> np.ndarray:
-        return points.values[:, 0]
+    def judged(points: Points, stage: str) -> tuple[None, np.ndarray]:
+        return None, 2.0 * points.values.T
 
-    simulations = SimpleNamespace(filled=filled, records=records, objective=lambda one: 2.0 * one)
-    run = SimpleNamespace(simulations=simulations)
+    simulations = SimpleNamespace(filled=filled, judged=judged)
+    run = SimpleNamespace(simulations=simulations, study=SimpleNamespace(further=()))
     values = np.array([[1.0], [-1.0], [2.0], [3.0], [-2.0]])
     np.testing.assert_array_equal(rare._valid(run, ("C",), values), values[:, 0] > 0.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rare, "_rows", lambda run, choice, u: (("C",), u))
-        first, second = rare._simulated(run, [(None, values), (None, -values[:1])], "stage")
+        patch.setattr(rare, "rows_of", lambda run, choice, u: (("C",), u))
+        (first,), (second,) = rare.simulated(run, [(None, values), (None, -values[:1])], "stage")
     np.testing.assert_array_equal(first, [2.0, np.nan, 4.0, 6.0, np.nan])
     np.testing.assert_array_equal(second, [np.nan])
 

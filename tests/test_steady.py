@@ -9,11 +9,11 @@ import pytest
 from scipy import stats
 
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import ensemble, judging
 from hpcclear.dynamics.steady.copies import scales
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.steady.look import look
 from hpcclear.dynamics.steady.procedure import loosest
 from hpcclear.dynamics.views import Outcome, Parameters, Start

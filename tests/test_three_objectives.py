@@ -183,6 +183,7 @@ def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path
 
 
 @pytest.mark.mpi
+@pytest.mark.nightly  # with two objectives in test_goals
 def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
     """By the formula of other studies, whose program ranks can start."""
     light = 'study.cases={light={random=["C", "m2"], objectives=["mean", "deviation", {formula="m2 + m3"}]}}'

@@ -77,7 +77,10 @@ def _dynamics(monkeypatch):
 def apart(ours, theirs, *overrides):
     scene = scene_of(*overrides)
     return tolerance._apart(
-        SimpleNamespace(study=scene.required_study), Choice("", "play", {"m2": 0.2}), ours, theirs
+        SimpleNamespace(study=scene.required_study),
+        Choice("", "play", {"m2": 0.2}),
+        ours[None],
+        theirs[None],
     )
 
 

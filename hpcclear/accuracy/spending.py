@@ -21,11 +21,11 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import perturbed, scales
 from hpcclear.dynamics.steady.ensemble import POOLED
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 

@@ -21,14 +21,17 @@ from hpcclear.base.remarks import remark
 
 def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
-    parts = {root / "dynamics" / name for name in ("layout.py", "rows.py")}
-    parts |= set((root / "dynamics").glob("*/*.py"))
+    parts = {root / "dynamics" / "layout.py"} | set((root / "dynamics").glob("*/*.py"))
     # of laws the texts are, each named by its content
     parts -= set((root / "dynamics" / "laws").glob("*.py"))
     parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
     parts |= set((root / "base" / "text").glob("*.py"))
     return sorted(
-        parts | {root / "base" / name for name in ("one_text.py", "outcome.py", "unrolled.py")}
+        parts
+        | {
+            root / "base" / name
+            for name in ("numbered.py", "one_text.py", "outcome.py", "unrolled.py")
+        }
     )
 
 

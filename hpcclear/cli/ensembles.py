@@ -180,7 +180,7 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
     default="objective",
     show_default=True,
     metavar="SERIES",
-    help='Series of a response at the section: "contact_force o2"; or its max, min or mean by revolution: "max contact_force o2".',
+    help='Series of a response at the section: "contact_force o2"; or its max, min, mean a revolution: "max contact_force o2".',
 )
 @click.option(
     "--section",

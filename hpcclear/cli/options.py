@@ -226,7 +226,7 @@ def on_ranks(
 def lightly() -> None:
     """Load xarray in this process without pint and pyarrow: a fifth and a twentieth of a start, and 200 MB of address space.
 
-    Values of result files are plain numbers, of which xarray need not ask whether they are pint's; where a version of it has
+    Values of result files are plain numbers, of which xarray need not check whether they are pint's; where a version of it has
     other names, pint is loaded. pandas finds no pyarrow while it is loaded; who imports that later has it.
     """
     if "pyarrow" not in sys.modules:

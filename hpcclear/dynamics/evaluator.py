@@ -11,12 +11,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
-from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lanes import Lanes, PrescribedSamples
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.prescribed_samples import PrescribedSamples
+from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start

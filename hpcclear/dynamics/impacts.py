@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -119,7 +118,7 @@ def spectral(series: Mapping[str, Array], periods: Array, count: int) -> dict[st
     if "frame_force_x" in series:
         forces["frame_force"] = (squares("frame_force_x") + squares("frame_force_y"))[:, :, 0]
     centres = spectra.band_centres(1.0 / periods.max(), most / periods.max())
-    found: dict[str, Any] = {"order": np.arange(1, most + 1), "band": centres}
+    found: dict[str, Array] = {"order": np.arange(1.0, most + 1), "band": centres}
     for name, one in forces.items():
         found[f"{name}_orders"] = np.sqrt(one.mean(axis=0))
         flat = one.reshape(revolutions, most, -1)

@@ -1,6 +1,6 @@
 """Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
 
-Rows are numbered as they are declared (`hpcclear.dynamics.rows`). They are module constants, so the compiler sees every
+Rows are numbered as they are declared (`hpcclear.base.numbered`). They are module constants, so the compiler sees every
 distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
 """
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.numbered import Rows
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
-from hpcclear.dynamics.rows import Rows
 
 TURN = 6.283185307179586  # rad
 
@@ -58,30 +58,17 @@ class Effects(NamedTuple):
         return None if self.friction is None else self.friction.bristled
 
 
-class Open(NamedTuple):
-    """Which places of joints hold one with clearance (1), and which none (None)."""
-
-    joint_0: Any = None
-    joint_1: Any = None
-    joint_2: Any = None
-    joint_3: Any = None
-    joint_4: Any = None
-    joint_5: Any = None
-    joint_6: Any = None
-    joint_7: Any = None
-
-
 def bristles_of(effects: Effects) -> int:
     """How many coordinates the bristles of friction take: one for each joint with clearance, before those of the mechanism.
 
     A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
     """
-    return 0 if effects.bristled is None else sum(flag is not None for flag in open_of(effects))
+    return 0 if effects.bristled is None else len(places_of(effects))
 
 
-def open_of(effects: Effects) -> Open:
-    """Those of a set of effects."""
-    return Open(*[None] * effects.first, *[1] * (effects.joints or 0))
+def places_of(effects: Effects) -> range:
+    """Places of the joints with clearance."""
+    return range(effects.first, effects.first + (effects.joints or 0))
 
 
 class Waves(NamedTuple):
@@ -101,10 +88,9 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     """Those of each place of joints, up to the last open one."""
     bearing, journal = effects.bearing_waves or 0, effects.journal_waves or 0
     stride = 2 * (bearing + journal)
-    places = [k for k, flag in enumerate(open_of(effects)) if flag is not None]
     return tuple(
         Waves(k * stride, bearing, k * stride + 2 * bearing, journal)
-        for k in range(max(places, default=-1) + 1)
+        for k in range(places_of(effects).stop)
     )
 
 
@@ -237,7 +223,7 @@ class Integrated(NamedTuple):
 
 
 _PLACES = range(MAX_JOINTS)
-GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
+GAPS = tuple(Integrated(GAP + k, "joints") for k in _PLACES)
 _OTHERS = [row for row in WRITTEN.declared if row.asked_by and row.first != GAP]
 _STEPPED = {row.asked_by for row in _OTHERS} - {"profile", "steps"}
 _PROFILES, MEASURES, _SUMMED = (
@@ -268,14 +254,14 @@ MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
-    there = open_of(effects)
+    there = places_of(effects)
     whole = effects.objective is not None and effects.objective.whole
     closed = {
         row.first + k
         for row in _OTHERS
         if row.size == MAX_JOINTS
-        for k, flag in enumerate(Open(1) if whole and row.first == OBJECTIVE_RATES else there)
-        if flag is None
+        for k in _PLACES
+        if k not in (range(1) if whole and row.first == OBJECTIVE_RATES else there)
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
     return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
@@ -491,8 +477,8 @@ def rules_of(effects: Effects) -> Rules:
     turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
     flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
-    places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
-    return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
+    places = places_of(e)
+    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop])
 
 
 class Stepped(NamedTuple):

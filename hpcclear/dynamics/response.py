@@ -11,18 +11,18 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY, Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import alone, outcome_records, responses_reported
 from hpcclear.dynamics.impacts import Turns, measured, spectral
 from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.lanes import PrescribedSamples
 from hpcclear.dynamics.parameters import Numbers, parameters
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
@@ -266,7 +266,7 @@ def _measured(
     joints = len(scene.joint_labels)
     first = problem.transient + 1
     return {
-        "revolution": np.arange(first, first + len(periods)),
+        "revolution": np.arange(float(first), first + len(periods)),
         **measured(periods, integrals, cycle, joints, rigid=not scene.modes),
         **spectral(data, periods, scene.output.instants_per_revolution),
     }

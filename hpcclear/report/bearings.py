@@ -216,7 +216,7 @@ def _projected_areas(response: xr.Dataset) -> dict[str, float]:
 
 @lru_cache(maxsize=4)
 def _areas_in(text: str) -> dict[str, float]:
-    """`_projected_areas` of a scene's text, which is asked for by each table of a page."""
+    """`_projected_areas` of a scene's text, which each table requests of a page."""
     scene = scene_of_text(text, "scene")
     areas = {}
     for joint in scene.pins():

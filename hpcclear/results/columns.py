@@ -246,7 +246,7 @@ CONTRIBUTIONS: Columns = {
     "halved": number(("design", "input"), "1",
         "fall of the standard deviation with half the scatter of an input, relative", required=True),
     "halved_error": number(("design", "input"), "1", "standard error of it", required=True),
-    "halving_cost": number(("design", "input"), "", "what half the scatter of an input costs more, by the costs of the study"),
+    "halving_cost": number(("design", "input"), "1", "additional cost of half the scatter of an input, as its cost is given"),
     "unexplained": number(("design",), "1", "share of the variance that no input or pair of them explains", required=True),
     "unexplained_error": number(("design",), "1", "standard error of it"),
     "together": flag(("input",), "whether the input is correlated with others, whose contribution is one"),

@@ -7,6 +7,7 @@ from pydantic import field_validator, model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
+from hpcclear.scene.loads import Law
 
 
 class Contact(LawTable):
@@ -17,7 +18,9 @@ class Contact(LawTable):
     law: str
     """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
     geometry: str | None = None
-    """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner" or "power"."""
+    """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or "table"."""
+    curve: Annotated[Any, Law("m", "N")] | None = None
+    """The geometry "table": ``[[depth, force], ...]``, m and N, both rising from 0."""
     minimum_impact_speed: Speed = 1e-3
     """Lower bound of the impact velocity in the damping, m/s."""
     force: str | None = None
@@ -29,6 +32,12 @@ class Contact(LawTable):
     @classmethod
     def _sphere_is_the_default(cls, name: str | None) -> str | None:
         return None if name == SPHERE else name
+
+    @model_validator(mode="after")
+    def _curve_has_its_geometry(self) -> "Contact":
+        if self.curve is not None and self.geometry is None:
+            raise invalid('belongs to geometry = "table"', "Write geometry, or remove it", "curve")
+        return self
 
     @property
     def has_length(self) -> bool:

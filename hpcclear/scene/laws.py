@@ -6,6 +6,7 @@ Laws are found by name in the registry of plug-ins; no higher layer is imported 
 import contextlib
 import dataclasses
 import importlib
+import itertools
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, ClassVar, Self
@@ -15,6 +16,7 @@ from pydantic_core import CoreSchema
 
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
+from hpcclear.scene.loads import Law
 from hpcclear.scene.plugged import as_invalid
 from hpcclear.scene.wanted import hint
 
@@ -87,8 +89,9 @@ def _on(law: Any, geometry: Any) -> Any:
     return law.on(geometry)
 
 
-def on_geometry(law: Any, name: str) -> Any:
-    """A law on the elastic part of a geometry of that name; an error for validators where there is none."""
+def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
+    """A law on the elastic part of a geometry of that name, made of `rows` if it has a table; an error for validators where
+    there is none."""
     found = our_laws("geometry")
     if name not in found:
         known = (SPHERE, *found)
@@ -98,7 +101,14 @@ def on_geometry(law: Any, name: str) -> Any:
             f"the law {law.name!r} has an elastic force of its own",
             'Remove geometry, or use a law with damping only, such as "hunt-crossley"', "geometry", name,
         )  # fmt: skip
-    return _on(law, found[name])
+    shape = found[name]
+    if (shape.of_rows is None) != (rows is None):
+        raise invalid(
+            f"the geometry {name!r} has no table" if rows else "the table of depths and forces is missing",
+            "Remove it" if rows else 'Add curve = [["1 um", "100 N"], ["2 um", "250 N"], ...]',
+            "curve", rows,
+        )  # fmt: skip
+    return _on(law, shape if rows is None else shape.of_rows(rows))
 
 
 def _with_entries(kind: str) -> Iterator[Any]:
@@ -173,7 +183,7 @@ class LawTable(Table):
         """The law of a name, with what the table says besides; an error for validators where there is none."""
         shape = data.get("geometry")
         if isinstance(shape, str) and shape != SPHERE:
-            return on_geometry(cls.find(name, {**data, "geometry": None}), shape)
+            return on_geometry(cls.find(name, {**data, "geometry": None}), shape, _curve(data))
         known = our_laws(cls.kind)
         if name in known:
             return known[name]
@@ -298,6 +308,33 @@ class LawTable(Table):
         }
         made["additionalProperties"] = True  # of users' laws
         return made
+
+
+def _curve(data: Mapping[str, Any]) -> Any:
+    """Rows of the entry ``curve``, both columns rising from 0, or None; an error for validators."""
+    from pydantic_core import PydanticCustomError
+
+    if data.get("curve") is None:
+        return None
+    try:
+        rows = Law("m", "N").convert(data["curve"])
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise invalid(context["reason"], context["remedy"], "curve", data["curve"]) from None
+    rising = all(second[1] > first[1] for first, second in itertools.pairwise(rows))
+    if (
+        rows[0][0] < 0.0
+        or rows[0][1] < 0.0
+        or (rows[0][0] == 0.0) != (rows[0][1] == 0.0)
+        or not rising
+    ):
+        raise invalid(
+            "depths and forces must rise from 0",
+            "Sort the rows; leave [0, 0] out",
+            "curve",
+            data["curve"],
+        )
+    return rows
 
 
 def _schema(parameter: Any, law: Any, laws: Mapping[str, Any]) -> dict[str, Any]:

@@ -149,7 +149,9 @@ def _contacts(scene: Scene) -> Iterator[Switch]:
         kept = [floor]
         if table.geometry is not None:
             names = [one.name for one in table.declared.geometry.parameters]
-            elastic |= {"geometry": table.geometry} | {name: table.value(name) for name in names}
+            elastic |= {"geometry": table.geometry, "curve": table.curve} | {
+                name: table.value(name) for name in names
+            }
             kept += [f"effects.contact.{name}" for name in names]
         moved = {path: path for path in kept}
         yield Switch("contact damping", {"effects.contact": elastic}, moved)

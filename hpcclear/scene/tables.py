@@ -275,7 +275,7 @@ class SceneTables(Table):
         return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
 
     def responses_asked(self) -> bool:
-        """Whether each sample records more than gaps and peak forces: asked for, or required by the study."""
+        """Whether each sample records more than gaps and peak forces: requested, or required by the study."""
         asked = self.numerics.responses or any(one.needs_responses for one in self._objectives())
         return asked or self.impacts_asked()
 

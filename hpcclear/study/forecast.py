@@ -1,8 +1,8 @@
 """What a study simulates as a rule, and what a simulation of it costs, from a pilot: a few designs all over the box with their
-scatter. Cost and scatter differ from design to design, and the design in the scene may be like none of those that are found.
+scatter. Cost and scatter differ from design to design, and the design in the scene may differ from all that are found.
 
 `hpcclear.study.extent.samples_of` has the most that there can be. Verified designs take as many simulations as their errors in
-the pilot ask for; fronts are shorter and searches end earlier than they may.
+the pilot require; fronts are shorter and searches end earlier than they may.
 """
 
 import time
@@ -124,7 +124,7 @@ def _of_case(run: StudyRun, case: Case) -> float:
 
 
 def _errors(run: StudyRun, choice: Choice, f: Array) -> Array:
-    """Half-widths of all that a design is verified in, over the accuracy asked for, from f (replicates, n); (k,)."""
+    """Half-widths of all that a design is verified in, over the accuracy requested, from f (replicates, n); (k,)."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation, _, *others = truth.estimates_of(run, choice, f)
     wanted = run.study.wanted

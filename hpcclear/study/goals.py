@@ -36,8 +36,8 @@ class GoalValue:
 def goal_value(
     goal: Goal, values: Array, design: Mapping[str, float], confidence: float
 ) -> GoalValue:
-    """A goal from values of f, (replicates, values), NaN where failed, and the design in SI; or from those of all responses,
-    (k, replicates, values), of which it takes its own."""
+    """An objective or constraint from values of f, (replicates, values), NaN where failed, and the design in SI; or from
+    those of all responses, (k, replicates, values)."""
     values = values[goal.place] if values.ndim == 3 else values
     if goal.exact:
         value = float(goal.of_design(design))
@@ -69,7 +69,7 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
 
 
 def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
-    """Whether its limits are as narrow as asked for, or as a part of that."""
+    """Whether its interval is as narrow as requested, or as a part of that."""
     share, relative = wanted(goal, accuracy)
     share *= part
     half = (one.upper - one.lower) / 2.0

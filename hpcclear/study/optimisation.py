@@ -62,7 +62,7 @@ class Problem:
     draws : callable
         Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides.
     further : tuple of RobustObjective
-        The same of `Study.further`, responses besides f that cases ask for.
+        The same of `Study.further`, responses besides f that cases require.
     """
 
     names: tuple[str, ...]

@@ -3,7 +3,7 @@
 Of a probability of 1e-4 a hundred thousand samples show ten. Where a constraint allows less than `RARE`, designs that plain
 samples do not decide are sampled where they fail (`hpcclear.statistics.random.importance`), for all of them at once; longer and
 longer while a verdict is open and `most_samples` allows. A few of their draws are taken again at a stricter tolerance, and what
-that changes is part of the limits. Where plain and weighted samples contradict each other, both count.
+that changes is part of the interval. Where plain and weighted samples contradict each other, both count.
 """
 
 from collections.abc import Generator, Sequence

@@ -117,7 +117,8 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
     true = {name: values[table.rows] for name, values in true.items()}
     remarks = list(found.remarks)
     text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
-    run.notify(text)
+    if run.study.paired:
+        run.notify(text)
     remarks += more
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:

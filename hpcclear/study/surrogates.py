@@ -113,7 +113,7 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
 
 
 def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
-    """Surrogates of responses besides f that cases ask for (`Study.further`), of the designs simulated so far in the inputs of
+    """Surrogates of responses besides f that cases require (`Study.further`), of the designs simulated so far in the inputs of
     the model that is searched, as it is of f.
 
     Raises

@@ -1,9 +1,9 @@
-"""What the tolerance of the integration does to verified designs: part of all their intervals, and of an accuracy that is requested.
+"""Effect of the integration tolerance on verified designs: part of all their intervals, and of a requested accuracy.
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
-tolerance does. That is added to all confidence intervals of the case. Where a study requires an accuracy (`study.accuracy`), the samples have
-to meet what it leaves; elsewhere pairs take no more than `COST` of the study.
+tolerance does. That is added to all confidence intervals of the case. With `study.accuracy`, the samples have to meet what it
+leaves; elsewhere pairs take no more than `COST` of the study.
 
 Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
 variance of paired samples).
@@ -40,7 +40,7 @@ ROOM = 0.75
 """Share of an accuracy from which on the tolerance dominates: the samples then have to meet the accuracy by themselves."""
 
 COST = 0.02
-"""Of a study's simulations that pairs may take where no accuracy is asked, beyond the first of them."""
+"""Of a study's simulations that pairs may take where no accuracy is requested, beyond the first of them."""
 
 DRAWS = 16
 """Of independent draws pairs are made of one in so many, and of so many at least."""

@@ -24,7 +24,7 @@ TIED = 0.4
 """Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
 
 CLOSE = 0.25
-"""Of the accuracy asked for: what a constraint that is not decided is known to, unless it is a probability."""
+"""Of the accuracy requested: what a constraint that is not decided is known to, unless it is a probability."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
@@ -76,7 +76,7 @@ def made(
     before: Sequence[Array] = (),
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
-    """f of designs, by as many simulations as the study asks for, (2, replicates, values) each as `doubled` returns them.
+    """f of designs, by as many simulations as the study requires, (2, replicates, values) each as `doubled` returns them.
 
     Raises
     ------
@@ -152,8 +152,7 @@ def doubled(
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (k, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
-    from."""
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; `before` is continued."""
     wanted = wanted or run.study.wanted
     made = list(before) or [nothing(run)] * len(choices)
     many = verdicts.rivals(choices)
@@ -255,7 +254,7 @@ def _values(
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation, the larger one where they are not symmetric."""
+    """Half-widths of the confidence intervals of mean and standard deviation, the larger one where they are not symmetric."""
     mean, deviation = (limits(one, settings.confidence)[1] - one.value for one in moments(values))
     return mean, deviation
 
@@ -263,8 +262,8 @@ def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all confidence intervals are as narrow as asked for; a deviation of nothing but round-off is, and so is what surely keeps or
-    breaks its threshold, as one of `many` designs. What does neither is known better, so that it may be decided."""
+    """Whether all confidence intervals are as narrow as requested. A standard deviation of round-off is, and so is what
+    significantly keeps or breaks its threshold, as one of `many` designs. Others are simulated further until decided."""
     settings, case = run.study.verification, run.study.case(choice.case)
     mean, deviation = (one.value for one in moments(values[0]))
     reach = _reaches(settings, values[0])
@@ -292,7 +291,7 @@ def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue
 
 
 def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
-    """Mean, standard deviation, percentile and all that the case of a design requires, from what was simulated (k, replicates, n)."""
+    """Mean, standard deviation, percentile, objectives and constraints of a design, from its simulations (k, replicates, n)."""
     percentile = quantile(values[0], QUANTILE, run.study.verification.confidence)
     return [*moments(values[0]), percentile, *_goals(run, choice, values)]
 
@@ -303,15 +302,15 @@ def nothing(run: StudyRun) -> Array:
 
 
 def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """All that is told of designs from what was made of them, shape (2, replicates, values) each.
+    """Results of designs from their simulations, shape (2, replicates, values) each.
 
     Returns
     -------
     dict of arrays over the designs
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
-        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
+        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
         and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
         `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
     """

@@ -171,6 +171,8 @@ class Geometry:
     """Half of the angle over which the surfaces touch, rad, of depth and force."""
     has_length: bool = False
     """Whether the bearing's length is needed."""
+    of_rows: Function | None = None
+    """From the rows of a table (depth in m, force in N) in the scene to the geometry that they make; None: it has no table."""
     name: str = ""
 
 

@@ -63,7 +63,7 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
             used.append(node.id)
     names = list(dict.fromkeys(used))
     text = f"from math import *\n\n\ndef {entry}({', '.join(names)}):\n    return {ast.unparse(tree)}\n"
-    function = _function(text, entry)
+    function = function_of(text, entry)
     named: dict[str, Any] = {
         "name": "expression",
         "words": "a formula in the scene",
@@ -85,8 +85,8 @@ def _parsed(formula: str) -> ast.Expression:
         ) from None
 
 
-def _function(text: str, name: str) -> Any:
-    """The function of a text, whose lines `inspect` finds."""
+def function_of(text: str, name: str) -> Any:
+    """The function `name` of a text, whose lines `inspect` finds."""
     path = f"<formula {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
     linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
     names: dict[str, Any] = {}

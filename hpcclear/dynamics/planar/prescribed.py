@@ -8,12 +8,12 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import Revolute, Slide, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.path import rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, scene_of
 from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved

@@ -58,7 +58,7 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
     return tuple(
-        joint.without_play if isinstance(joint, Loose) else joint for joint in mechanism.joints
+        joint.without_clearance if isinstance(joint, Loose) else joint for joint in mechanism.joints
     )
 
 

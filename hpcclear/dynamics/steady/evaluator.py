@@ -12,10 +12,10 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, response
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import scales
 from hpcclear.dynamics.steady.effort import Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.steady.procedure import steady_mean
 from hpcclear.dynamics.views import Outcome, Start
 from hpcclear.scene import Scene

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.revolutions import objective
 
 LEVEL = 0.97
 """Of intervals that are called 95 %: a mean is looked at until its interval is narrow enough, and each look is
@@ -25,6 +24,14 @@ SLOWEST = 0.97
 
 DRIFT = 3.5
 """Standard errors of a drift, or of a difference between tolerances, that is no chance."""
+
+
+def objective(gaps: Array) -> Array:
+    """f (eq. 13), m, from mean gaps of all joints, m: shape (..., joints) to (...)."""
+    total: Array = np.hypot(gaps[..., 0], gaps[..., 1])
+    for k in range(2, gaps.shape[-1]):
+        total = np.hypot(total, gaps[..., k])  # by 0 it stays what it is, to the last bit
+    return total
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import effort as given
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import PERTURBATION, perturbed, separation
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Outcome, Start
 
 SHARE = 0.1

@@ -6,10 +6,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import LENGTH, perturbed
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 RTOL = 1e-8

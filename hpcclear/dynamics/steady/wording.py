@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Booleans, Records
 from hpcclear.base.outcome import Flag, Regime, Status
-from hpcclear.dynamics.revolutions import objective
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.scene import Scene
 
 NAMED = 8

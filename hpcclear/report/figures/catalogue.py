@@ -9,6 +9,7 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import (
     accuracy,
+    curves,
     designs,
     effects,
     guides,
@@ -159,6 +160,7 @@ RESPONSE: tuple[Entry, ...] = (
     Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
     Entry("spectrum", "response", response.spectrum_figure, "spectra"),
     Entry("energy", "response", response.energy_figure, "energy balance"),
+    Entry("tables", "response", curves.tables_figure, "tables of the scene, as they are simulated"),
 )
 """Of a response, beside `response_figure`."""
 

@@ -185,7 +185,7 @@ class Rare:
     weights: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
     simulations: int = 0
     factor: float = 1.0
-    """What the tolerance of f may change the probability by, part of all limits."""
+    """What the tolerance of f may change the probability by, part of all intervals."""
     _first: Array = field(default_factory=lambda: np.empty((0, 0)))
     _failing: list[tuple[Array, Array]] = field(default_factory=list)
     _anew: int = 0

@@ -44,7 +44,7 @@ class Estimate:
 
 
 FEW = 100.0
-"""Values that carry a standard deviation, below which its limits are widened: what few carry their scatter does not show."""
+"""Values that carry a standard deviation, below which its interval is widened: few values do not show their scatter."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def moments(values: Array) -> tuple[Estimate, Deviation]:
 
     Returns
     -------
-    (Estimate, Deviation)
+    `Estimate`, `Deviation`
         All NaN where fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
