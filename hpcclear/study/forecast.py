@@ -55,7 +55,7 @@ class _Here(Simulations):
         self._evaluate = evaluate
         self.count, self.seconds = 0, 0.0
 
-    def records(self, points: Points, stage: str) -> Records:
+    def _records(self, points: Points, stage: str) -> Records:
         """Outcome records of designs, in their order."""
         if not self.count:
             self._evaluate(points.take(np.arange(1)))  # compiles
