@@ -24,9 +24,9 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import perturbed, scales
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -34,9 +34,9 @@ SCENES = (5, 8, 11, 30, 55, 59, 69, 85, 104, 111)
 """The first in which 1 % takes more than the least that is ever simulated."""
 TARGET = 1e-2
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6)
-COPIES, STRETCH = 64, 5
+COPIES, SEGMENT = 64, 5
 SETTLED = 12
-"""Stretches after which nothing settles."""
+"""Segments after which nothing settles."""
 TOGETHER = 8
 """Designs in the lanes at once, as in a batch."""
 
@@ -52,20 +52,20 @@ class Split(NamedTuple):
     error: float
 
 
-def gaps_at(scene: Scene, rtol: float, stretches: int) -> tuple[np.ndarray, float]:
-    """Mean gaps (stretches, copies, 2) of perturbed copies, and processor seconds of one revolution."""
-    here = one_turn(scene, rtol, averaged_revolutions=STRETCH)
+def gaps_at(scene: Scene, rtol: float, segments: int) -> tuple[np.ndarray, float]:
+    """Mean gaps (segments, copies, 2) of perturbed copies, and processor seconds of one revolution."""
+    here = one_turn(scene, rtol, averaged_revolutions=SEGMENT)
     par = parameters(here)
     start = perturbed(start_states(here, par), scales(here), range(5000, 5000 + COPIES))
     lanes, rows = Lanes(problem_of(here), 32), np.repeat(par, COPIES, axis=0)
     lanes.step(1)
     found = []
     began = time.process_time()
-    for _ in range(stretches):
+    for _ in range(segments):
         outcome = lanes.run(rows, start)
         found.append(outcome.mean_gap)
         start = outcome.end()
-    return np.stack(found), (time.process_time() - began) / (stretches * COPIES * STRETCH)
+    return np.stack(found), (time.process_time() - began) / (segments * COPIES * SEGMENT)
 
 
 def error_of(
@@ -94,13 +94,13 @@ def cheapest(
                 for length in (1, 2, 4, 8, 16, 32, 48):
                     if spin_up + length > len(gaps):
                         continue
-                    revolutions = STRETCH * length * copies
-                    seconds = price * (revolutions + STRETCH * spin_up * copies)
+                    revolutions = SEGMENT * length * copies
+                    seconds = price * (revolutions + SEGMENT * spin_up * copies)
                     if best is not None and seconds >= best.seconds:
                         continue
                     error, limit = error_of(gaps, copies, spin_up, length, truth)
                     if error <= TARGET / 1.96 and (limit <= TARGET or not limits):
-                        best = Split(seconds, rtol, copies, STRETCH * spin_up, revolutions, error)
+                        best = Split(seconds, rtol, copies, SEGMENT * spin_up, revolutions, error)
     return best
 
 
@@ -110,7 +110,7 @@ def all_known(all_gaps: dict[float, tuple[np.ndarray, float]], truth: float) -> 
     for rtol, (gaps, price) in all_gaps.items():
         late = gaps[SETTLED:]
         each = objective(late.mean(axis=0))
-        scatter = float(each.var(ddof=1)) * STRETCH * len(late) / truth**2
+        scatter = float(each.var(ddof=1)) * SEGMENT * len(late) / truth**2
         off = abs(float(objective(late.mean(axis=(0, 1)))) / truth - 1.0)
         doubt = float(each.std(ddof=1)) / np.sqrt(COPIES) / truth
         revolutions = int(np.ceil(scatter * (1.96 / TARGET) ** 2))
@@ -140,7 +140,7 @@ def ours(scene: Scene, number: int) -> tuple[np.ndarray, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, nargs="*", default=SCENES)
-    parser.add_argument("--stretches", type=int, default=60)
+    parser.add_argument("--segments", type=int, default=60)
     options = parser.parse_args()
     ratios: dict[str, list[tuple[float, float]]] = {
         "with all known": [],
@@ -150,7 +150,7 @@ def main() -> None:
     for number in options.scenes:
         kind, scene = random_scene(number)
         ours(scene, 1)  # compiles
-        found = {rtol: gaps_at(scene, rtol, options.stretches) for rtol in TOLERANCES}
+        found = {rtol: gaps_at(scene, rtol, options.segments) for rtol in TOLERANCES}
         late = found[1e-6][0][SETTLED:]
         truth = float(objective(late.mean(axis=(0, 1))))
         one, alone = ours(scene, 1)

@@ -25,11 +25,11 @@ from drawing import described
 from hpcclear import __version__
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
-from hpcclear.dynamics.energy import energies
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import PERTURBATIONS, outcome_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.energy import energies
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.start import start_states

@@ -24,9 +24,9 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import perturbed, scales
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Set-up and all checks; every step runs whatever became of the others, and one table ends it. Exit 1 if a test failed.
-#   bash tests/run.sh           short profile: what a change must pass before it is handed on
+#   bash tests/run.sh           short profile: what a change must pass before it lands (.ci/run)
 #   bash tests/run.sh --quick   for the loop while developing, under 3 minutes once the kernel is compiled
-#   bash tests/run.sh --nightly short profile and what it leaves out: docs, release, kills, generated scenes (.ci/run)
+#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, release, kills, generated scenes
 #   bash tests/run.sh --full    everything, and the job scripts on a real Slurm where it is installed
 #   bash tests/run.sh --strict  exit 1 for lint, format, types and layers too; types for every locked Python (.ci/run)
 # --latest and --lowest choose other versions (jobs/environment.sh). All other words go to pytest:
@@ -23,24 +23,25 @@ for word in "$@"; do
     esac
 done
 
-# Left to --nightly: they run every block of the pages, build and install, kill jobs, or try generated scenes.
-nightly=(docs fuzz release survival)
-# Left out of --quick as well: they start mpiexec, other programs or a browser by the dozen, compile kernels of their own, or
+# Left out of --quick: they start mpiexec, other programs or a browser by the dozen, compile kernels of their own, or
 # simulate for long. A file that is new is in.
 long=(
-    api checkpoint cli cluster comm dataset effects figures hard_cases hostile jacobian limits linkage_scenes llvm motion native_windows
-    notebook oracle plan progress random_scenes report robust sensitivity statistics stiff study target tight trust vectorised
+    api checkpoint cli cluster comm dataset docs effects figures fuzz hard_cases hostile jacobian limits linkage_scenes
+    llvm motion native_windows notebook oracle plan progress random_scenes release report robust sensitivity statistics
+    stiff study survival target tight trust vectorised
 )
 
 rows=()
 left=()
+marks=
 red=0
 said=$(mktemp)
 table() {
     printf '\n%-32s %-8s %s\n' step result time
     printf '%s\n' "${rows[@]}"
+    [ -z "$marks" ] || echo "left out by this profile: tests marked $marks"
     if [ "${#left[@]}" -gt 0 ]; then
-        echo "left out by this profile: tests marked full, and ${#left[@]} of $(ls tests/test_*.py | wc -l) test files:"
+        echo "and ${#left[@]} of $(ls tests/test_*.py | wc -l) test files:"
         printf '%s\n' "${left[*]}" | fold -s -w 100 | sed 's/^/    /'
     fi
     if grep -q '^SKIPPED' "$said" 2>/dev/null; then
@@ -75,18 +76,27 @@ trap - EXIT
 unset PYTHONDONTWRITEBYTECODE
 row set-up 0 $SECONDS
 
-choice=(-m "not full")
 case $profile in
-full) choice=() ;;
-quick) left=("${nightly[@]}" "${long[@]}") ;;
-short) left=("${nightly[@]}") ;;
+full) ;;
+nightly) marks="full" ;;
+quick) marks="full or nightly" left=("${long[@]}") ;;
+short) if [ "${#words[@]}" -gt 0 ]; then marks="full"; else marks="full or nightly"; fi ;; # files that are named run
 esac
-if [ "${#words[@]}" -gt 0 ] && [ "$profile" = short ]; then left=(); fi # files that are named run
+choice=(${marks:+-m "not ($marks)"})
 for name in ${left[@]+"${left[@]}"}; do choice+=("--ignore=tests/test_$name.py"); done
 tests() { # what pytest says is kept, for the reasons of skips at the end
     python -m pytest "$@" | tee "$said"
     return "${PIPESTATUS[0]}"
 }
+ahead() {
+    local code=0 other
+    python tests/compile_ahead.py 1 & other=$!
+    python tests/compile_ahead.py || code=1
+    wait "$other" || code=1
+    return "$code"
+}
+# Named files compile what they need.
+if [ "${#words[@]}" -eq 0 ] && [ -f tests/compile_ahead.py ]; then step "compile" ahead; fi
 # Three at a time on two cores: many tests wait for mpiexec, for a kill or for a stop. The limit is for what hangs, on a busy machine too.
 step "tests, serial and under mpiexec" tests -q -ra --timeout 3600 -n 3 --dist loadfile --no-loadscope-reorder --durations=20 \
     ${choice[@]+"${choice[@]}"} ${words[@]+"${words[@]}"}

@@ -12,6 +12,7 @@ from some_laws import row
 
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
@@ -114,7 +115,9 @@ def lanes_have_single_bits(scene: Scene, columns: Mapping[tuple[str, ...], np.nd
     points = Points(names, np.transpose(list(columns.values())), tuple(columns))
     par = parameters(scene, points)
     start = start_states(scene, par)
-    together, alone = (Lanes(problem_of(scene), width).run(par, start) for width in (16, 1))
+    together, alone = (
+        Lanes(problem_of(scene), width).run(par, start) for width in (DEFAULT_LANES, 1)
+    )
     assert (alone.status == Status.OK).all()
     np.testing.assert_array_equal(together.rows, alone.rows)
 

@@ -7,6 +7,7 @@ import pytest
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.implicit import memory as mem
 from hpcclear.dynamics.implicit.columns import new_columns
 from hpcclear.dynamics.implicit.inverses import invert_complex, invert_real
@@ -50,12 +51,12 @@ def run(scene: Scene, samples: slice, width: int) -> Outcome:
 
 @pytest.mark.parametrize("name", ["friction", "oil", "always"])
 def test_no_sample_depends_on_its_neighbours(name: str):
-    """Three columns of eight, and eleven samples that take three in turn."""
+    """Three samples and many empty lanes, and eleven that take three in turn."""
     scene = scene_of(name)
-    together = run(scene, slice(0, 11), 16)
+    together = run(scene, slice(0, 11), DEFAULT_LANES)
     assert (together.status == Status.OK).all()
     assert (together.stiff_steps > 0).all()
-    for few, width in ((slice(4, 7), 8), (slice(0, 11), 3)):
+    for few, width in ((slice(4, 7), DEFAULT_LANES), (slice(0, 11), 3)):
         np.testing.assert_array_equal(run(scene, few, width).rows, together.rows[few])
 
 
@@ -71,7 +72,7 @@ def test_a_film_is_the_same_in_any_number_of_lanes(model: str):
     states = start + scale * np.random.default_rng(5).uniform(-1.0, 1.0, (count, 2 * n))
     contacts = np.zeros((count, START - START_CONTACTS))
     found = []
-    for width in (1, 16):
+    for width in (1, DEFAULT_LANES):
         out = np.zeros((count, n + RATES))
         address = problem.motion(problem.effects, width).address
         observe(address, par, problem.tables, states, contacts, np.zeros(count), out, width)
@@ -85,7 +86,7 @@ def test_implicit_steps_agree_with_explicit_ones(name: str, near: float):
     """Which share no coefficient, and are tight: what they differ by is the error of implicit steps at rtol 1e-6 or less."""
     scene = scene_of(name)
     tight = scene.with_({"numerics.method": "dormand-prince", "numerics.rtol": 1e-9})
-    abreast, exact = (run(one, slice(0, 4), 16) for one in (scene, tight))
+    abreast, exact = (run(one, slice(0, 4), DEFAULT_LANES) for one in (scene, tight))
     assert (abreast.stiff_steps > 0).all()
     assert (exact.stiff_steps == 0).all()
     np.testing.assert_allclose(abreast.objective, exact.objective, rtol=near)

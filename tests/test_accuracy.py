@@ -48,7 +48,7 @@ TINY = replace(
     repeats=1,
     revolutions=16,
     copies=4,
-    stretches=8,
+    segments=8,
     training=(20, 40),
     tests=20,
     draws=(16, 64, 1024),  # 256 simulations do for the first two
@@ -170,13 +170,13 @@ def test_a_transient_that_decays_and_copies_that_settle_apart():
 # ---- tolerance and revolutions -------------------------------------------------------------------
 
 
-def planted(bias, deviation, stretches=64, seed=7):
-    """Copies whose stretches scatter independently about a mean that goes by the tolerance."""
+def planted(bias, deviation, segments=64, seed=7):
+    """Copies whose segments scatter independently about a mean that goes by the tolerance."""
     rng = np.random.default_rng(seed)
-    shape = (stretches, len(spending.TOLERANCES), spending.COPIES)
+    shape = (segments, len(spending.TOLERANCES), spending.COPIES)
     f = 1.0 + np.array(bias)[:, None] + deviation * rng.standard_normal(shape)
     gaps = 1e-5 * np.stack([0.6 * f, 0.8 * f], axis=-1)
-    done = stretches * spending.COPIES * spending.STRETCH
+    done = segments * spending.COPIES * spending.SEGMENT
     price = np.array([1.0, 1.1, 1.3, 1.6, 2.0, 2.5]) * 1e-3
     return spending.Run(gaps, price * done, np.empty((6, spending.COPIES, 0)))
 
@@ -201,7 +201,7 @@ def test_the_cheapest_tolerance_is_the_loosest_that_is_not_off():
     assert seconds == pytest.approx(1.1e-3 * (spent + 32 * found.spin_up), rel=0.01)
     assert found.cheapest(0.004)[0] <= 1e-5  # 1e-4 is off by more
     assert np.isnan(found.cheapest(1e-5)).all()  # no bias is known so well
-    two = spending.analyse(planted([0.1, 0.01, 0.0, 0.0, 0.0, 0.0], 0.03, stretches=32))
+    two = spending.analyse(planted([0.1, 0.01, 0.0, 0.0, 0.0, 0.0], 0.03, segments=32))
     assert found.cheapest(0.004)[1] > found.cheapest(0.02)[1] > 0
     assert two.revolutions == found.revolutions // 2
 

@@ -449,7 +449,7 @@ def test_energy_closes_with_play_contact_and_friction(rtol):
     "contact",
     [
         pytest.param(running.LATCHED, id="latched", marks=pytest.mark.full),
-        pytest.param(running.HUNT_CROSSLEY, id="hunt-crossley"),
+        pytest.param(running.HUNT_CROSSLEY, id="hunt-crossley", marks=pytest.mark.nightly),
     ],
 )
 def test_rods_however_soft_or_stiff_end_in_a_stated_way(contact):

@@ -7,6 +7,7 @@ import pytest
 from running import scene_with
 
 from hpcclear.base import beside, cores
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
 
@@ -42,7 +43,7 @@ def test_a_part_that_fails_is_left_to_this_process(tmp_path):
 
 def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
     """A stepper never runs on addresses that are not there yet."""
-    lanes = Lanes(problem_of(scene_with()), 4)
+    lanes = Lanes(problem_of(scene_with()), DEFAULT_LANES)
 
     def interrupted(width, stages):
         raise KeyboardInterrupt

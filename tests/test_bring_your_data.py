@@ -6,11 +6,12 @@ from pathlib import Path
 import kinds_of_tables
 import numpy as np
 import pytest
+import report_data as data
 from pydantic import BaseModel
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.curves import curve_at
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.ensemble.session import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
@@ -323,6 +324,26 @@ def test_a_sketch_draws_each_table():
         assert "kN" in curve.get_title(loc="left")
         assert peak is None or values.max() == peak
     assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []
+
+
+def test_the_page_draws_the_tables_of_a_scene(tmp_path):
+    """Also of one that came from a file, whose values the result carries."""
+    from hpcclear.report.figures import catalogue
+    from hpcclear.report.figures.curves import tables_figure
+    from hpcclear.report.html.gallery import picture
+
+    (tmp_path / "p.csv").write_text("angle [deg],force [kN]\n0,1\n90,-0.5\n180,0\n270,0.2\n")
+    load = f'effects.slider_load={{file="{tmp_path / "p.csv"}"}}'
+    plain, loaded = (load_scene(JOBS / "slider_crank.toml", sets) for sets in ([], [load]))
+    found = data.response().assign_attrs(scene=loaded.text)
+    (line,) = tables_figure(found).axes[0].get_lines()
+    assert [round(one, 9) for one in line.get_ydata()[1:5]] == [1.0, -0.5, 0.0, 0.2]
+    assert tables_figure in [
+        entry.draw for entry in catalogue.RESPONSE
+    ]  # all of them are on the page
+    assert picture(tables_figure, found, "tables") is not None
+    without = data.response().assign_attrs(scene=plain.text)
+    assert picture(tables_figure, without, "tables") is None
 
 
 @pytest.mark.parametrize(

@@ -415,7 +415,11 @@ def kill_once(folder: Path, rounds: int, delay: float, context: BaseContext) -> 
 
 
 @pytest.mark.parametrize(
-    "kills", [pytest.param(10, id="10"), pytest.param(250, id="250", marks=pytest.mark.full)]
+    "kills",
+    [
+        pytest.param(10, id="10", marks=pytest.mark.nightly),
+        pytest.param(250, id="250", marks=pytest.mark.full),
+    ],
 )
 def test_kills_at_random_moments_lose_nothing_that_was_safe(tmp_path, kills):
     context = multiprocessing.get_context("forkserver")

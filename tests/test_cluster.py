@@ -143,7 +143,9 @@ def strike(box: Box, what: str) -> None:
 @pytest.mark.parametrize(
     ("what", "codes"),
     [
-        ("cut", {1}),  # at the default silence: later MPICH crashes without a message
+        pytest.param(
+            "cut", {1}, marks=pytest.mark.nightly
+        ),  # at the default silence: later MPICH crashes without a message
         pytest.param("root", DOCUMENTED | {9, 137, 255}, marks=FULL),  # the launcher's own
         pytest.param("remote", DOCUMENTED | {9, 137, 255}, marks=FULL),
         pytest.param("node", DOCUMENTED | {9, 137, 255}, marks=FULL),

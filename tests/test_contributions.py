@@ -95,8 +95,8 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     )  # fmt: skip
     best = xr.Dataset(coords={"design": "case alpha"})
     shares, tolerances = scatter.lines({"contributions": content}, best)
-    listed = "C 55% ± 2.0%, m2+m3 (correlated) 30% ± 3.9%, u2 0% within 0.8%. The cubic fit does not explain 15%"
+    listed = "C 55% ± 2.0%, m2+m3 (correlated) 30% ± 3.9%, u2 below 0.8%. The cubic fit does not explain 15%"
     assert listed in shares.text
-    assert "C 25% ± 2.0%, m2 10% ± 2.0%, m3 2% ± 1.0%, u2 0% within 0.2%" in tolerances.text
+    assert "C 25% ± 2.0%, m2 10% ± 2.0%, m3 2% ± 1.0%, u2 below 0.2%" in tolerances.text
     assert "other" not in shares.text + tolerances.text
     assert list(scatter.lines({}, best)) == []

@@ -104,6 +104,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "bifurcation": "observed",
         "wear": "clearance bearing_depth objective lifetime survival survival_lower exceedance ending",
         "effects": "off change limit decision recommended work samples failed objective",
+        "identify": "interval posterior explained widening coverage measured predicted rate",
         "accuracy": "error seconds evaluations averaging_error r2 moment_error strong_seconds lost_seconds",
     }
     dims = {
@@ -122,6 +123,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "bifurcation": "value crossing",
         "wear": "life joint cycle quantile",
         "effects": "variant effect response",
+        "identify": "unknown end record feature",
         "accuracy": "integrator rung quantity",
     }
     assert set(KINDS) == set(contract)

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -49,7 +50,9 @@ def follow(todo: list[Block], place: Path, monkeypatch: pytest.MonkeyPatch) -> N
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", RUN)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n == "README.md" else pytest.mark.nightly) for n in RUN]
+)
 def test_blocks_of_a_page_run_in_their_order(name, tmp_path, monkeypatch):
     todo = [block for block in BLOCKS[name] if block.runs and not block.slow]
     follow(todo, tmp_path / "checkout", monkeypatch)
@@ -145,6 +148,7 @@ FOREIGN |= {
 """Options of other programs: srun, apptainer, the two commands, tests/elsewhere.sh."""
 
 
+@cache
 def anchors(page: Path) -> set[str]:
     """Anchors of a page's headings, as GitHub makes them."""
     found = tokens(page)
@@ -205,6 +209,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.nightly
 def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
     made = {str(path.relative_to(site).parent) for path in site.rglob("index.html")}
     pages = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in PAGES[2:]}
@@ -214,6 +219,7 @@ def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
             assert not re.match(r"(https?:)?//", address), f"{path} loads {address}"
 
 
+@pytest.mark.nightly
 def test_the_reference_is_complete(site):
     commands = Site(site / "reference/commands/index.html").text
     for name, command in cli.commands.items():
@@ -247,6 +253,7 @@ def test_every_table_of_a_scene_has_an_example_and_every_entry_a_meaning():
             assert row.startswith("| `kind`") or not row.endswith("|  |"), f"{name}: {row}"
 
 
+@pytest.mark.nightly
 def test_no_code_of_ours_is_left_in_the_pages(site):
     for path in site.rglob("*.html"):
         text = Site(path).text

@@ -9,8 +9,8 @@ from numba import njit
 
 import hpcclear
 from hpcclear.base import eight
+from hpcclear.base.code_folder import _compiled_sources
 from hpcclear.base.eight import above, fetch, put, size, spread
-from hpcclear.base.jit import _compiled_sources
 
 ROWS = 24
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.explicit.tableau import PRINCE_DORMAND, TSITOURAS, Tableau
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.stepping.events import absolute_integral, hermite, root
@@ -45,7 +46,9 @@ def test_peaks_lie_between_the_ends_of_steps(law: str, pair: Tableau, rtol: floa
     # Those at the ends are 0.2 % low in the median, 1.7 % at worst. At 1e-12 steps are so short that it does not matter.
     def run(rtol: float, pair: Tableau):
         setup = ensemble(scene(law, rtol, 0, 1), 64)
-        return Lanes(replace(setup.problem, tableau=pair), 32).run(setup.par, setup.start)
+        return Lanes(replace(setup.problem, tableau=pair), DEFAULT_LANES).run(
+            setup.par, setup.start
+        )
 
     exact, found = run(1e-12, TSITOURAS), run(rtol, pair)
     for ours, theirs in (
@@ -63,7 +66,9 @@ def test_implicit_steps_have_the_same_peaks():
     setup = ensemble(scene("hunt-crossley", 1e-8, 0, 1), 8)
 
     def run(implicit: str):
-        return Lanes(replace(setup.problem, implicit=implicit), 8).run(setup.par, setup.start)
+        return Lanes(replace(setup.problem, implicit=implicit), DEFAULT_LANES).run(
+            setup.par, setup.start
+        )
 
     found, other = run("always"), run("never")
     assert found.stiff_steps.min() > 100

@@ -123,7 +123,7 @@ def test_all_corners_are_tried_and_those_that_make_no_mechanism_named():
     assert len(found.points) == 4
     assert list(map(tuple, found.points.values[list(found.refused)])) == [(0.07, 0.06)]
     told = dict(lines(found, simulate=False))
-    assert told["tried"] == "4 (all corners): 3 make a mechanism"
+    assert told["tried"] == "4 (all corners): 3 can be assembled"
     assert told["refused"].startswith("1 of 4 corners: ")
     assert "rod" in told["refused"]
 
@@ -135,7 +135,7 @@ def test_check_prints_the_corners(tmp_path):
     shown = " ".join(done.output.split())
     assert done.exit_code == 0
     assert "Corners of the study's ranges" in shown
-    assert "3 make a mechanism" in shown
+    assert "3 can be assembled" in shown
 
 
 @pytest.mark.parametrize(("shortest", "word"), [(0.01, "assembled"), (0.088, "cannot turn")])
@@ -184,7 +184,7 @@ def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
     found = tried(crank_and_rod(), simulate=True)
     assert seen[0].transient_revolutions + seen[0].averaged_revolutions == 2
     told = dict(lines(found, simulate=True))
-    assert told["tried"] == "4 (all corners): 2 make a mechanism and run two revolutions"
+    assert told["tried"] == "4 (all corners): 2 can be assembled and complete two revolutions"
     assert told["failed"].startswith(f"1 of 4 corners stalled: {Status.STALLED.message}")
     assert told["failed"].endswith(Status.STALLED.remedy)
 

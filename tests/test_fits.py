@@ -288,8 +288,10 @@ def test_a_share_of_the_number_it_is_about():
     assert studied({"study.random.x": mass}).study.random_input("x").deviation == pytest.approx(
         2.8e-3
     )
-    with pytest.raises(InputError, match="a share of a number that the study varies"):
-        studied({"study.random.m2": {"distribution": "uniform", "half_width": "3 %"}})
+    moved = studied({"study.random.m2": {"distribution": "uniform", "half_width": "3 %"}})
+    row = moved.study.random_input("m2")
+    assert row.relative
+    assert moved.study.law(row, {"m2": 0.3}).span == pytest.approx((-9e-3, 9e-3))
     bare = {"path": "mechanism.rod.mass", "distribution": "uniform", "half_width": "much %"}
     with pytest.raises(InputError, match="half_width"):
         scene_with({"study.variables.C": {"range": [1e-4, 2e-4]}, "study.random.m": bare})

@@ -303,7 +303,7 @@ def test_where_nothing_can_be_kept_a_temporary_folder_goes_at_the_end(tmp_path):
     ids=lambda settings: next(iter(settings)),
 )
 def test_a_place_that_cannot_be_written_to_ends_no_command(tmp_path, settings):
-    code = "import hpcclear.base.jit as one; print(one.config.CACHE_DIR)"
+    code = "from hpcclear.base.code_folder import chosen_folder; print(chosen_folder())"
     known = {"HPCCLEAR_CACHE": str(tmp_path / "own"), "XDG_CACHE_HOME": str(tmp_path / "home")}
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=crowded(60.0),

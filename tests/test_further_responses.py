@@ -7,6 +7,7 @@ from running import HUNT_CROSSLEY, LATCHED, scene_with
 from hpcclear.base.objectives import RATE, asked
 from hpcclear.base.outcome import ON_REQUEST, RESPONSES
 from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
@@ -97,7 +98,7 @@ def test_ranks_know_what_a_study_asks_for(how):
     scene = asking({}) if how == "study" else asking({"numerics.responses": True}, "mean-gap")
     points = Points(("C",), np.array([[2e-4], [3e-4]]), (("joints.crank_rod.clearance",),))
     records = sample_points(scene, points, alone())
-    here = asked(evaluate_records(scene, points, lanes=32), scene.objective)
+    here = asked(evaluate_records(scene, points, lanes=DEFAULT_LANES), scene.objective)
     assert records.tobytes() == here.tobytes()
     told = [name for name in RESPONSES if "point" not in name]  # no point is followed
     assert all(np.isfinite(records[name]).all() for name in told)
@@ -138,9 +139,9 @@ def test_the_energy_balance_of_every_sample_closes(changes):
     scene = asking({**changes, "numerics.energy": True})
     clearances = np.linspace(1e-4, 4e-4, 40)[:, None]
     points = Points(("C",), clearances, (("joints.crank_rod.clearance",),))
-    records = evaluate_records(scene, points, lanes=32)
+    records = evaluate_records(scene, points, lanes=DEFAULT_LANES)
     assert (records["status"] == 0).all()
     assert (records["energy_error"] < 1e-7).all()
     assert (records["energy_error"] > 0).any()
-    loose = evaluate_records(scene.with_({"numerics.rtol": 1e-4}), points, lanes=32)
+    loose = evaluate_records(scene.with_({"numerics.rtol": 1e-4}), points, lanes=DEFAULT_LANES)
     assert np.median(loose["energy_error"]) > 30 * np.median(records["energy_error"])

@@ -84,7 +84,7 @@ def test_words_tables_and_units_of_the_objective() -> None:
     ("entries", "key", "reason"),
     [
         ({"objectives": ["mean", "median"]}, "objectives.1.statistic", "not one of the known"),
-        ({"objectives": ["mean"]}, "objectives", "two objectives or more"),
+        ({"objectives": []}, "objectives", "needs an objective"),
         ({"objectives": ["mean", {"statistic": "exceedance"}]}, "objectives.1.limit", "threshold is missing"),
         ({"objectives": ["mean", {"statistic": "exceedance", "limit": "3 N"}]}, "objectives.1.limit", "does not fit"),
         ({"objectives": ["mean", {"statistic": "quantile", "level": 1.5}]}, "objectives.1.level", "below 1"),

@@ -17,6 +17,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together
@@ -277,7 +278,11 @@ def test_samples_are_the_scenes_with_their_numbers():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in ("press", "four_stroke") else pytest.mark.full) for n in NAMES]
+    "name", [
+        pytest.param("press"),
+        pytest.param("four_stroke", marks=pytest.mark.nightly),
+        *(pytest.param(n, marks=pytest.mark.full) for n in NAMES if n not in ("press", "four_stroke")),
+    ]
 )  # fmt: skip
 def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
     """And a sample comes to the bits of a single response by the same method."""
@@ -289,7 +294,8 @@ def test_bytes_are_the_same_for_any_ranks_and_lanes(name, tmp_path):
     scene = load_scene(LINKAGES / f"{name}.toml", sets)
     columns = {"C": np.linspace(*scene.required_study.variable("C").range, 9)}
     one, many = (
-        evaluate_records(scene, as_points(scene, columns), lanes=lanes) for lanes in (1, 8)
+        evaluate_records(scene, as_points(scene, columns), lanes=lanes)
+        for lanes in (1, DEFAULT_LANES)
     )
     assert one.tobytes() == many.tobytes()
     files = []
@@ -430,5 +436,5 @@ def test_the_angle_of_a_body_that_is_held_is_told():
     """By the joint that holds it: it has no coordinate of its own."""
     examples = LINKAGES.parents[1] / "docs" / "mkdocs" / "examples"
     told = put_together(mechanism_of(load_scene(examples / "linkage.toml").linkage)).report()
-    assert "frame: 90 deg (from 0)" in told
-    assert "crank: 25 deg (from 25)" in told
+    assert "frame: 90 deg (estimate 0)" in told
+    assert "crank: 25 deg (estimate 25)" in told

@@ -34,6 +34,7 @@ STOPS = [
     "map",
     "wear",
     "effects",
+    "identify",
     "run",
     "accuracy",
 ]  # by their time limit, so that the test is short
@@ -55,6 +56,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, s
     return {name: tuple(found) for name, found in json.loads(done.stdout).items()}
 
 
+@pytest.mark.nightly
 def test_every_command_works_or_ends_in_a_sentence(outcomes):
     codes = {name: code for name, (code, _) in outcomes.items()}
     assert {name: codes[name] for name in WORKS} == dict.fromkeys(WORKS, 0)

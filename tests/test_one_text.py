@@ -4,6 +4,7 @@ import ast
 import re
 import sys
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -47,6 +48,10 @@ def doubled(flag, x):
         return x
 
 
+class Switches(NamedTuple):
+    joints: Any = None
+
+
 @lane_function
 def everything(flag, gaps, x, n):
     """Calls within calls, tuples, loops written out and not, a function of the other kind beside."""
@@ -75,7 +80,7 @@ def plain(flag, gaps, x, n):
 
 
 @pytest.mark.parametrize("flag", [None, 1])
-@pytest.mark.parametrize("gaps", [at.Open(), at.Open(joint_1=1)])
+@pytest.mark.parametrize("gaps", [Switches(), Switches(joints=1)])
 def test_the_text_does_what_the_calls_do(flag, gaps):
     x = np.random.default_rng(3).normal(size=6)
     text = njit(one_text(everything, "everything", flag=flag, gaps=gaps, n=5))
@@ -86,7 +91,7 @@ def test_the_text_does_what_the_calls_do(flag, gaps):
 
 def test_what_is_off_is_not_in_the_text():
     with_, without = (
-        text_of(everything, "everything", {"flag": flag, "gaps": at.Open(), "n": 2})
+        text_of(everything, "everything", {"flag": flag, "gaps": Switches(), "n": 2})
         for flag in (1, None)
     )
     assert "3.0 *" in with_
@@ -96,7 +101,7 @@ def test_what_is_off_is_not_in_the_text():
 def test_a_function_of_the_other_kind_stands_beside():
     """It is compiled with its own rules of arithmetic."""
     assert (written_kind(everything), written_kind(first_beyond)) == ("lane", "scalar")
-    text = text_of(everything, "everything", {"flag": None, "gaps": at.Open(), "n": 2})
+    text = text_of(everything, "everything", {"flag": None, "gaps": Switches(), "n": 2})
     beside = text[: text.index("def first_beyond")].splitlines()[-1]
     assert beside.startswith("@njit(")
     assert "fastmath" not in beside

@@ -205,6 +205,7 @@ def check_outcome(scene: Scene) -> None:
     assert run.outcome["rhs_evaluations"] < 2 * 20 * 100_000
 
 
+@pytest.mark.nightly
 @CI
 @given(plain_scenes)
 def test_random_scene(content: dict):

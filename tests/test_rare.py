@@ -107,6 +107,21 @@ def test_limits_of_a_rare_failure_hold(name, limit, shift):
     assert values.std() < 0.15
 
 
+@pytest.mark.parametrize(("off", "expected"), [(0.0, 1.0), (0.1, 1.4)])
+def test_limits_of_a_rare_failure_hold_what_the_tolerance_takes(off, expected):
+    """A plane that is too low by a tenth: at 3.1 its probability is 1.37 times larger at a stricter tolerance."""
+    made = estimated(plane, 4, 3.1, 3)
+    before = made.interval(0.95)
+    answered(made.paired(0.0), lambda u: plane(u) + off)
+    found = made.interval(0.95)
+    assert made.factor == pytest.approx(expected, abs=0.15)
+    assert (found.lower, found.upper) == pytest.approx(
+        (before.lower / made.factor, before.upper * made.factor)
+    )
+    if off:
+        assert found.upper > stats.norm.sf(3.1 - off) > before.value
+
+
 def test_what_cannot_fail_has_an_upper_limit_all_the_same():
     """f is bounded below the limit; an upper limit is that of a lower level."""
     made = estimated(lambda u: np.tanh(plane(u)), 3, 1.0 + 1e-9, 1)
@@ -137,16 +152,16 @@ def test_inputs_too_far_out_to_make_a_mechanism_count_as_failed():
             raise InputError("C", -1.0, "is negative", "Narrow its distribution")
         return Points(names, values, (("joints.crank_rod.clearance",),))
 
-    def records(points: Points, stage: str) -> np.ndarray:
-        return points.values[:, 0]
+    def judged(points: Points, stage: str) -> tuple[None, np.ndarray]:
+        return None, 2.0 * points.values.T
 
-    simulations = SimpleNamespace(filled=filled, records=records, objective=lambda one: 2.0 * one)
-    run = SimpleNamespace(simulations=simulations)
+    simulations = SimpleNamespace(filled=filled, judged=judged)
+    run = SimpleNamespace(simulations=simulations, study=SimpleNamespace(further=()))
     values = np.array([[1.0], [-1.0], [2.0], [3.0], [-2.0]])
     np.testing.assert_array_equal(rare._valid(run, ("C",), values), values[:, 0] > 0.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rare, "_rows", lambda run, choice, u: (("C",), u))
-        first, second = rare._simulated(run, [(None, values), (None, -values[:1])], "stage")
+        patch.setattr(rare, "rows_of", lambda run, choice, u: (("C",), u))
+        (first,), (second,) = rare.simulated(run, [(None, values), (None, -values[:1])], "stage")
     np.testing.assert_array_equal(first, [2.0, np.nan, 4.0, 6.0, np.nan])
     np.testing.assert_array_equal(second, [np.nan])
 

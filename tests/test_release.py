@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from patience import crowded
 
+pytestmark = pytest.mark.nightly
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
 JOBS = {

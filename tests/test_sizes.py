@@ -1,4 +1,4 @@
-"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused, loops that are written out."""
+"""Sizes come from one place: sums over any number of coordinates, what does not fit is refused."""
 
 import dis
 from dataclasses import replace
@@ -11,6 +11,7 @@ from running import scene_with
 from some_laws import effects_with
 
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.numbered import Rows
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.explicit import tableau as tab
@@ -20,7 +21,6 @@ from hpcclear.dynamics.implicit.columns import leave
 from hpcclear.dynamics.implicit.newton import observe_stages
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.rows import Rows
 from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.views import Outcome, Start
 

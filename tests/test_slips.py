@@ -47,7 +47,10 @@ def fault(made: Slip, code: int, output: str) -> str:
 
 @pytest.mark.parametrize(
     ("first", "count"),
-    [(0, FIRST), *(pytest.param(k, ONE, marks=pytest.mark.full) for k in range(0, 10_000, ONE))],
+    [
+        pytest.param(0, FIRST, marks=pytest.mark.nightly),
+        *(pytest.param(k, ONE, marks=pytest.mark.full) for k in range(0, 10_000, ONE)),
+    ],
 )
 def test_check_answers_every_random_scene(first, count, tmp_path, recwarn):
     faults: Counter[tuple[str, str]] = Counter()

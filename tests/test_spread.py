@@ -50,9 +50,9 @@ def test_limits_of_a_quantile_hold_wherever_unknown_values_lie():
 
 def test_quantiles_are_stated_only_where_the_samples_reach_them():
     few, many = (spread.statistics(drawn(count)) for count in (60, 500))
-    assert text(few, "P50 of f").count("mm") == 3
-    assert text(few, "P95 of f") == "not stated: it takes 72 samples"
-    assert text(few, "P99 of f") == "not stated: it takes 368 samples"
+    assert text(few, "median of f").count("mm") == 3
+    assert text(few, "P95 of f") == "not stated: it needs 72 samples"
+    assert text(few, "P99 of f") == "not stated: it needs 368 samples"
     assert "to" in text(many, "P99 of f")
     assert "failed" in dict(few)
     failing = spread.statistics(drawn(500, 60))  # these might all be above

@@ -64,9 +64,37 @@ def test_a_response_that_is_compiled_loads_nothing_that_only_compiling_needs(tmp
         "mpi4py.MPI",
         "numba",
         "pint",
+        "pyarrow",
         "scipy.special",
         "scipy.stats",
         "sklearn",
         "xarray",
     }
     assert loaded_by(command(*words), compiling | others) == {"numba", "xarray"}
+
+
+@pytest.mark.parametrize(("ends", "code"), [("3", 3), ("None", 0), ("'why'", 1)])
+def test_a_process_ends_at_once_but_says_all_and_leaves_nothing(ends, code):
+    """What Python does at its end, but for freeing one by one what the system frees."""
+    program = f"""
+import atexit, gc, sys
+import hpcclear.__main__ as program, hpcclear.cli
+def command():
+    assert gc.get_threshold() > usual
+    gc.collect()
+    assert gc.get_threshold() == usual
+    atexit.register(print, "last")
+    print("x" * 100_000)
+    sys.exit({ends})
+usual = gc.get_threshold()
+hpcclear.cli.main = command
+class Left:
+    def __del__(self): print("freed")
+left = Left()
+program.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=crowded(60.0)
+    )
+    assert (done.returncode, done.stderr) == (code, "")
+    assert done.stdout == "x" * 100_000 + "\nlast\n"

@@ -328,7 +328,7 @@ def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("rank", [1, 2])
+@pytest.mark.parametrize("rank", [1, pytest.param(2, marks=pytest.mark.nightly)])
 def test_an_error_of_a_leader_or_of_who_it_leads_is_told_once_and_loses_nothing(tmp_path, rank):
     place = tmp_path / "out.nc"
     failed = launch(4, place, 60_000, SHARED="1", FAILS=str(rank))

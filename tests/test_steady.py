@@ -9,11 +9,11 @@ import pytest
 from scipy import stats
 
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import ensemble, judging
 from hpcclear.dynamics.steady.copies import scales
 from hpcclear.dynamics.steady.effort import Effort, Mean, Sample
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.steady.look import look
 from hpcclear.dynamics.steady.procedure import loosest
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -63,13 +63,13 @@ APPROACHES = {
 def looked_at(f: Callable[[int], float], target: float, tolerance: float, latched: bool) -> Mean:
     """What a look says of a motion whose f, 1 in the end, is told revolution by revolution; `tolerance` times rtol is added."""
     asking = look(Effort(a_sample(latched), 10**4), target)
-    stretch = next(asking)
+    segment = next(asking)
     for k in itertools.count():
-        outcome = Outcome(np.zeros((len(stretch.start), Outcome.size)))
-        off = tolerance * stretch.rtol / np.sqrt(Parameters(stretch.par).strictness)
+        outcome = Outcome(np.zeros((len(segment.start), Outcome.size)))
+        off = tolerance * segment.rtol / np.sqrt(Parameters(segment.par).strictness)
         outcome.mean_gap[:, 0] = 1.0 + f(k) + off
         try:
-            stretch = asking.send(outcome)
+            segment = asking.send(outcome)
         except StopIteration as end:
             return end.value[0]
 
@@ -236,15 +236,15 @@ def found_of_noise(scatter: float, bias: float, seed: int, target: float = 1e-2)
     """What an ensemble finds where f is 1 and noise; the looser tolerance off by `bias`."""
     rng = np.random.default_rng(seed)
     asking = ensemble.ensemble(Effort(a_sample(), 10**6), target, ensemble.LOOSEST, growth=10.0)
-    stretch = next(asking)
+    segment = next(asking)
     while True:
-        tolerance = stretch.rtol / np.sqrt(Parameters(stretch.par).strictness)
-        outcome = Outcome(np.zeros((len(stretch.start), Outcome.size)))
+        tolerance = segment.rtol / np.sqrt(Parameters(segment.par).strictness)
+        outcome = Outcome(np.zeros((len(segment.start), Outcome.size)))
         off = bias * (tolerance > 0.5 * ensemble.LOOSEST)
-        noise = scatter / np.sqrt(stretch.revolutions) * rng.standard_normal(len(off))
+        noise = scatter / np.sqrt(segment.revolutions) * rng.standard_normal(len(off))
         outcome.mean_gap[:, 0] = 1.0 + off + noise
         try:
-            stretch = asking.send(outcome)
+            segment = asking.send(outcome)
         except StopIteration as end:
             return end.value
 
@@ -260,7 +260,7 @@ def test_an_ensemble_of_noise_holds_its_mean_for_little_more_than_it_takes(scatt
     width = np.median([mean.limit for mean in found]) / (1.96 * f.std())
     assert (0.95 < width < 1.2) if scatter > 0.1 else (1.5 < width < 3.0)
     least = max(
-        (1.96 * scatter / 1e-2) ** 2, ensemble.FIRST[0] * ensemble.STRETCH * ensemble.COPIES
+        (1.96 * scatter / 1e-2) ** 2, ensemble.FIRST[0] * ensemble.SEGMENT * ensemble.COPIES
     )
     assert np.mean([mean.revolutions for mean in found]) < 1.7 * least
 
@@ -273,10 +273,10 @@ def test_a_tolerance_that_is_off_is_not_averaged_with_the_stricter_one():
 
 
 @pytest.mark.parametrize(
-    ("growth", "stretches"), [(11.0, 4), (2.5, 5), (1.0, 6), (-1.0, 6), (np.nan, 6)]
+    ("growth", "segments"), [(11.0, 4), (2.5, 5), (1.0, 6), (-1.0, 6), (np.nan, 6)]
 )
-def test_slow_kicks_wait_longer_for_the_first_look(growth: float, stretches: int):
-    assert ensemble._first(a_sample(), growth) == stretches
+def test_slow_kicks_wait_longer_for_the_first_look(growth: float, segments: int):
+    assert ensemble._first(a_sample(), growth) == segments
     assert ensemble._first(a_sample(latched=True), growth) == 6
     assert ensemble._first(a_sample(free=True), growth) == 6
 

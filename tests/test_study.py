@@ -339,7 +339,10 @@ def test_a_formula_has_no_chaos_and_the_study_says_so(results):
     spoilt = found.copy(deep=True)
     spoilt["chaotic"][:], spoilt["chaos_share"][:] = 0.5, 0.4
     lines = dict(answer(files | {"chaos": spoilt}, "here"))
-    assert "change 50% of the samples of this one and explain 40% of its variance" in lines["chaos"]
+    assert (
+        "change 50% of the recommended design's samples and explain 40% of its variance"
+        in lines["chaos"]
+    )
     assert "averaged_revolutions" in lines["next steps"]
 
 
@@ -459,7 +462,7 @@ def test_the_front_is_true_where_the_surrogate_fails(tmp_path, monkeypatch):
     told: list[str] = []
     scene = scene_of("study.verification.infill_rounds=4", "study.seed=5")
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet", notify=told.append)
-    assert any(text.startswith("Surrogate error at ") for text in told)
+    assert any(text.startswith("Surrogate errors of mean") for text in told)
     found = dataset.read(tmp_path / "out" / "verification.nc")
     ours, swarms = found.sel(design="first alpha"), found.sel(design="first best alpha")
     assert float(ours["mean_upper"]) < float(swarms["mean_lower"])

@@ -9,9 +9,9 @@ import pytest
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import angle_cells
 from hpcclear.dynamics.linkage.parts import TableDrive
 from hpcclear.dynamics.linkage.table_drive import words_of
+from hpcclear.dynamics.planar.curves import angle_cells
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.problem import problem_of
 

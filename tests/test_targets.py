@@ -44,6 +44,7 @@ def test_the_scenes_own_settings_are_placed_between_the_measured_ones(found):
     assert "rtol 1e-6" in own.words
     price = float(found["tolerance_seconds"][3])
     assert own.seconds == pytest.approx(10 * price)
+    assert own.error >= min(way.error for way in targets.ways(found) if way.seconds <= own.seconds)
     loose = targets.settings(
         found.assign_attrs(scene=SCENE.replace("rtol = 1e-06", "rtol = 1e-03"))
     )

@@ -183,6 +183,7 @@ def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path
 
 
 @pytest.mark.mpi
+@pytest.mark.nightly  # with two objectives in test_goals
 def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
     """By the formula of other studies, whose program ranks can start."""
     light = 'study.cases={light={random=["C", "m2"], objectives=["mean", "deviation", {formula="m2 + m3"}]}}'
@@ -414,7 +415,7 @@ def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) 
 
 MANY = '["mean", "deviation", "quantile", {formula="m2"}, {formula="m3"}, {formula="u2"}]'
 REFUSED = {  # what is asked for: the key within the case, and why
-    '["mean"]': ("objectives", "two objectives or more"),
+    "[]": ("objectives", "needs an objective"),
     '["mean", "deviation", "mean"]': ("objectives.2", "already"),
     '[{formula="m2+m3"}, "mean", {formula=" m2 + m3"}]': ("objectives.2", "already"),
     '["quantile", {statistic="quantile", level=0.95}]': ("objectives.1", "already"),

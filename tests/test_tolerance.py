@@ -77,7 +77,10 @@ def _dynamics(monkeypatch):
 def apart(ours, theirs, *overrides):
     scene = scene_of(*overrides)
     return tolerance._apart(
-        SimpleNamespace(study=scene.required_study), Choice("", "play", {"m2": 0.2}), ours, theirs
+        SimpleNamespace(study=scene.required_study),
+        Choice("", "play", {"m2": 0.2}),
+        ours[None],
+        theirs[None],
     )
 
 
@@ -256,12 +259,20 @@ def test_pairs_are_of_points_that_are_verified_anyway(tmp_path, made):
     assert [rtol for stage, rtol in made if stage == "pairs"] == pytest.approx([1e-6])
 
 
-def test_without_an_accuracy_nothing_is_paired(tmp_path, made):
-    scene = scene_of().with_({"study.accuracy": None})
+@pytest.mark.parametrize("override", ["study.verification.least_samples=512", "study.verification.samples=400"])  # fmt: skip
+def test_without_an_accuracy_limits_hold_the_tolerance_too(tmp_path, made, override):
+    """A few pairs in every study, of independent draws as of sequences; they do not ask for more samples."""
+    bare = scene_of().with_({"study.accuracy": None}).to_toml()
+    scene = load_scene(tomllib.loads(bare), [override])
     run_study(scene, tmp_path / "it", alone(), progress_style="quiet")
-    assert {rtol for _, rtol in made} == {1e-4}
-    assert extent.samples_of(scene)["pairs"] == 0
-    assert "mean_tolerance" not in dataset.read(tmp_path / "it" / "verification.nc")
+    pairs = sum(count for (stage, _), count in made.items() if stage == "pairs")
+    assert pairs == extent.samples_of(scene)["pairs"] > 0
+    assert pairs < 0.04 * sum(made.values())
+    found = dataset.read(tmp_path / "it" / "verification.nc")
+    np.testing.assert_allclose(found["mean_tolerance"], SHARE, rtol=1e-3)
+    half = (found["mean_upper"] - found["mean_lower"]) / 2.0
+    assert (half > SHARE * found["mean_true"]).all()
+    assert "mean_within" not in found
 
 
 # -- what is refused, and what an earlier version wrote ----------------------------------------------
@@ -318,10 +329,8 @@ def test_an_accuracy_of_verification_beside_another_is_not_used_and_said_so():
     assert "not used beside study.accuracy" in scene.readings[0]
 
 
-def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path, made):
+def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path):
     scene = scene_of("study.verification.samples=100")
     told: list[str] = []
     run_study(scene, tmp_path / "it", alone(), progress_style="quiet", notify=told.append)
     assert any("study.accuracy is not used" in text for text in told)
-    assert {rtol for _, rtol in made} == {1e-4}
-    assert extent.samples_of(scene)["pairs"] == 0

@@ -18,9 +18,9 @@ from test_wear import ROTOR, WEAR
 import hpcclear
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.problem import effects_of, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome

@@ -18,10 +18,11 @@ from hpcclear.accuracy.profile import Profile
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout import MAX_JOINTS
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import gaps_of_revolutions, objective
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Parameters, Start
 from hpcclear.scene import Scene
 
@@ -91,3 +92,26 @@ def revolutions_of(scene: Scene, copies: int, revolutions: int) -> tuple[Array, 
     gaps = gaps_of_revolutions(lanes, par, start, revolutions)
     seconds = (time.perf_counter() - started) / (revolutions * copies)
     return gaps[:, np.isfinite(gaps[-1]).all(axis=1)], seconds
+
+
+def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int) -> Array:
+    """Mean gaps of every revolution, shape (revolutions, samples, MAX_JOINTS), m; NaN from a failure on.
+
+    Parameters
+    ----------
+    lanes : Lanes
+        Empty, of a problem that averages one revolution without a transient.
+    par : ndarray, shape (samples, PARAMETERS)
+    start : Start
+    revolutions : int
+    """
+    count = len(par)
+    gaps = np.full((revolutions, count, MAX_JOINTS), np.nan)
+    alive = np.arange(count)
+    for revolution in range(revolutions):
+        outcome = lanes.run(par[alive], start)
+        good = outcome.status == 0
+        alive, outcome = alive[good], outcome[good]
+        gaps[revolution, alive] = outcome.mean_gap
+        start = outcome.end()
+    return gaps

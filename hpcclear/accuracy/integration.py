@@ -1,7 +1,7 @@
 """Work and precision: error of one revolution against time and force evaluations, over a ladder of tolerances.
 
 One revolution from the start, so that errors are those of the integrator: over many revolutions rattling contacts
-amplify any error to the same size (the averaging panel shows that floor).
+amplify any error to the same size (the averaging panel shows that bound).
 """
 
 from collections.abc import Callable

@@ -19,8 +19,8 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.scene import Scene
 
 LARGEST_STEP = 1.0 / 64.0
@@ -172,7 +172,7 @@ def solve_turn(
     """One revolution by a solver of scipy, in pieces on which every law is smooth; values and force evaluations."""
     here, start, period = one.anew(), one.start.copy(), float(one.named.period)
     effects = one.problem.effects
-    joints = [j for j, on in enumerate(at.open_of(effects)) if on is not None]
+    joints = list(at.places_of(effects))
     side = np.where(here.joints(0.0, start)[:, OPEN] > 0.0, 1.0, -1.0)
     end = np.inf if one.free else period
     limit = 20.0 * period if one.free else end
@@ -220,7 +220,7 @@ def _full_turn(n: int, end: float) -> Event:
 def _event(value: Event, direction: float) -> Event:
     """A terminal event of scipy that has one value at one time.
 
-    scipy finds a change of sign in the states at both ends of a step, then asks the interpolant there, which differs by
+    scipy finds a change of sign in the states at both ends of a step, then evaluates the interpolant there, which differs by
     rounding: where the change is that small, it would find none and stop with an error.
     """
     known: dict[float, float] = {}

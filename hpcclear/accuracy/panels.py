@@ -150,7 +150,7 @@ class Panels:
         else:
             self._shown(run)
         with self.ranks.stage("spending"):
-            until, check = self.profile.stretches, self.ranks.raise_if_stopped
+            until, check = self.profile.segments, self.ranks.raise_if_stopped
             for longer in spending.measure(self.scene, run, until, check):
                 self._store.save_stage("copies", vars(longer))
                 self._shown(longer)

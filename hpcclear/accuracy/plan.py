@@ -4,6 +4,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.study import extent, lives
+from hpcclear.study import extent, forecast, lives
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
 """Errors of the ladder."""
@@ -169,7 +170,7 @@ def measure(
     assert study is not None  # refused by `design`
     wanted = [(None, scene), *((e, scene.with_({"numerics.target_error": e})) for e in errors)]
     rows: list[Row] = []
-    whole = sum(extent.samples_of(scene).values()) if study.cases else None
+    whole: int | None = None
     single = extent.responses_of(scene) if study.cases else 0
 
     def made() -> Plan:
@@ -186,6 +187,9 @@ def measure(
         )
     seconds, _ = _busy(scene, points, ranks, _block(scene) * ranks.size, "plan: first look")
     rows.append(Row(None, scene, seconds, ""))
+    if study.cases:
+        pilot = partial(sample_points, scene, ranks=ranks, stage="plan: pilot")
+        whole, _ = forecast.expected(scene, pilot, seconds)
     show(replace(made(), first=True))
     rows.clear()
     with _company(scene, points, workers if ranks.size == 1 else 1, notify):
@@ -265,7 +269,7 @@ def _company(
 
 
 def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -> None:
-    """Simulate points over and over until asked to stop."""
+    """Simulate points over and over until stopped."""
     evaluator = Evaluator(
         load_scene(content, trust=True).with_({"numerics.target_error": None}), points
     )

@@ -22,7 +22,7 @@ class Profile:
     """Of the long runs of the averaging panel."""
     copies: int = 32
     """Long runs that differ by tiny perturbations at their start."""
-    stretches: int = 64
+    segments: int = 64
     """Of ten revolutions, of each copy at each tolerance, in the panel of tolerance and revolutions."""
     training: tuple[int, ...] = (25, 50, 100, 200, 400)
     """Sample sizes of the surrogates."""
@@ -47,7 +47,7 @@ QUICK = Profile(
     more_methods=False,
     revolutions=160,
     copies=16,
-    stretches=16,
+    segments=16,
     training=(25, 50, 100),
     tests=100,
     draws=tuple(4**k for k in range(2, 7)),

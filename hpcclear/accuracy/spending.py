@@ -21,11 +21,11 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import perturbed, scales
 from hpcclear.dynamics.steady.ensemble import POOLED
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Start
 from hpcclear.scene import Scene
 
@@ -33,11 +33,11 @@ TOLERANCES = tuple(10.0**-k for k in range(3, 9))
 COPIES = 32
 """At each tolerance: as many as lanes, each with a spin-up of its own."""
 
-STRETCH = 10
+SEGMENT = 10
 """Revolutions at a time."""
 
 FIRST = 8
-"""Stretches of all copies after which there is something to show; they are doubled from there."""
+"""Segments of all copies after which there is something to show; they are doubled from there."""
 
 AIMS = (0.1, 0.03, 0.01, 0.003, 0.001)
 """Relative standard errors whose cheapest price is reported."""
@@ -114,7 +114,7 @@ class Run:
 
 
 def measure(
-    scene: Scene, run: Run, stretches: int, check: Callable[[], object] = lambda: None
+    scene: Scene, run: Run, segments: int, check: Callable[[], object] = lambda: None
 ) -> Iterator[Run]:
     """Go on until there are so many intervals of every copy; yields at every doubling.
 
@@ -123,8 +123,8 @@ def measure(
     here = one_turn(scene)
     par = np.repeat(parameters(here), COPIES, axis=0)
     lanes = [_lanes(here, rtol) for rtol in TOLERANCES]
-    while len(run.gaps) < stretches:
-        until = min(max(FIRST, 2 * len(run.gaps)), stretches)
+    while len(run.gaps) < segments:
+        until = min(max(FIRST, 2 * len(run.gaps)), segments)
         gaps, seconds, start = list(run.gaps), run.seconds.copy(), run.start.copy()
         while len(gaps) < until:
             gaps.append(np.empty(run.gaps.shape[1:]))
@@ -140,7 +140,7 @@ def measure(
 
 
 def _lanes(scene: Scene, rtol: float) -> Lanes:
-    changes = {"rtol": rtol, "atol": None, "averaged_revolutions": STRETCH}
+    changes = {"rtol": rtol, "atol": None, "averaged_revolutions": SEGMENT}
     lanes = Lanes(
         problem_of(scene.with_({f"numerics.{k}": v for k, v in changes.items()})), DEFAULT_LANES
     )
@@ -165,15 +165,15 @@ def analyse(run: Run) -> Spending:
     alone = share == 1.0
     bias = np.where(alone, np.nan, mean / truth - 1.0)
     bias_error = np.where(alone, np.nan, bias_error)
-    turns = np.array([STRETCH * gaps.shape[0] * gaps.shape[1] for gaps in kept])
+    turns = np.array([SEGMENT * gaps.shape[0] * gaps.shape[1] for gaps in kept])
     variance = square * turns / truth**2
-    spent = doubling(int(turns.min()) // (4 * STRETCH), start=1) * STRETCH
-    error = np.array([[_error(gaps, int(n) // STRETCH, truth) for n in spent] for gaps in kept])
+    spent = doubling(int(turns.min()) // (4 * SEGMENT), start=1) * SEGMENT
+    error = np.array([[_error(gaps, int(n) // SEGMENT, truth) for n in spent] for gaps in kept])
     model = np.sqrt(_known_bias(bias, bias_error)[:, None] ** 2 + variance[:, None] / spent)
-    done = STRETCH * COPIES * len(run.gaps)
+    done = SEGMENT * COPIES * len(run.gaps)
     return Spending(
         np.array(TOLERANCES), spent, error, model, bias, bias_error, variance,
-        float(STRETCH * spin_up), run.seconds / done, done * len(TOLERANCES),
+        float(SEGMENT * spin_up), run.seconds / done, done * len(TOLERANCES),
     )  # fmt: skip
 
 
@@ -208,11 +208,11 @@ def _known_bias(bias: Array, error: Array) -> Array:
     return np.sqrt(np.maximum(np.nan_to_num(bias) ** 2 - np.nan_to_num(error) ** 2, 0.0))
 
 
-def _error(gaps: Array, stretches: int, truth: float) -> float:
+def _error(gaps: Array, segments: int, truth: float) -> float:
     """Relative error of means of so many intervals, from gaps (intervals, copies, joints): of one copy or of several."""
     length, copies = gaps.shape[:2]
-    together = -(-stretches // length)  # copies in a mean
-    long = stretches // together
+    together = -(-segments // length)  # copies in a mean
+    long = segments // together
     groups, pieces = copies // together, length // long
     if groups * pieces < 4:
         return np.nan

@@ -11,17 +11,15 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from numba import config
-
+from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.cores import own_cores
-from hpcclear.base.jit import source_key
 
 PATIENCE = 120.0  # s, after which it is given up
 
 
 def _mark(part: str) -> Path:
     """Where it is noted that a part was compiled."""
-    return Path(config.CACHE_DIR) / f"compiled-{source_key()}-{part.replace(':', '-')}"
+    return Path(chosen_folder()) / f"compiled-{source_key()}-{part.replace(':', '-')}"
 
 
 @contextlib.contextmanager
@@ -44,7 +42,7 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
         other = subprocess.Popen(
             [sys.executable, "-c", code, *wanted],
             stdin=quiet, stdout=quiet, stderr=quiet,
-            env={**os.environ, "NUMBA_CACHE_DIR": config.CACHE_DIR},  # also where that is a folder of this process alone
+            env={**os.environ, "NUMBA_CACHE_DIR": chosen_folder()},  # also where that is a folder of this process alone
         )  # fmt: skip
     except OSError:  # no room for another process
         yield

@@ -1,19 +1,56 @@
-"""Compiled functions that come from the cache on disk without what only compiling needs.
+"""Compiled functions that come from this package's own cache on disk, without what only compiling needs.
+
+The folder is this package's alone: of the host process, what Numba keeps where and compiles for what stays as it is.
 
 Before Numba loads machine code it imports its own library for compiled programs: arrays, strings, random numbers, linear
-algebra. That took a third of the start of a command, and code that is compiled already calls none of it. Numba imports it
+algebra. That took a third of the start of a command, and code that is compiled already calls nothing of it. Numba imports it
 itself where it compiles.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import MethodType
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core.caching import Cache
 from numba.core.ccallback import CFunc
+from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import Signature
+
+from hpcclear.base.code_folder import chosen_folder
+from hpcclear.base.width import asked_width, features
+
+
+@contextmanager
+def _set(name: str, value: Any) -> Iterator[None]:
+    """Have a setting of Numba inside the block, and the host's own behind it."""
+    before = getattr(config, name)
+    setattr(config, name, value)
+    try:
+        yield
+    finally:
+        setattr(config, name, before)
+
+
+def _prepare() -> None:
+    """Have Numba make its compiler for the vectors that this processor is fast with, if it has not made it yet.
+
+    It is made once a process, for all that is compiled there; where the host has compiled before, its choice holds.
+    """
+    asked_width()  # refused if it is none, also where the user names the processor to Numba, and it says nothing
+    chosen = config.CPU_FEATURES
+    if config.ENABLE_AVX and config.CPU_NAME is None and chosen is None:
+        chosen = features()
+    with _set("CPU_FEATURES", chosen):
+        cpu_target.target_context.codegen()
+
+
+def features_in_use() -> str:
+    """Features of the processor that Numba compiles for, as LLVM names them."""
+    return str(cpu_target.target_context.codegen()._tm_features)
 
 
 def _load_overload(cache: Any, signature: Any, context: Any) -> Any:
@@ -32,7 +69,8 @@ def _lightly(compiled: Any) -> Any:
 
 def cached(function: Any, **options: Any) -> Any:
     """Compile a function for Python at its first call, or load it; `options` as those of `numba.njit`."""
-    return _lightly(njit(cache=True, error_model="numpy", **options)(function))
+    with _set("CACHE_DIR", chosen_folder()):  # read where the function's own cache is made, here
+        return _lightly(njit(cache=True, error_model="numpy", **options)(function))
 
 
 def c_function(signature: Signature, function: Any, **options: Any) -> CFunc:
@@ -43,6 +81,10 @@ def c_function(signature: Signature, function: Any, **options: Any) -> CFunc:
         locals={},
         options={"error_model": "numpy", **options},
     )
-    compiled.enable_caching()
+    with _set("CACHE_DIR", chosen_folder()):
+        compiled.enable_caching()
     _lightly(compiled).compile()
     return compiled
+
+
+_prepare()

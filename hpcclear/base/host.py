@@ -1,7 +1,6 @@
-"""What only some operating systems offer, with what takes its place elsewhere: the one module that asks for it.
+"""What only some operating systems offer, with what takes its place elsewhere: the one module that requires it.
 
-Linux has all of it, macOS most; native Windows has none of the modules that are loaded here, so each is loaded where it is
-called.
+Linux has all of it, macOS most, native Windows none: each module is loaded where it is called.
 """
 
 import contextlib
@@ -128,23 +127,23 @@ def group_members(number: int) -> tuple[str, set[str]]:
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError in what takes longer, in the main thread; without limit where there is no SIGALRM."""
+    """Raise TimeoutError in what takes more processor time, in the main thread; without limit where there is no SIGPROF."""
     import threading
 
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGPROF"):
         yield
         return
 
     def ring(number: int, frame: FrameType | None) -> None:
         raise TimeoutError
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)  # a busy machine is not the content's fault
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def processor() -> str:

@@ -1,30 +1,14 @@
-"""How this package compiles: the decorators, and a private cache that notices every change of source.
+"""How this package compiles: the decorators, and the width of its vectors."""
 
-Numba's own cache looks at one file only and serves stale code when a function in another file was edited. Here
-the folder's name holds a hash of all sources and of the versions that shape the code. The cache is pickle,
-so the folder must belong to the user and be closed to others.
-"""
-
-import hashlib
-import os
-import platform
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
-from functools import cache
-from pathlib import Path
 from typing import Any
 
-import llvmlite
 import llvmlite.binding
-import numba
-import numpy as np
-from numba import config, njit, types
+from numba import njit, types
 from numba.core.extending import intrinsic
 
-from hpcclear.base.cached import cached
-from hpcclear.base.private import private_folder, unwritable
-from hpcclear.base.remarks import remark
-from hpcclear.base.width import asked_width, features
+from hpcclear.base.cached import cached, features_in_use
 
 FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
@@ -38,64 +22,6 @@ def emitted(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return intrinsic(function) if function else intrinsic(**options)
 
 
-def _compiled_sources(root: Path) -> list[Path]:
-    """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
-    parts = {root / "dynamics" / name for name in ("layout.py", "rows.py")}
-    parts |= set((root / "dynamics").glob("*/*.py"))
-    # of laws the texts are, each named by its content
-    parts -= set((root / "dynamics" / "laws").glob("*.py"))
-    parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
-    parts |= set((root / "base" / "text").glob("*.py"))
-    return sorted(
-        parts | {root / "base" / name for name in ("one_text.py", "outcome.py", "unrolled.py")}
-    )
-
-
-def _compiles(source: bytes) -> bool:
-    """Whether a file has what is compiled, or what emits it."""
-    return any(word in source for word in (b"jit", b"numba", b"llvmlite"))
-
-
-@cache
-def source_key() -> str:
-    """Hash of the sources that are compiled and of the versions that shape compiled code (16 hex digits)."""
-    root = Path(__file__).parent.parent
-    digest = hashlib.sha256()
-    for path in _compiled_sources(root):
-        digest.update(str(path.relative_to(root)).encode())
-        digest.update(path.read_bytes())
-    versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
-    for version in versions:
-        digest.update(version.encode())
-    digest.update(str(root).encode())
-    return digest.hexdigest()[:16]
-
-
-def cache_folder() -> Path:
-    """Return this user's private folder for compiled code of these sources, made if need be.
-
-    Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
-    """
-    folder = private_folder("HPCCLEAR_CACHE") / source_key()
-    folder.mkdir(mode=0o700, exist_ok=True)
-    return folder
-
-
-def _chosen_folder() -> str:
-    """Return the user's ``NUMBA_CACHE_DIR`` if it can be written to, else this package's own folder."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    if not named:
-        return str(cache_folder())
-    why = unwritable(Path(named))
-    if not why:
-        return named
-    folder = str(cache_folder())
-    remark(
-        f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}"
-    )
-    return folder
-
-
 def doubles_in_a_vector() -> int:
     """Numbers that a vector register of this processor holds: 8, 4 or 2."""
     features = llvmlite.binding.get_host_cpu_features()
@@ -106,7 +32,7 @@ def doubles_in_a_vector() -> int:
 
 def doubles_in_use() -> int:
     """Numbers in the vectors that the compiler uses: half of the available ones where it prefers 256 bits."""
-    half = "+prefer-256-bit" in (config.CPU_FEATURES or "")
+    half = "+prefer-256-bit" in features_in_use()
     return min(doubles_in_a_vector(), 4 if half else 8)
 
 
@@ -141,11 +67,6 @@ def narrow_vectors(typingctx):
 
     return types.none(), codegen
 
-
-config.CACHE_DIR = _chosen_folder()  # decided before the first decorator runs
-asked_width()  # refused if it is none, also where the user names the processor to Numba, and it says nothing
-if config.ENABLE_AVX and config.CPU_NAME is None and config.CPU_FEATURES is None:
-    config.CPU_FEATURES = features()
 
 _written: dict[Any, str] = {}
 _apart: set[Any] = set()

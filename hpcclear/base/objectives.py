@@ -21,7 +21,7 @@ RECORDED = {"objective": "m"} | {
     name: FIELDS[name].unit.removeprefix("1")
     for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS)
 }
-"""Fields of a sample's record that `Objective.value` may ask for, with units; ``objective`` is f of eq. 13."""
+"""Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
 OF_JOINTS = {
     "gap": "m",
@@ -36,7 +36,7 @@ OF_JOINTS = {
     "bearing_radius": "m",
     "journal_radius": "m",
 }
-"""What `Objective.rate` may ask for of each joint with clearance, with units: distance from the clearance circle, positive in
+"""What `Objective.rate` may require of each joint with clearance, with units: distance from the clearance circle, positive in
 contact, and its rate; the same cut at 0; the forces of contact; the sliding speed; the normal from bearing to journal."""
 
 OF_ALL = {
@@ -47,7 +47,7 @@ OF_ALL = {
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",
 }
-"""What it may ask for of the mechanism: the angle from the x axis, speed and torque of the body that the drive turns, and the
+"""What it may require of the mechanism: the angle from the x axis, speed and torque of the body that the drive turns, and the
 acceleration of the followed body or point. Nothing of it jumps at the end of a revolution."""
 
 MADE = ("mean", "revolution", "rms", "peak")
@@ -72,7 +72,7 @@ class Objective:
     """Its value, of arguments in `RECORDED`, and ``rate``: what was made of `rate`. What joints have comes as an array over the
     joints with clearance. By default the rate, of the joint where it is largest."""
     rate: Function | None = None
-    """Plain arithmetic of arguments in `OF_JOINTS` and `OF_ALL`, compiled into the simulation as laws are. One that asks for
+    """Plain arithmetic of arguments in `OF_JOINTS` and `OF_ALL`, compiled into the simulation as laws are. One that requires
     nothing of joints is of the mechanism as a whole."""
     made: Literal["mean", "revolution", "rms", "peak"] = "mean"
     """What is made of the rate over the averaged revolutions: its mean in time, its integral over a revolution, its root mean
@@ -89,7 +89,7 @@ class Objective:
 
     @property
     def asks(self) -> frozenset[str]:
-        """All that its functions ask for."""
+        """All that its functions require."""
         return frozenset(name for one in (self.value, self.rate) if one for name in arguments(one))
 
     @property
@@ -172,7 +172,7 @@ class Objective:
 
 
 def arguments(function: Function) -> tuple[str, ...]:
-    """Names of what a function asks for."""
+    """Names of what a function requires."""
     return tuple(signature(function).parameters)
 
 

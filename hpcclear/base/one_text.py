@@ -20,9 +20,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from numba import config
-
-from hpcclear.base.jit import source_key, written_kind
+from hpcclear.base.code_folder import chosen_folder, source_key
+from hpcclear.base.jit import written_kind
 from hpcclear.base.text.alike import written_once
 from hpcclear.base.text.statements import Writer
 from hpcclear.base.text.values import Known, Module, Value, definition_of
@@ -57,7 +56,7 @@ def text_of(function: Any, name: str, known: dict[str, Any]) -> str:
 
 
 def _folder() -> Path:
-    folder = Path(config.CACHE_DIR) / f"texts-{source_key()}"
+    folder = Path(chosen_folder()) / f"texts-{source_key()}"
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder
 

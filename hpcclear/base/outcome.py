@@ -16,7 +16,7 @@ MAX_JOINTS = 8
 
 CORNERS = {
     "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
-    "back_left": (-1.0, 1.0), "back_right": (-1.0, -1.0),
+    "back_right": (-1.0, -1.0), "back_left": (-1.0, 1.0),
 }  # fmt: skip
 """Contacts of a guide with clearance, the corners of its slider: before or behind its middle along the line, left or right."""
 
@@ -148,7 +148,7 @@ class Field(NamedTuple):
     per: str = ""
     """"joint" or "wave": what there is one for each of; "" for one a sample."""
     when: str = ""
-    """What a scene has to ask for, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
+    """What a scene has to require, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
     "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
     required: bool = False
     """Whether every file with the outcome of a simulation has it."""

@@ -59,7 +59,7 @@ def part(limits: tuple[float, float], cp: float, cpk: float, towards: str, inspe
     towards : str
         "upper" or "lower": where the mean lies where `cpk` is less.
     inspected : bool
-        Whether parts beyond the limits are sorted out; else they are met up to `TAIL` standard deviations.
+        Whether parts beyond these diameters are sorted out; else they are met up to `TAIL` standard deviations.
     """
     lower, upper = limits
     deviation = (upper - lower) / (6.0 * cp)

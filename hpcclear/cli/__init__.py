@@ -61,7 +61,7 @@ def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
     Input files (scenes) are TOML; results are NetCDF files that open in xarray. To use more than one
-    core, start sample, run, wear, map, effects, identify, accuracy or plan under mpiexec:
+    core, start sample, run, wear, map, bifurcation, effects, identify, accuracy or plan under mpiexec:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """

@@ -36,7 +36,7 @@ def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     for what, path in files.items():
         out.print(f"{what:14} {path}", soft_wrap=True)
     out.print(f"motion         {found.attrs['motion']}", soft_wrap=True)
-    out.print(f"result         {result(found)}", soft_wrap=True)
+    out.print(f"steady mean    {result(found)}", soft_wrap=True)
 
 
 def _integration(found: xr.Dataset) -> Table:
@@ -95,12 +95,13 @@ def cheapest(found: xr.Dataset, aim: float) -> str:
     if not np.isfinite(seconds):
         return "not resolved by the measured revolutions"
     spent = int(here["cheapest_revolutions"])
-    return f"rtol {float(here['cheapest_tolerance']):.0e}, {spent} revolutions, {seconds:.2g} s"
+    count = f"{spent} revolution{'s' if spent > 1 else ''}"
+    return f"rtol {float(here['cheapest_tolerance']):.0e}, {count}, {seconds:.2g} s"
 
 
 def result(found: xr.Dataset) -> str:
     """The cheapest settings for one error, in one line."""
-    return f"cheapest settings for a standard error of f of {AIM:.0%}: {cheapest(found, AIM)} of one core"
+    return f"cheapest settings for a standard error of {AIM:.0%}, all replicas together: {cheapest(found, AIM)} of one core"
 
 
 def _grid(title: str) -> Table:

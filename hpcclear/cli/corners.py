@@ -24,7 +24,7 @@ def lines(found: Tried, simulate: bool) -> list[tuple[str, str]]:
     ]
     failed = list(sentences(found.status, columns, "corners")) if simulate else []
     bad = len(found.refused) + int((found.status > 0).sum())
-    does = "make a mechanism and run two revolutions" if simulate else "make a mechanism"
+    does = "can be assembled and complete two revolutions" if simulate else "can be assembled"
     which = "all corners" if total < MOST or total == 2 ** len(columns) else "a balanced selection"
     rows = [("tried", f"{total} ({which}): {total - bad} {does}")]
     for reason in dict.fromkeys(found.refused.values()):

@@ -67,7 +67,8 @@ def describe(found: "Finished", scene: Scene, file: Path) -> int:
         ),
         ("samples", f"{int(content['samples'].sum())}, {_failed(content)} failed"),
     ]
-    out.print(table("Effect screening", rows + _load(found)))
+    out.print(table("Effect screening", rows))
+    out.print(table("Run", _load(found)))
     out.print(f"effects  {found.output}")
     out.file.write("\n" + plain(recommendation(content, scene, file, tolerance, seconds)))
     return Exit.DONE
@@ -93,7 +94,8 @@ def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> 
     kept = [k for k in range(content.sizes["response"]) if _is_reported(content, k)]
     labels = [str(content["response"].to_numpy()[k]) for k in kept]
     for name in labels:
-        made.add_column(name.replace("mean", "mean f"), justify="right", no_wrap=True)
+        words = {"mean": "mean f", "deviation": "std. dev."}
+        made.add_column(words.get(name, name), justify="right", no_wrap=True)
     made.add_column("time", justify="right", no_wrap=True)
     made.add_column("within", overflow="fold")
     for k in range(1, content.sizes["variant"]):

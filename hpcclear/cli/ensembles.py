@@ -148,8 +148,8 @@ def merge(written: Written, output: Path, points: Path | None) -> int:
 def map_command(written: Written, output: Path, x: str, y: str | None, how: How) -> int:
     """Map periodic and chaotic motion over one or two entries of the scene.
 
-    Each cell has the largest Lyapunov exponent per revolution, the period, the kinds of motion from several
-    starts, and f with its half-width.
+    Each cell has the largest Lyapunov exponent per revolution, the period, the number of different
+    motions reached from several starts, and f with its half-width.
 
     Example: mpiexec -n 2 hpcclear map jobs/hunt_crossley.toml --x C=0.1mm:1mm:40 -o results/map.nc
     """
@@ -180,7 +180,7 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
     default="objective",
     show_default=True,
     metavar="SERIES",
-    help='Series of a response, such as "contact_force o2", at the section; with max, min or mean before it, of a revolution.',
+    help='Series of a response at the section: "contact_force o2"; or its max, min, mean a revolution: "max contact_force o2".',
 )
 @click.option(
     "--section",
@@ -216,7 +216,7 @@ def bifurcation(
 ) -> int:
     """Observe one value of each revolution over a range of an entry of the scene, for a bifurcation figure.
 
-    Where the motion repeats every n revolutions, a value has n dots. Draw it with hpcclear plot.
+    If the motion repeats every n revolutions, the figure has n dots at that value. hpcclear plot draws it.
 
     Example: mpiexec -n 2 hpcclear bifurcation jobs/hunt_crossley.toml --x drive.speed="500 rpm:6000 rpm:12" -o results/b.nc
     """

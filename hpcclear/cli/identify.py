@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
-import xarray as xr
 
 from hpcclear.cli.options import (
     PATH,
@@ -68,6 +66,10 @@ if TYPE_CHECKING:
     "--noise", type=Amount(min=0.0, min_open=True), metavar="SHARE",
     help="Noise of a sample over the RMS of the signal. With it the scatter between revolutions is used too.",
 )  # fmt: skip
+@click.option(
+    "--pressure", default="", metavar="COLUMN=AREA",
+    help="Measured pressure on the slider as a known load: a column of the first table and the piston's area.",
+)  # fmt: skip
 @flag("--advise", "Compare signals: half-widths to expect, by number of revolutions.")
 @click.option(
     "--members", type=click.IntRange(min=32), metavar="N",
@@ -77,7 +79,7 @@ if TYPE_CHECKING:
 def identify(
     written: Written, output: Path, unknowns: tuple[str, ...], signals: tuple[Path, ...], names: tuple[str, ...],
     dates: tuple[str, ...], limit: str | None, band: str | None, resonance: str | None, gain_error: float,
-    angle_error: str, noise: float | None, advise: bool, members: int | None, how: How,
+    angle_error: str, noise: float | None, pressure: str, advise: bool, members: int | None, how: How,
 ) -> int:  # fmt: skip
     """Identify unknown clearances from a measured signal, with calibrated intervals.
 
@@ -98,7 +100,16 @@ def identify(
         unit = Unknown.of(scene, unknowns[0]).unit
         most = None if limit is None else number_of("--limit", limit, unit)
         wanted = Wanted(
-            unknowns, signals, tuple(names), dates, most, sensor, noise, advise, members
+            unknowns,
+            signals,
+            tuple(dict.fromkeys(names)),
+            dates,
+            most,
+            sensor,
+            noise,
+            pressure,
+            advise,
+            members,
         )
         return describe(run_identify(scene, place_of(output), ranks, wanted, how.options()))
 
@@ -130,8 +141,5 @@ def describe(found: "Finished") -> int:
     for text in identified.warnings(content):
         out.print(remark("warning", fitting(text)))
     out.print(f"written  {found.output}")
-    return Exit.DONE if _explained(content) else Exit.TARGET_MISSED
-
-
-def _explained(content: xr.Dataset) -> bool:
-    return "explained" not in content or bool(np.all(content["explained"].to_numpy() == 1))
+    explained = "explained" not in content or bool((content["explained"] == 1).all())
+    return Exit.DONE if explained else Exit.TARGET_MISSED

@@ -20,8 +20,8 @@ _TITLES = {
 def laws() -> int:
     """List what a scene may name: laws, geometries of contact, objectives, distributions, surrogates and searches.
 
-    Laws with formula, parameters, units, bounds, range and source. Those of installed packages are among them.
-    One of your own: docs/extending.md.
+    Laws are listed with formula, parameters, units, bounds, range and source, those of installed packages too.
+    To write your own, see docs/extending.md.
 
     Example: hpcclear laws
     """

@@ -97,7 +97,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         lives.check(scene)
     states = 2 * (coordinate_count(scene) - scene.bristles)
     bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
-    open_joints = len(scene.clearance_joints())
+    open_joints = len(scene.contact_labels())
     rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
     method = integrator_of(scene)
     rows += [
@@ -151,7 +151,7 @@ def _assembly(scene: Scene) -> list[tuple[str, str]]:
 
     linkage_of(scene)
     lines = put_together(mechanism_of(scene.linkage)).report()
-    return [(f"starts at {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
+    return [(f"start of {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
 
 
 def _locked(scene: Scene) -> list[str]:
@@ -188,13 +188,21 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     study = scene.study
     assert study is not None
     rows = [
-        ("samples", f"{study.samples} ({study.method}), seed {study.seed}"),
+        ("samples", f"{study.samples} ({spread.DRAWN[study.method]}), seed {study.seed}"),
         ("objective", f"{study.objective}: {scene.objective.words}"),
     ]
     for variable in study.variables:
-        if variable.range is not None:
+        loads = "" if variable.over is None else f" (load cases, {_over(variable.over)})"
+        if variable.rows:
+            named = ", ".join(row.name for row in variable.rows)
+            rows.append((variable.name, f"{named}: {variable.words}{loads}"))
+        elif variable.values is not None:
+            listed = ", ".join(turning(one, variable.unit) for one in variable.values)
+            rows.append((variable.name, f"{listed}: {variable.words}{loads}"))
+        elif variable.range is not None:
             lower, upper = (turning(end, variable.unit) for end in variable.range)
-            rows.append((variable.name, f"{lower} to {upper}: {variable.words}"))
+            step = "" if variable.step is None else f" by {turning(variable.step, variable.unit)}"
+            rows.append((variable.name, f"{lower} to {upper}{step}: {variable.words}"))
         elif variable.ratio is not None:
             rows.append(
                 (
@@ -224,6 +232,12 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
     return rows
 
 
+def _over(over: str | tuple[float, ...]) -> str:
+    """How load cases make one f, in words."""
+    weights = "" if over == "worst" else ", ".join(f"{float(one):g}" for one in over)
+    return f"weights {weights}" if weights else "f of the worst"
+
+
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
     from hpcclear.dynamics.evaluation import evaluate_records
@@ -245,15 +259,20 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         ("run time per sample", f"{each * 1e3:.3g} ms on one core ({DEFAULT_LANES} per batch)"),
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
     ]
-    if scene.study is not None:
-        rows.append(("hpcclear sample", _all(scene.study.samples, each)))
-    if scene.study is not None and scene.study.cases:
-        from hpcclear.study.extent import samples_of
+    if scene.study is None:
+        return rows
+    whole = 0
+    if scene.study.cases:
+        from hpcclear.base.objectives import asked
+        from hpcclear.study.forecast import expected
 
-        whole = sum(samples_of(scene).values())
-        rows.append(
-            ("hpcclear run", f"about {_all(whole, each)}; hpcclear plan estimates it better")
-        )
+        def evaluated(points: Points) -> np.ndarray:
+            return asked(evaluate_records(scene, points), scene.objective)
+
+        whole, each = expected(scene, evaluated, each)
+    rows.append(("hpcclear sample", _all(scene.study.samples, each)))
+    if whole:
+        rows.append(("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear plan"))
     return rows
 
 
@@ -289,7 +308,8 @@ def describe_statistics(found: "Finished") -> None:
         rows.append(("mean of f", shown))
         rows.append(("std. deviation of f", quantity(deviation, unit)))
         rows.append(("half-width of a single f", labels.NOT_CHECKED))
-    out.print(table("Statistics", rows + _load(found)))
+    out.print(table("Statistics", rows))
+    out.print(table("Run", _load(found)))
     out.print(f"statistics {found.output}")
 
 
@@ -301,6 +321,7 @@ def describe_study(place: Path) -> None:
         "kriging",
         "verification",
         "contributions",
+        "worst",
         "chaos",
         "timing",
     )
@@ -352,24 +373,25 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
         rows.append(
             (
                 "cycle-to-cycle std. dev.",
-                f"median {np.median(in_time):.1e}, largest {in_time.max():.1e} of f",
+                f"median {np.median(in_time):.2%}, largest {in_time.max():.2%} of f",
             )
         )
     if "target_error_reached" in samples.attrs:
         rows.append(("target error", str(samples.attrs["target_error_reached"])))
-    busy = found.spent[:, 0]
+    speed, busy = [], found.spent[:, 0]
     evaluations = int(samples["rhs_evaluations"].sum())
     if busy.sum() > 0.0:
         throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
         if evaluations:  # without clearance there is nothing to integrate
             throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns per force evaluation"
-        rows.append(("throughput", throughput))
-    out.print(table("Samples", rows + _load(found)))
+        speed = [("throughput", throughput)]
+    out.print(table("Samples", rows))
     if lines := spread.statistics(samples, thresholds):
         rows = [(line.label, fitting(line.text)) for line in lines]
         out.print(table("Statistics, with 95 % confidence intervals", rows))
     for text in spread.remarks(samples):
         out.print(remark("Warning", text))
+    out.print(table("Run", speed + _load(found)))
     for what, path in (("samples", found.output), ("timing", found.timing)):
         if path.exists():  # what was merged has its times beside the parts
             out.print(f"{what:8} {path}")
@@ -381,8 +403,8 @@ def _half_widths(samples: xr.Dataset) -> str:
     good = (samples["status"] == Status.OK).to_numpy()
     shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
     if not np.isfinite(shares).any():
-        return f"{labels.NOT_CHECKED} (numerics.target_error gives every sample one)"
-    return f"median {np.nanmedian(shares):.1e}, largest {np.nanmax(shares):.1e} of f"
+        return f"{labels.NOT_CHECKED}; set numerics.target_error to estimate it for each sample"
+    return f"median {np.nanmedian(shares):.2%}, largest {np.nanmax(shares):.2%} of f"
 
 
 def describe_map(found: "Finished") -> None:
@@ -393,15 +415,19 @@ def describe_map(found: "Finished") -> None:
     for regime in Regime:
         count = int(((content["regime"] == regime).to_numpy() & good).sum())
         if count and regime is not Regime.UNJUDGED:
-            rows.append((regime.name.lower(), f"{count} {regime.meaning.partition(': ')[2]}"))
+            name, _, meaning = regime.meaning.partition(": ")
+            rows.append((name, f"{count} cells: {meaning}"))
     periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
-    parts = [f"{n} cells: {p:.0f}" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)]
+    parts = [
+        f"{p:.0f} in {n} cells" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)
+    ]
     rows.append(("period, revolutions", ", ".join(parts) or "none found"))
     growth = content["lyapunov_exponent"].to_numpy()[good]
     if len(growth):
         text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"
         rows.append(("largest Lyapunov exponent", text))
-    out.print(table("Map", rows + _load(found)))
+    out.print(table("Map", rows))
+    out.print(table("Run", _load(found)))
     out.print(f"map      {found.output}")
 
 
@@ -417,5 +443,6 @@ def describe_bifurcation(found: "Finished") -> None:
         unit = str(seen.attrs["units"])
         low, high = (quantity(float(end), unit) for end in (seen.min(), seen.max()))
         rows.append(("range", f"{low} to {high}"))
-    out.print(table("Bifurcation", rows + _load(found)))
+    out.print(table("Bifurcation", rows))
+    out.print(table("Run", _load(found)))
     out.print(f"written  {found.output}")

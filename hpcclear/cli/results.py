@@ -33,7 +33,7 @@ UNITS = click.option(
     "units",
     multiple=True,
     metavar="UNIT",
-    help='Unit of all quantities that it fits, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
+    help='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
 )
 
 
@@ -85,7 +85,8 @@ def compare(
     """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
 
     The first column is time or crank_angle, the others are quantities as exported tables name them, such as
-    "contact_force crank_rod [kN]". The averaged revolutions are compared, continued periodically.
+    "contact_force crank_rod [kN]". The averaged revolutions are repeated
+    periodically and compared with it.
 
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """
@@ -102,7 +103,7 @@ def compare(
     rows = [
         ("measured points", str(len(found.x))),
         ("aligned", f"{found.aligned}, shifted by {moved}"),
-        ("simulated revolutions", f"{found.revolutions} averaged ones, continued periodically"),
+        ("simulated revolutions", f"{found.revolutions} averaged ones, repeated periodically"),
     ]
     out.print(table("Comparison", rows))
     for one in found.quantities:

@@ -12,6 +12,7 @@ from hpcclear.cli.options import (
     Written,
     check_free,
     flag,
+    lightly,
     of_one_process,
     on_ranks,
     output_option,
@@ -19,7 +20,6 @@ from hpcclear.cli.options import (
     say,
     show,
     with_scene,
-    without_pint,
 )
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 @click.argument("file", type=PATH)
 @flag(
     "--four-stroke",
-    "A gas force against two turns of the crank, in an engine written as a linkage.",
+    "A four-stroke engine, written as a linkage; its gas force repeats every two turns of the crank.",
 )
 @flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @of_one_process
@@ -126,7 +126,7 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
 
     Exit code 1 if the file's own design cannot turn but its study varies the geometry; 2 if no design can.
-    Under mpiexec or srun all ranks connect first. A launcher of another MPI library gives exit code 2.
+    Under mpiexec or srun it also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
@@ -165,12 +165,13 @@ def _draw(scene: "Scene", sketch: Path) -> None:
 @output_option("NetCDF file to write.")
 @of_one_process
 def simulate(written: Written, output: Path) -> int:
-    """Simulate one design: bearing forces, torque, motion, energies, objective, as time series.
+    """Simulate one design: objective, and time series of bearing forces, torque, motion and energies.
 
     Exit code 1 if the simulation failed, 4 if f did not reach numerics.target_error. The file is written all the same.
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
+    lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.response import simulate as simulate_scene
@@ -179,7 +180,6 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
 
-    without_pint()
     scene = written.scene()
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
@@ -234,7 +234,7 @@ def report(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
 def reproduce(place: Path, samples: int, trust: bool) -> int:
     """Repeat some simulations of a result from the scene in its file, and compare bit by bit.
 
-    PLACE is a result file or a directory of results. Other versions and processors than those of the result are listed.
+    PLACE is a result file or a directory of results. Versions and processors that differ from those of the result are listed.
     Exit code 1 if anything differs or cannot be read.
 
     Example: hpcclear reproduce results/quickstart

@@ -33,7 +33,8 @@ def describe(found: "Finished") -> int:
     rows += [("ended", text) for text in _endings(content)]
     rows += [("warning", text) for text in doubts(content)]
     rows += [*_ends(content), *_lifetimes(content), *_profiles(content), *_causes(content)]
-    out.print(table("Wear", rows + _load(found)))
+    out.print(table("Wear", rows))
+    out.print(table("Run", _load(found)))
     out.print(f"written  {found.output}")
     if good.any() or np.isfinite(content["lifetime"]).any():
         return Exit.DONE
@@ -85,7 +86,7 @@ def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
         ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
         value = one(float(content[f"{name}_quantile"].sel(quantile=level)))
         shown.append(f"{value} (95 % CI {ends[0]} to {ends[1]})")
-    return f"{shown[0]}; 5th percentile {shown[1]}; 95th percentile {shown[2]}"
+    return f"median {shown[0]}; 5th percentile {shown[1]}; 95th percentile {shown[2]}"
 
 
 def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
@@ -109,7 +110,7 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
     interval = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
     rows.append(
         (
-            f"survival at {cycles:.4g}",
+            f"survival, {cycles:.4g} rev.",
             f"{float(last['survival']):.3g} of the service lives ({interval})",
         )
     )
@@ -153,6 +154,8 @@ def _causes(content: xr.Dataset) -> list[tuple[str, str]]:
         if len(share) and np.isfinite(share).any():
             k = int(np.nanargmax(share))
             word = "dominant" if share[k] >= DOMINATES else "largest"
-            text = f"{content['random_input'].to_numpy()[k]} ({word} input): {share[k]:.0%} of the variance of ranks"
-            rows.append((f"scatter of {name}", text))
+            text = (
+                f"{content['random_input'].to_numpy()[k]}, {share[k]:.0%} of the variance of ranks"
+            )
+            rows.append((f"{word} input, {name}", text))
     return rows

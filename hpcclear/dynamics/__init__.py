@@ -1,1 +1,1 @@
-"""A design through time: from a scene's numbers to outcome records, compiled and in lockstep lanes."""
+"""A design through time: from a scene's numbers to outcome records, compiled, in batches of lanes."""

@@ -15,7 +15,7 @@ from hpcclear.scene.points import Points
 def evaluator_of(
     scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = ()
 ) -> Evaluator | SteadyEvaluator:
-    """The steady mean to a named error, or the stretch of revolutions that the scene names; arguments and errors are those of
+    """The steady mean to a named error, or the segment of revolutions that the scene names; arguments and errors are those of
     either.
     """
     if scene.numerics.target_error is not None and scene.clearance_joints():
@@ -26,7 +26,7 @@ def evaluator_of(
 def evaluate_records(
     scene: Scene, points: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = ()
 ) -> Records:
-    """Simulate all points here and now, by replicas beside them (`Evaluator`) if asked; records in the points' order (n,)."""
+    """Simulate all points at once, with replicas (`Evaluator`) if requested; records in the points' order (n,)."""
     evaluator = evaluator_of(scene, points, lanes, perturbations)
     evaluator.submit(np.arange(len(points)), points.values)
     done = []

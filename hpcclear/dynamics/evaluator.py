@@ -11,12 +11,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
-from hpcclear.dynamics import energy
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.lanes import Lanes, PrescribedSamples
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.prescribed_samples import PrescribedSamples
+from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.problem import Problem, problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.views import Outcome, Parameters, Start
@@ -32,7 +31,7 @@ CACHE_OF_A_VECTOR = 12 * 1024
 parameters do not fit."""
 
 LEAST_LANES = 16
-"""Shorter loops the compiler does not vectorise where it must ask at run time whether arrays overlap."""
+"""Shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap."""
 
 
 def default_lanes() -> int:
@@ -89,9 +88,9 @@ TIGHTEST = 1e-14
 """Tolerance of a copy at least: beyond it all is rounding."""
 
 COVERAGE = 1.7
-"""Stated uncertainty over how far the farthest copy is; `analysis/uncertainty.py` tells how often it holds and how wide it is.
-Copies no stricter than the sample would add errors of their own where its motion is nearly regular: limits that hold as often
-were up to 12 times the error there."""
+"""Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
+holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: equally reliable
+intervals were up to 12 times the error there."""
 
 COVERAGE_ALONE = 1.25
 """The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
@@ -107,7 +106,7 @@ class Evaluator:
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional
-        Samples in lockstep.
+        Samples of a batch.
     perturbations : sequence of int, optional
         In units of `PERTURBATION`, of replicas at a tighter tolerance that run beside each sample and give its objective a
         half-width, as `alone` gives those of a single response; none by default.
@@ -119,7 +118,7 @@ class Evaluator:
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do.
+        If the scene requires what the kernel cannot do.
     """
 
     def __init__(
@@ -201,7 +200,7 @@ class Evaluator:
 
 
 def responses_reported(problem: Problem) -> tuple[str, ...]:
-    """Which of `RESPONSES` samples notify: those asked for, of a slider where one is followed, of a point where one is."""
+    """Which of `RESPONSES` samples record: those requested, of a slider or a point only where one is followed."""
     if not problem.effects.responses:
         return ()
     linkage, impacts = problem.linkage, impacts_reported(problem)
@@ -265,7 +264,7 @@ def outcome_records(
 ) -> Records:  # fmt: skip
     """Outcomes (m) and parameters (m, PARAMETERS) as records.
 
-    Numbers of failed samples are NaN, and so are those that were not asked for: the further responses unless
+    Numbers of failed samples are NaN, and so are those that were not requested: the further responses unless
     `responses` (as of `responses_reported`), sliding work unless `worn`,
     what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
     """

@@ -90,6 +90,8 @@ def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
         p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
     else:
         p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
+    if GEOMETRIES[scene.clearance_joint(label).geometry].along_a_line:  # a corner is small
+        p[:, at.DEEPEST_VALID] = np.minimum(p[:, at.DEEPEST_VALID], HERTZ_RANGE * shape.radius)
     rubs = scene.effects.friction
     if rubs.law == "none":
         return
@@ -131,7 +133,7 @@ def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
 
 def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: Any) -> Array:
     """Energy stored in the contacts at `places`, J, (t,); parameters (PARAMETERS,) or (t, PARAMETERS), gaps and contact flags
-    (t, places): under latched laws a penetration counts only while in contact."""
+    (t, places): under `latched` laws a penetration counts only while in contact."""
     table = scene.effects.contact
     if table is None or not len(places):
         return np.zeros(len(gaps))

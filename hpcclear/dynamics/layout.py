@@ -1,6 +1,6 @@
 """Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
 
-Rows are numbered as they are declared (`hpcclear.dynamics.rows`). They are module constants, so the compiler sees every
+Rows are numbered as they are declared (`hpcclear.base.numbered`). They are module constants, so the compiler sees every
 distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
 """
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.numbered import Rows
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
-from hpcclear.dynamics.rows import Rows
 
 TURN = 6.283185307179586  # rad
 
@@ -44,7 +44,7 @@ class Effects(NamedTuple):
 
     @property
     def latched(self) -> Any:
-        """Whether the normal force's law asks for the impact speed, which is latched."""
+        """Whether the normal force's law requires the impact speed, which is `latched`."""
         return None if self.contact is None else self.contact.latched
 
     @property
@@ -58,30 +58,17 @@ class Effects(NamedTuple):
         return None if self.friction is None else self.friction.bristled
 
 
-class Open(NamedTuple):
-    """Which places of joints hold one with clearance (1), and which none (None)."""
-
-    joint_0: Any = None
-    joint_1: Any = None
-    joint_2: Any = None
-    joint_3: Any = None
-    joint_4: Any = None
-    joint_5: Any = None
-    joint_6: Any = None
-    joint_7: Any = None
-
-
 def bristles_of(effects: Effects) -> int:
     """How many coordinates the bristles of friction take: one for each joint with clearance, before those of the mechanism.
 
     A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
     """
-    return 0 if effects.bristled is None else sum(flag is not None for flag in open_of(effects))
+    return 0 if effects.bristled is None else len(places_of(effects))
 
 
-def open_of(effects: Effects) -> Open:
-    """Those of a set of effects."""
-    return Open(*[None] * effects.first, *[1] * (effects.joints or 0))
+def places_of(effects: Effects) -> range:
+    """Places of the joints with clearance."""
+    return range(effects.first, effects.first + (effects.joints or 0))
 
 
 class Waves(NamedTuple):
@@ -101,10 +88,9 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
     """Those of each place of joints, up to the last open one."""
     bearing, journal = effects.bearing_waves or 0, effects.journal_waves or 0
     stride = 2 * (bearing + journal)
-    places = [k for k, flag in enumerate(open_of(effects)) if flag is not None]
     return tuple(
         Waves(k * stride, bearing, k * stride + 2 * bearing, journal)
-        for k in range(max(places, default=-1) + 1)
+        for k in range(places_of(effects).stop)
     )
 
 
@@ -229,7 +215,7 @@ RATES = WRITTEN.end
 
 
 class Integrated(NamedTuple):
-    """A rate that every stepper integrates over a step: its row, and the effect that asks for it. A gap's absolute value is
+    """A rate that every stepper integrates over a step: its row, and the effect that requires it. A gap's absolute value is
     integrated, and the error of its integral, relative to the clearance times a revolution, counts for the step's."""
 
     rate: int
@@ -237,7 +223,7 @@ class Integrated(NamedTuple):
 
 
 _PLACES = range(MAX_JOINTS)
-GAPS = tuple(Integrated(GAP + k, f"joint_{k}") for k in _PLACES)
+GAPS = tuple(Integrated(GAP + k, "joints") for k in _PLACES)
 _OTHERS = [row for row in WRITTEN.declared if row.asked_by and row.first != GAP]
 _STEPPED = {row.asked_by for row in _OTHERS} - {"profile", "steps"}
 _PROFILES, MEASURES, _SUMMED = (
@@ -251,7 +237,7 @@ _PROFILES, MEASURES, _SUMMED = (
 )
 INTEGRATED = (*GAPS, *MEASURES, *_SUMMED, *_PROFILES)
 """All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
-The explicit and implicit steppers, the books of a lane and its outcome read this."""
+The explicit and implicit steppers, the sums of a lane and its outcome read this."""
 
 INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
 
@@ -268,14 +254,14 @@ MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 def measures_of(effects: Effects) -> np.ndarray:
     """Rates besides the gaps that are integrated with these effects."""
-    there = open_of(effects)
+    there = places_of(effects)
     whole = effects.objective is not None and effects.objective.whole
     closed = {
         row.first + k
         for row in _OTHERS
         if row.size == MAX_JOINTS
-        for k, flag in enumerate(Open(1) if whole and row.first == OBJECTIVE_RATES else there)
-        if flag is None
+        for k in _PLACES
+        if k not in (range(1) if whole and row.first == OBJECTIVE_RATES else there)
     }
     asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
     return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
@@ -440,7 +426,7 @@ JOINTS = tuple(
 
 
 class Block(NamedTuple):
-    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, books.
+    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, sums.
 
     `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
 
@@ -462,7 +448,7 @@ class Queue(NamedTuple):
 
 class Method(NamedTuple):
     """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
-    which a stepper asks for what is compiled apart from it (`stepping.special`)."""
+    which a stepper calls what is compiled apart from it (`stepping.special`)."""
 
     settings: Any
     weights: Any
@@ -472,7 +458,7 @@ class Method(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What a stepper has to know of the effects, as numbers 0 and 1: none of them has it compiled anew."""
+    """What a stepper has to know of the effects, as numbers 0 and 1: they change no compiled code."""
 
     latched: Any  # impacts are located, and their speed is kept
     free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
@@ -491,8 +477,8 @@ def rules_of(effects: Effects) -> Rules:
     turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
     flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
-    places = [k for k, flag in enumerate(open_of(e)) if flag is not None] or [0, -1]
-    return Rules(*[int(flag is not None) for flag in flags] + [places[0], places[-1] + 1])
+    places = places_of(e)
+    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop])
 
 
 class Stepped(NamedTuple):

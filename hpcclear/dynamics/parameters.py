@@ -6,10 +6,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import fill, swing
 from hpcclear.dynamics.laws import laws, numbers
+from hpcclear.dynamics.planar import bristles
 from hpcclear.dynamics.planar.prescribed import held_extremes
 from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, parameters_of
 from hpcclear.scene import Scene

@@ -10,9 +10,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics import bending
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import periodic_cells
 from hpcclear.dynamics.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.implicit.control import STEEP
 from hpcclear.dynamics.laws.lanes import in_lanes
@@ -24,6 +22,8 @@ from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text
 from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameter_rows, parameters
 from hpcclear.dynamics.planar import problem as planar
+from hpcclear.dynamics.planar import swings
+from hpcclear.dynamics.planar.curves import periodic_cells
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.stepping.settings import STRICT
 from hpcclear.dynamics.views import Outcome, Parameters, Settings, Start
@@ -70,7 +70,7 @@ class Problem:
     atol: tuple[float, ...]
     """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
     impact_floor: float
-    """Least latched impact speed, m/s."""
+    """Least `latched` impact speed, m/s."""
     transient: int
     averaged: int
     max_steps: int
@@ -130,7 +130,7 @@ class Problem:
 
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
         """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
-        their starts (m), or were torn through."""
+        their starts (m), or were penetrated too deep."""
         p, failed = Parameters(par), start.failed
         outcome.status[failed != Status.OK] = failed[failed != Status.OK]
         torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)
@@ -202,17 +202,17 @@ def implicit_method(scene: Scene) -> str:
     method = scene.numerics.method
     if method == "auto" and scene.modes:
         mechanism = planar.linkage_of(scene).mechanism
-        if max(bending.swings(mechanism)) * float(planar.period_of(mechanism)) > bending.STIFF:
-            return "always"  # there is no stretch of the motion in which they are slow
+        if max(swings.swings(mechanism)) * float(planar.period_of(mechanism)) > swings.STIFF:
+            return "always"  # there is no segment of the motion in which they are slow
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
     if scene.films() or scene.bristles:
         return "stiff"  # a film's damping grows beyond all bounds as it gets thin; bristles give way within a micrometre
     par = Parameters(parameters(scene)[0])
-    is_open = np.array([flag is not None for flag in at.open_of(effects_of(scene))])
+    there = list(at.places_of(effects_of(scene)))
     ramp = par.steepness * (scene.effects.friction.law != "none")
     stiff = (ramp >= STIFF_RAMP) | (par.damping >= STIFF_DAMPING)
-    return "stiff" if (stiff & is_open).any() else "never"
+    return "stiff" if stiff[there].any() else "never"
 
 
 def _cells_of_curves(

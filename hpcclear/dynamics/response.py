@@ -1,5 +1,7 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -9,18 +11,18 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY, Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import alone, outcome_records, responses_reported
 from hpcclear.dynamics.impacts import Turns, measured, spectral
 from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.lanes import PrescribedSamples
 from hpcclear.dynamics.parameters import Numbers, parameters
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.prescribed_samples import PrescribedSamples
 from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.start import start_states
@@ -86,7 +88,7 @@ def simulate(
     scene : Scene
     objective : Objective, optional
         What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
-        need ``numerics.responses`` where there is no study that asks for them.
+        need ``numerics.responses`` where there is no study that requires them.
     copy : int
         Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
         motion without clearance has no copies.
@@ -103,7 +105,7 @@ def simulate(
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do, or for time series that do not fit into memory.
+        If the scene requires what the kernel cannot do, or time series that do not fit into memory.
     """
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
@@ -162,6 +164,8 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
     found = planar_labels(scene, linkage_of(scene).mechanism)
     if scene.modes:
         found["mode"] = scene.mode_labels
+    if scene.guides():
+        found["guide"] = scene.guides()
     if scene.template is None and not coordinate_count(scene):
         found["pin"] = pins_of(scene)
     return found or None
@@ -196,7 +200,7 @@ SPUN_UP, SHOWN = 20, 10
 
 
 def _steady(scene: Scene) -> Records | None:
-    """The record (1,) of the steady mean, where the scene names a target error; None: it asks for a stretch."""
+    """The record (1,) of the steady mean, where the scene names a target error; None: it requires a segment."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return None
     return evaluate_records(scene, ITSELF)
@@ -254,7 +258,7 @@ def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Ar
 
 def _measured(
     scene: Scene, recording: Recording, turns: Turns, data: dict[str, Array]
-) -> dict[str, Array]:
+) -> dict[str, Any]:
     """Measures of impact and noise of the averaged revolutions, and the coordinates that go with them."""
     problem = recording.problem
     periods, integrals = turns.averaged(problem.transient)

@@ -117,7 +117,7 @@ class Start(View):
 class Outcome(View):
     """Outcomes of samples; numbers of a failed one are what it had got to, or NaN.
 
-    Means are over the averaged revolutions, totals over all of them; those of rates that no effect asked for are 0.
+    Means are over the averaged revolutions, totals over all of them; those of rates that no effect requested are 0.
     """
 
     size = at.OUT

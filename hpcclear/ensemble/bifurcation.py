@@ -42,7 +42,7 @@ class Observation:
     """transient and revolutions: how many are left out and observed."""
 
     def of(self, response: xr.Dataset) -> xr.DataArray:
-        """The series that is observed; raises InputError where the response has none of this name."""
+        """The series that is observed; raises InputError where the response lacks this name."""
         found = motion.series(response)
         word, _, rest = self.name.partition(" ")
         name = rest if word in REDUCED else self.name

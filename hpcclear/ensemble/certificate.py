@@ -5,7 +5,7 @@ so many replicates of the points; it is sent what came of them, and returns what
 numbers.
 
 Singly at first: replicates double until each effect's change is significantly within the tolerance, significantly beyond it,
-or undecided. What is within it singly is then left out together; where that fails, pairs tell which effects are more
+or undecided. What is within it singly is then left out together; where that fails, pairs show which effects are more
 together than alone. What is recommended has been simulated: the most effects whose own change together is within the
 tolerance.
 
@@ -81,13 +81,13 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked of an effect screening."""
+    """What is required of an effect screening."""
 
     effects: int
     tolerance: float
     """Relative change that is allowed."""
     confidence: float
-    """Of each change's limits."""
+    """Confidence level of each change."""
     most: int
     """Replicates of a variant at most."""
     scattered: bool
@@ -218,7 +218,7 @@ def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
 
 
 def _decidable(book: Book, off: Variant) -> bool:
-    """Whether more replicates may tell a change: not where too many have failed."""
+    """Whether more replicates may decide a change: not where too many have failed."""
     return book.verdict(off) is Verdict.UNDECIDED and bool(
         np.isfinite(book.changes(off).mean.value)
     )

@@ -1,4 +1,4 @@
-"""The `effects` command: by how much each effect of a scene changes what its study asks, on all ranks.
+"""The `effects` command: by how much each effect of a scene changes what its study requires, on all ranks.
 
 Root follows the effect screening (`hpcclear.ensemble.certificate`); what it requests is a design like any other, the same
 points for every variant, simulated on all ranks and kept in the checkpoint."""

@@ -162,7 +162,7 @@ def _reason(one: Life) -> str:
 
 
 def _profiles(relief: Relief, found: list[Curves], angles: Array) -> dict[str, Array]:
-    """Quantiles over lives of the depth of both surfaces by the angle, (quantile, cycle, joint, angle), m."""
+    """Quantiles over service lives of the depth of both surfaces by the angle, (quantile, cycle, joint, angle), m."""
     aside = relief.around(_stacked(found, "waves"), angles)
     mean = {"bearing_profile": "bearing", "journal_profile": "journal"}
     return {

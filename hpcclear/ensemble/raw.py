@@ -32,7 +32,7 @@ class RawFiles:
         Global attributes of the files.
     objective : Objective
     joints : sequence of str
-        Labels of the joints that records tell of.
+        Labels of the joints of the records.
     """
 
     def __init__(

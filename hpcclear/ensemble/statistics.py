@@ -97,6 +97,12 @@ def run_statistics(
             "statistics are streamed for Monte Carlo samples only",
             'Set method = "monte-carlo" in [study]',
         )
+    tables = [one.name for one in scene.study.variables if one.rows]
+    if tables:
+        raise InputError(
+            f"study.variables.{tables[0]}", None, "statistics are not streamed over the rows of a table",
+            "Use `sample` without --statistics, or leave the variable out",
+        )  # fmt: skip
     place = Place.of_file(output, options.fresh)
     points = MonteCarloPoints(scene, scene.study.samples if samples is None else samples)
     key = statistics_key(scene, len(points))
@@ -256,7 +262,7 @@ class _Streaming:
 
     def _run_samples(self, left: Remaining) -> float:
         """Let ranks send samples: those of the first block, which decides the histograms, of blocks that an earlier run left
-        with samples, of one that tells what a sample costs; or all, if root keeps them. Returns seconds of a rank for one."""
+        with samples, of one that measures their cost; or all, if root keeps them. Returns seconds of a rank for one."""
         if len(left) == 0:
             return 0.0
 

@@ -23,7 +23,7 @@ from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.scene.switches import Off, Switch, switches
 
 CONFIDENCE = 0.99
-"""Of each change's limits: several are looked at, and each more than once."""
+"""Confidence level of each change: several are looked at, and each more than once."""
 
 SCATTER = 8
 """Points of a replicate about its design, where the study has random inputs."""
@@ -194,7 +194,7 @@ class Trial:
         return self._implicit[kept]
 
     def plan(self, wanted: Wanted) -> Plan:
-        """What is asked of the effect screening.
+        """What is required of the effect screening.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class Trial:
         return scene.with_({"numerics.max_steps": most} | self._turns)
 
     def _limit(self, records: Records) -> None:
-        """Limits by what the whole scene took at its first points."""
+        """Bounds by what the whole scene took at its first points."""
         numerics = self.scene.numerics
         self._evaluations = int(records["rhs_evaluations"].max())
         if numerics.target_error is not None and self.scene.clearance_joints():

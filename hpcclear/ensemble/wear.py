@@ -1,7 +1,7 @@
 """The `wear` command: service lives of a mechanism with wear, on all ranks.
 
-Root follows the lives (`hpcclear.dynamics.wear.life`) side by side: what all of them ask for is a design like any other,
-simulated on all ranks and kept in the checkpoint; who goes on after a kill asks for the same once more and finds it done.
+Root follows the lives (`hpcclear.dynamics.wear.life`) in parallel: what all of them request is a design like any other,
+simulated on all ranks and kept in the checkpoint; a resumed run requests the same again and finds it done.
 """
 
 import contextlib
@@ -114,7 +114,7 @@ def of_lives(scene: Scene) -> Scene:
 
 
 def inputs_of(scene: Scene) -> Points | None:
-    """Random inputs of every life, a row each; None of a single one, which is the scene as it stands."""
+    """Random inputs of every life, a row each; None for a single one, which is the scene as it stands."""
     assert scene.wear is not None
     if scene.wear.lives == 1:
         return None
@@ -211,7 +211,7 @@ def _simulated(
     progress: LivesProgress,
     first: int,
 ) -> list[Records]:
-    """Records of what each life asks for, as one design; its first simulation has the number `first`."""
+    """Records of what each life requests, as one design; its first simulation has the number `first`."""
     rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
     design = np.concatenate(rows)
     late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
@@ -240,7 +240,7 @@ def _go_on(
     going: dict[int, tuple[Asking, Asked]],
     ended: dict[int, Life],
 ) -> None:
-    """Send a life what it waited for; it asks for more or ends."""
+    """Send a life what it waited for; it requests more or ends."""
     try:
         asked = next(asking) if seen is None else asking.send(seen)
         going[number] = asking, asked

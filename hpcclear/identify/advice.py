@@ -12,7 +12,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.identify.features import Choice, Layout
-from hpcclear.identify.judgement import members_of
+from hpcclear.identify.judgement import members_of, predictable
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.posterior import FOLDS
 from hpcclear.identify.signals import ORDERS, Sensor, Spectrum
@@ -23,6 +23,9 @@ REVOLUTIONS = (5, 20, 100)
 
 NOISE = 0.1
 """Noise of a sample over the RMS of the signal, where none is given."""
+
+PENALTIES = (0.1, 1.0, 10.0, 100.0)
+"""Of the regression; that with the least error is taken."""
 
 SAMPLES = 512
 """Samples of a revolution."""
@@ -62,7 +65,8 @@ def advice(
         ]
         width.append([one for one, _ in rows])
         related.append([one for _, one in rows])
-    return Advice(tuple(names), np.array(width), np.array(related))
+    narrowest = np.minimum.accumulate(np.array(width), axis=1)  # more revolutions are no worse
+    return Advice(tuple(names), narrowest, np.array(related))
 
 
 def _expected(
@@ -75,13 +79,17 @@ def _expected(
     measured = Measured(name, typical, True, frequency, ORDERS)
     layout = Layout.of(measured, sensor)
     features, _ = members_of(ensemble, [layout], sensor, frequency)
-    noise = layout.values(typical)[1]
+    noise = layout.values(typical, measured=True)[1]
     rng = np.random.default_rng([seed, 0x6164])
     choice = Choice.of(features, noise)
-    scores = choice.scores(features + rng.standard_normal(features.shape) * np.sqrt(noise))
+    seen_features = features + rng.standard_normal(features.shape) * np.sqrt(noise)
+    kept = predictable(ensemble.places, choice.scores(seen_features), rng)
+    choice = choice.only(kept)
+    scores = choice.scores(seen_features) / np.sqrt(np.maximum(choice.information, 1e-12))
     unknowns = ensemble.inputs.unknowns
     truth = ensemble.places[:, : len(unknowns)]
-    error = truth - _cross_validated(scores / np.sqrt(choice.information), truth)
+    errors = [truth - _cross_validated(scores, truth, penalty) for penalty in PENALTIES]
+    error = min(errors, key=lambda one: float((one**2).sum()))
     ranges = np.array([one.upper - one.lower for one in unknowns])
     related: Array = np.atleast_2d(np.corrcoef(error.T))
     away = related[~np.eye(len(unknowns), dtype=bool)]
@@ -89,7 +97,7 @@ def _expected(
     return np.quantile(np.abs(error), 0.95, axis=0) * ranges, most
 
 
-def _cross_validated(scores: Array, truth: Array) -> Array:
+def _cross_validated(scores: Array, truth: Array, penalty: float) -> Array:
     """Unknowns (n, u) predicted by regressions that were fitted without each, bounded to the unit cube."""
     upper = np.triu_indices(min(scores.shape[1], 8))
     squares = (scores[:, upper[0]] * scores[:, upper[1]]).reshape(len(scores), -1)
@@ -98,6 +106,6 @@ def _cross_validated(scores: Array, truth: Array) -> Array:
     groups = np.arange(len(scores)) % FOLDS
     for k in range(FOLDS):
         own, others = terms[groups == k], terms[groups != k]
-        matrix = others.T @ others + 0.5 * np.eye(terms.shape[1])
+        matrix = others.T @ others + penalty * np.eye(terms.shape[1])
         found[groups == k] = own @ np.linalg.solve(matrix, others.T @ truth[groups != k])
     return np.clip(found, 0.0, 1.0)

@@ -20,7 +20,7 @@ from hpcclear.identify.features import Layout
 from hpcclear.identify.history import history, seconds_of
 from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.judgement import Prepared, Verdict, features_of, judged, prepare
-from hpcclear.identify.measured import Measured, read_measured
+from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.signals import Sensor, names_of, revolutions_of
 from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
 from hpcclear.ranks.team import Ranks
@@ -53,6 +53,8 @@ class Wanted:
     sensor : Sensor
     noise : float, optional
         Standard deviation of the sensor's noise over the RMS of the signal.
+    pressure : str
+        ``COLUMN=AREA`` of a measured pressure on the slider, in the first table; a known input.
     advise : bool
         Whether further signals are compared.
     members : int, optional
@@ -65,6 +67,7 @@ class Wanted:
     limit: float | None = None
     sensor: Sensor = field(default_factory=Sensor)
     noise: float | None = None
+    pressure: str = ""
     advise: bool = False
     members: int | None = None
 
@@ -79,7 +82,7 @@ class Wanted:
         return {
             "unknowns": "; ".join(self.unknowns), "signals": ", ".join(self.names), "tables": ", ".join(digests),
             "dates": ", ".join(self.dates), "limit": repr(self.limit), "sensor": repr(self.sensor),
-            "noise": repr(self.noise), "advise": repr(self.advise), "members": repr(self.size()),
+            "noise": repr(self.noise), "pressure": self.pressure, "advise": repr(self.advise), "members": repr(self.size()),
         }  # fmt: skip
 
 
@@ -131,6 +134,8 @@ def _identified(
     scene: Scene, inputs: Inputs, times: Array, session: Session, wanted: Wanted
 ) -> xr.Dataset:
     """The dataset of what was found."""
+    if wanted.pressure and wanted.signals:
+        scene = loaded(scene, wanted.signals[0], wanted.pressure)
     plain, seed = prepared_scene(scene), 0 if scene.study is None else scene.study.seed
     frequency, sense, names = _driven(plain)
     every = tuple(dict.fromkeys((*wanted.names, *(names if wanted.advise else ()))))
@@ -140,12 +145,13 @@ def _identified(
         [read_measured(path, name, units[name], frequency, turns, sense) for name in wanted.names]
         for path in wanted.signals
     ]
+    layouts = _layouts(tables, wanted) if tables else []  # refuses before anything is simulated
     quiet = session.options.style == "quiet"
     ensemble = simulated(
         plain, inputs, every, wanted.size(), seed, session.ranks, session.opened(), quiet
     )
     with session.ranks.stage("posterior"):
-        found = _verdicts(ensemble, tables, wanted, seed) if tables else None
+        found = _verdicts(ensemble, tables, layouts, wanted, seed) if tables else None
         gains = None
         if wanted.advise:
             share = wanted.noise or NOISE
@@ -166,13 +172,16 @@ def _driven(scene: Scene) -> tuple[float, int, list[str]]:
 Found = tuple[Prepared, list[Verdict]]
 
 
+def _layouts(tables: Sequence[Sequence[Measured]], wanted: Wanted) -> list[Layout]:
+    """The features that all tables have."""
+    return [Layout.of(one, wanted.sensor, _noise(one, wanted.noise)) for one in _narrowest(tables)]
+
+
 def _verdicts(
-    ensemble: Ensemble, tables: Sequence[Sequence[Measured]], wanted: Wanted, seed: int
-) -> Found:
+    ensemble: Ensemble, tables: Sequence[Sequence[Measured]], layouts: Sequence[Layout], wanted: Wanted,
+    seed: int,
+) -> Found:  # fmt: skip
     """What each table says, by models for the noisiest of them."""
-    layouts = [
-        Layout.of(one, wanted.sensor, _noise(one, wanted.noise)) for one in _narrowest(tables)
-    ]
     pairs = [features_of(row, layouts) for row in tables]
     variance = np.max([own for _, own in pairs], axis=0)
     made = prepare(ensemble, layouts, wanted.sensor, tables[0][0].frequency, variance, seed)
@@ -198,7 +207,7 @@ def identified(
     ensemble: Ensemble, found: Found | None, times: Array, gains: Advice | None, wanted: Wanted, seed: int,
     attributes: Mapping[str, object],
 ) -> xr.Dataset:  # fmt: skip
-    """Return the dataset of kind ``identify``."""
+    """Return the dataset of kind ``identify``; `times` (records,), s."""
     inputs = ensemble.inputs
     units = [one.unit for one in inputs.unknowns]
     coords: dict[str, Any] = {
@@ -237,11 +246,11 @@ def identified(
     if gains is not None:
         coords |= {"candidate": np.array(gains.names, str), "revolutions": np.array(REVOLUTIONS)}
         data |= {"expected_half_width": gains.half_width, "expected_correlation": gains.correlation}
-    told = {
+    further = {
         **attributes, "members": len(ensemble.places), "failed_members": ensemble.failed,
         **({} if wanted.limit is None else {"limit": wanted.limit}),
     }  # fmt: skip
-    return with_units(dataset.dataset("identify", coords, data, told), units)
+    return with_units(dataset.dataset("identify", coords, data, further), units)
 
 
 def _of_verdicts(verdicts: Sequence[Verdict], particles: Array, unknowns: int) -> dict[str, Any]:

@@ -23,6 +23,7 @@ def identify(
     limit: float | None = None,
     sensor: "Sensor | None" = None,
     noise: float | None = None,
+    pressure: str = "",
     advise: bool = False,
     members: int | None = None,
     output: str | Path | None = None,
@@ -50,6 +51,8 @@ def identify(
     noise : float, optional
         Standard deviation of the sensor's noise in a sample over the RMS of the signal. With it, the scatter between
         revolutions is a feature.
+    pressure : str
+        ``"COLUMN=AREA"``: a measured pressure in the first table as a known load on the slider of a slider-crank.
     advise : bool
         Whether other signals are compared: expected half-widths by signal and number of revolutions.
     members : int, optional
@@ -75,8 +78,8 @@ def identify(
         return [str(one)] if isinstance(one, str | Path) else [str(each) for each in one]
 
     wanted = Wanted(
-        tuple(several(unknown)), tuple(map(Path, several(signal))), tuple(several(of)), tuple(dates), limit,
-        sensor or Sensor(), noise, advise, members,
+        tuple(several(unknown)), tuple(map(Path, several(signal))), tuple(dict.fromkeys(several(of))), tuple(dates), limit,
+        sensor or Sensor(), noise, pressure, advise, members,
     )  # fmt: skip
     return in_process(
         lambda place, ranks, options: run_identify(scene, place, ranks, wanted, options),

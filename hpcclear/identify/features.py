@@ -1,4 +1,4 @@
-"""Features of a signal: harmonics, third octaves and their scatter between revolutions; and the few combinations that tell.
+"""Features of a signal: harmonics, third octaves, their scatter between revolutions, and the most informative combinations.
 
 A revolution of a chaotic motion does not repeat, so no instant of it is a feature. Means over revolutions are, and the variance
 between revolutions says how well they are known.
@@ -65,8 +65,13 @@ class Layout:
         lowest = max(int(bare), int(np.ceil(sensor.band[0] / frequency - 1e-9)))
         highest = min(measured.highest, int(min(sensor.band[1] / frequency, ORDERS)))
         if highest <= max(lowest, 1):
-            reason = f"no harmonic of {frequency:.4g} Hz passes"
-            raise InputError("--band", name, reason, "Widen the band, or sample faster")
+            reason = f"no harmonic of {frequency:.4g} Hz in {name} passes"
+            raise InputError(
+                "--band",
+                "{:g}:{:g}".format(*sensor.band),
+                reason,
+                "Widen the band, or sample faster",
+            )
         orders = tuple(range(lowest, min(highest, SINGLE) + 1))
         return cls(name, orders, _thirds(SINGLE + 1, highest), measured.synchronised, noise)
 
@@ -91,10 +96,14 @@ class Layout:
             *(f"scatter of harmonics {a} to {b} of {self.name}" for a, b in self.scattered),
         )
 
-    def values(self, seen: Spectrum) -> tuple[Array, Array]:
-        """Return the features (..., p) of a spectrum and their variances (..., p)."""
+    def values(self, seen: Spectrum, measured: bool = False) -> tuple[Array, Array]:
+        """Return the features (..., p) of a spectrum and their variances (..., p).
+
+        A `measured` one has the sensor's noise, and its variances are those of few revolutions.
+        """
         mean, between = seen.mean, np.nan_to_num(seen.variance)
-        own = between / seen.revolutions
+        own = (known_scatter(seen).variance if measured else between) / seen.revolutions
+        noise = float(self.noise or 0.0) if measured else 0.0
         power = np.maximum(np.abs(mean) ** 2 - own, 0.0)
         found: list[Array] = []
         spread: list[Array] = []
@@ -114,7 +123,7 @@ class Layout:
         freedom = max(seen.revolutions - 1, 1)
         for a, b in self.scattered:
             width, total = b + 1 - a, between[..., a : b + 1].sum(-1)
-            found.append(np.sqrt(np.maximum(total - width * float(self.noise or 0.0) ** 2, 0.0)))
+            found.append(np.sqrt(np.maximum(total - width * noise**2, 0.0)))
             spread.append(0.5 * total / (freedom * width))
         return np.stack(found, -1), np.stack(spread, -1)
 
@@ -151,7 +160,7 @@ def known_scatter(seen: Spectrum) -> Spectrum:
 
 @dataclass(frozen=True)
 class Choice:
-    """The combinations of features that tell most.
+    """The most informative combinations of features.
 
     Attributes
     ----------

@@ -73,7 +73,7 @@ class Inputs:
 
     @classmethod
     def of(cls, scene: Scene, unknowns: Sequence[str]) -> "Inputs":
-        """Return the unknowns, and the random inputs of the scene's study that drive none of their entries.
+        """Return the unknowns, and the random inputs of the scene's study that drive other entries.
 
         Raises
         ------
@@ -131,12 +131,12 @@ class Inputs:
         return np.column_stack([own, *rest])
 
     def points(self, places: Array) -> Points:
-        """Return the same as designs."""
+        """Return the designs at places (n, size or more)."""
         paths = (*(one.paths for one in self.unknowns), *(one.paths for one in self.nuisances))
         return Points(self.names, self.values(places), paths)
 
     def variants(self, places: Array) -> list[dict[str, Any]]:
-        """Return the entries of the scene at each place."""
+        """Return the entries of the scene at each of the places (n, size or more)."""
         points = self.points(places)
         return [
             {

@@ -7,7 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from hpcclear.base.arrays import Array
-from hpcclear.identify.features import Choice, Layout, known_scatter, sensed
+from hpcclear.identify.features import Choice, Layout, sensed
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.posterior import LEVELS, Calibration, Model
 from hpcclear.identify.signals import Sensor
@@ -60,7 +60,7 @@ class Verdict:
     interval : ndarray, shape (3, unknowns)
         Lower end, median and upper end, SI.
     doubt : ndarray, shape (2,)
-        Standard scores of the fit: of the combinations that tell, and of all other features.
+        Standard scores of the fit: of the informative combinations, and of all other features.
     explained : bool
     worst : int
         Feature that fits least.
@@ -81,7 +81,7 @@ class Verdict:
 def features_of(measured: Sequence[Measured], layouts: Sequence[Layout]) -> tuple[Array, Array]:
     """Return the features (p,) of the signals of one measurement, and their variances (p,)."""
     pairs = [
-        layout.values(known_scatter(one.spectrum))
+        layout.values(one.spectrum, measured=True)
         for one, layout in zip(measured, layouts, strict=True)
     ]
     return np.concatenate([own for own, _ in pairs]), np.concatenate([own for _, own in pairs])

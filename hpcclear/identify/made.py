@@ -16,7 +16,8 @@ from hpcclear.scene.planar import turns_of
 
 
 def write_made(
-    scene: Scene, path: Path, names: Sequence[str], *, noise: float, revolutions: int = 30, samples: int = 512, seed: int = 0
+    scene: Scene, path: str | Path, names: Sequence[str], *, noise: float, revolutions: int = 30,
+    samples: int = 512, seed: int = 0,
 ) -> None:  # fmt: skip
     """Simulate a scene and write what a sensor would record over the crank angle, after the transient.
 
@@ -24,7 +25,7 @@ def write_made(
     ----------
     scene : Scene
         Of `hpcclear.identify.training.prepared_scene`, or any with many instants per revolution.
-    path : Path
+    path : path
         CSV table to write.
     names : sequence of str
         Signals.
@@ -58,7 +59,7 @@ def write_made(
         columns.append(values + noise * values.std() * rng.standard_normal(len(values)))
         unit = unit_of(response, name)
         headings.append(name if unit == "1" else f"{name} [{unit}]")
-    _write(path, headings, columns)
+    _write(Path(path), headings, columns)
 
 
 def _write(path: Path, headings: Sequence[str], columns: Sequence[Array]) -> None:

@@ -7,8 +7,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import IMPACTS, ORDERS, Spectrum, harmonics
 from hpcclear.report.compare import Column, read_columns
+from hpcclear.scene import Scene
+from hpcclear.scene.planar import turns_of
 
 FEWEST = 4
 """Whole revolutions that a table needs: their scatter is the measure of its noise."""
@@ -18,6 +21,9 @@ NYQUIST = 0.4
 
 DRIFT = 0.03
 """Relative difference of the crank's speed from the scene's that the search for its period covers."""
+
+PAIRS = 180
+"""Pairs of the curve of a measured pressure."""
 
 ANGLES = ("crank_angle", "crank angle", "angle", "phi")
 TIMES = ("time", "t")
@@ -103,6 +109,43 @@ def read_measured(
         known = float((place[-1] - place[0]) / (seconds[-1] - seconds[0]))
     highest = min(ORDERS, int(NYQUIST * rate))
     return Measured(name, Spectrum.of(found), angle is not None, known, highest, rate)
+
+
+def loaded(scene: Scene, path: Path, words: str) -> Scene:
+    """Return a scene whose slider bears a measured pressure: its mean over the revolutions, by the crank angle.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a slider-crank.
+    path : Path
+        Table with the crank angle.
+    words : str
+        ``COLUMN=AREA``: the pressure pushes the piston towards the crank.
+
+    Raises
+    ------
+    InputError
+        The words are another thing, the table lacks the angle or the column, or the scene is of another mechanism.
+    """
+    name, _, size = words.partition("=")
+    if not size:
+        raise InputError("--pressure", words, "is not COLUMN=AREA", 'For example pressure="12 cm2"')
+    if scene.template is None:
+        remedy = "Write the load of a linkage as a curve in its scene"
+        raise InputError("--pressure", words, "only a slider-crank has a piston", remedy)
+    area = number_of("--pressure", size, "m^2")
+    found = read_measured(path, name, "Pa", np.nan, turns_of(scene.linkage))
+    if not found.synchronised:
+        remedy = 'Add a column "crank_angle [deg]"'
+        raise InputError("--pressure", str(path), "has no crank angle", remedy)
+    share = np.arange(PAIRS) / PAIRS
+    order = np.arange(float(found.highest + 1))
+    mean = found.spectrum.mean[: found.highest + 1]
+    pressure = (mean * np.exp(2j * np.pi * order * share[:, None])).real.sum(axis=1)
+    angle = 2.0 * np.pi * turns_of(scene.linkage) * share
+    pairs = [[float(a), float(-area * p)] for a, p in zip(angle, pressure, strict=True)]
+    return scene.with_({"effects.slider_load": pairs})
 
 
 def _column(columns: list[Column], name: str, path: Path) -> Column:

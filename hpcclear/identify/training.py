@@ -29,7 +29,7 @@ from hpcclear.scene.planar import turns_of
 CHUNK = 64
 """Members between two checkpoints."""
 
-LEAST_REVOLUTIONS = 20
+LEAST_REVOLUTIONS = 10
 """Revolutions that a member is averaged over at least: chaos takes some to be seen."""
 
 LARGEST_FAILURE = 0.1
@@ -123,8 +123,8 @@ def simulated(
         known = None if checkpoint is None else checkpoint.load_stage(stage)
         if known is None:
             rows = variants[first : first + CHUNK]
-            told = partial(spectra, names=tuple(names))
-            found = responses_of(scene, rows, told, shape, ranks, "ensemble")[:, 0]
+            reduced = partial(spectra, names=tuple(names))
+            found = responses_of(scene, rows, reduced, shape, ranks, "ensemble")[:, 0]
             known = {"spectra": found}
             if checkpoint is not None:
                 checkpoint.save_stage(stage, known)

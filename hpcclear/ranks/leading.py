@@ -130,7 +130,7 @@ class Lead:
 
     @property
     def _can_answer(self) -> bool:
-        """Whether it is known now what a rank that asks may have; nothing, if no more will come."""
+        """Whether it is known now what a requesting rank may have; nothing, if no more will come."""
         return True
 
     def _accept(self, records: np.ndarray | None) -> None:

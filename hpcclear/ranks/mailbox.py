@@ -86,7 +86,7 @@ class Mail:
     neighbours : list of int
         Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
     leaders : list of int
-        The first rank of each node but for root, which is none of them.
+        The first rank of each node except root.
     group : list of int
         Of a leader: the other ranks of its node but for root.
     """

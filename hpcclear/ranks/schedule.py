@@ -76,7 +76,7 @@ def allot(remaining: int, ranks: int, need: Need) -> Allotment:
     Costs of samples are unknown beforehand and may differ tenfold, so a block holds what the rank
     does in about half a second (longer on many ranks, so that root is not swamped by requests),
     never more than half its fair share of what is left, never less than fills its lanes: samples in
-    lockstep lanes take the time of the longest one, so an empty lane saves nothing.
+    lanes of a batch take the time of the longest one, so an empty lane saves nothing.
     Stock for the time a request takes is kept while there is enough to do; at the end it would only
     sit behind one rank while another is idle, and a lane waits for its next sample instead.
 

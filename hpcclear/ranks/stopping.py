@@ -59,7 +59,7 @@ class StopSwitch:
     """Collects the signals and the time limit of one process; loops poll `is_set`.
 
     A thread of its own listens, since Python runs signal handlers only between two bytecodes of the
-    main thread, which a long fit in compiled code may not reach in time. Once asked to stop, the
+    main thread, which a long fit in compiled code may not reach in time. Once it has to stop, the
     process has `GRACE` seconds before `last_resort` ends it: files are written whole and renamed,
     so that nothing breaks. A second SIGINT ends it at once.
 

@@ -308,7 +308,7 @@ class Ranks:
                 backoff.reset()
 
     def _serve_stage(self, task: Task, leader: int) -> None:
-        """Ask for samples before the last ones are done, send records along, until who hands them out ends it."""
+        """Request samples before the last ones are done, send records along, until who hands them out ends it."""
         queue, setup = self.make_queue(task)
         asked, sent_at, backoff = False, time.monotonic(), Backoff()
         while (message := self.mail.poll()) is None or message.tag != Tag.END:

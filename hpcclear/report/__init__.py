@@ -6,6 +6,11 @@ Figures need matplotlib (the extra ``analysis``), which is imported when the fir
 from hpcclear.report.figures.compared import overlay_figure
 from hpcclear.report.figures.designs import comparison_figure, front_figure
 from hpcclear.report.figures.effects import effects_figure
+from hpcclear.report.figures.identified import (
+    features_figure,
+    growth_figure,
+    posterior_figure,
+)
 from hpcclear.report.figures.maps import bifurcation_figure, map_figure
 from hpcclear.report.figures.portraits import (
     force_polar_figure,
@@ -38,9 +43,11 @@ __all__ = [
     "effects_figure",
     "energy_figure",
     "fan_figure",
+    "features_figure",
     "fit_figure",
     "force_polar_figure",
     "front_figure",
+    "growth_figure",
     "map_figure",
     "orbit_figure",
     "overlay_figure",
@@ -48,6 +55,7 @@ __all__ = [
     "penetration_figure",
     "phase_figure",
     "poincare_figure",
+    "posterior_figure",
     "profile_figure",
     "response_figure",
     "samples_figure",

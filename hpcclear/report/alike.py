@@ -51,7 +51,11 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
 
 def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
     """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
-    masses = [one.name for one in labels.design_variables(together) if one.attrs["units"] == "kg"]
+    masses = [
+        one.name
+        for one in labels.design_variables(together)
+        if one.attrs["units"] == "kg" and "of_random_inputs" not in one.attrs
+    ]
     if not masses:
         return ""
     whole = np.sum([together[name].to_numpy() for name in masses], axis=0)

@@ -77,6 +77,7 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
         *([Line("near", near)] if near else []),
         Line("active bounds", bounds(best)),
         *scatter.lines(files, best),
+        *scatter.worst(files, best),
         *_shares(files),
         *(Line("warning", text) for text in _poor_fits(files)),
         Line("contact model", _left(files, best)),
@@ -250,7 +251,7 @@ def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     if not float(own["chaotic"]) > SOME:
         return f"{text}; this one is not: perturbations of 1e-9 leave its samples unchanged"
     return (
-        f"{text}. Perturbations of 1e-9 change {float(own['chaotic']):.0%} of the samples of this one and explain "
+        f"{text}. Perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples and explain "
         f"{float(own['chaos_share']):.0%} of its variance"
     )
 

@@ -1,6 +1,7 @@
 """Loads of the bearings in one response: forces with their angles, contact, pressure, torque, and warnings."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -208,9 +209,15 @@ def _weights(time: Array) -> Array:
 def _projected_areas(response: xr.Dataset) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
     try:
-        scene = scene_of_text(str(response.attrs["scene"]), "scene")
+        return _areas_in(str(response.attrs["scene"]))
     except (InputError, KeyError):
         return {}  # a file of another version, or without its scene
+
+
+@lru_cache(maxsize=4)
+def _areas_in(text: str) -> dict[str, float]:
+    """`_projected_areas` of a scene's text, which each table requests of a page."""
+    scene = scene_of_text(text, "scene")
     areas = {}
     for joint in scene.pins():
         one = scene.pin(joint)

@@ -105,7 +105,11 @@ def _role(end: str, own: xr.Dataset) -> str:
 
 def masses(verified: xr.Dataset) -> list[xr.DataArray]:
     """Return the design variables that are masses."""
-    return [v for v in labels.design_variables(verified) if v.attrs.get("units") == "kg"]
+    return [
+        v
+        for v in labels.design_variables(verified)
+        if v.attrs.get("units") == "kg" and "of_random_inputs" not in v.attrs
+    ]
 
 
 def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:

@@ -1,8 +1,11 @@
 """What a file of kind ``identify`` says, in lines for the terminal and the page."""
 
+from pathlib import Path
+
 import numpy as np
 import xarray as xr
 
+from hpcclear.report.figures import labels
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
 
@@ -15,19 +18,33 @@ TOGETHER = 0.9
 DAY = 86400.0
 
 
+def rounded(value: float, unit: str, digits: int = 2) -> str:
+    """Return a number to some digits in a unit of a readable size, without an exponent."""
+    if not np.isfinite(value):
+        return quantity(value, unit)
+    scale = labels.scale(unit, value)
+    shown = float(f"{value * scale.factor:.{digits}g}")
+    text = f"{shown:.0f}" if abs(shown) >= 10 ** (digits - 1) else f"{shown:.{digits}g}"
+    return f"{text} {scale.unit}" if scale.unit != "–" else text
+
+
 def lines(content: xr.Dataset) -> list[Line]:
     """Return what was identified: unknowns by record, fit, growth, and what to measure."""
     found = _records(content) if "interval" in content else []
     return [*found, *_growth(content), *_advice(content)]
 
 
+def _short(name: object) -> str:
+    """A scene path without its first table, to leave space on a terminal."""
+    return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
+
+
 def _records(content: xr.Dataset) -> list[Line]:
     found = []
     for k, record in enumerate(content["record"].to_numpy()):
-        several = content.sizes["record"] > 1
+        before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
         for u, name in enumerate(content["unknown"].to_numpy()):
-            label = f"{name}, {record}" if several else str(name)
-            found.append(Line(label, interval(content, k, u)))
+            found.append(Line(_short(name), before + interval(content, k, u)))
     share = content["coverage"].to_numpy()
     shown = " and ".join(f"{one:.0%}" for one in share)
     factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
@@ -44,16 +61,14 @@ def interval(content: xr.Dataset, record: int, unknown: int) -> str:
     least, most = (float(content[f"prior_{end}"][unknown]) for end in ("lower", "upper"))
     span = most - least
     if high - low > NARROWED * span:
-        return (
-            f"not determined: 95 % interval {quantity(low, unit, 2)} to {quantity(high, unit, 2)}"
-        )
+        return f"not determined: 95 % interval {rounded(low, unit)} to {rounded(high, unit)}"
     digits = 2 if high - low > 0.05 * abs(middle) else 3
-    ends = f"{quantity(low, unit, digits)} to {quantity(high, unit, digits)}"
+    ends = f"{rounded(low, unit, digits)} to {rounded(high, unit, digits)}"
     if low - least < 0.02 * span:
-        return f"at most {quantity(high, unit, digits)} (95 % interval {ends}; the lower bound cuts it off)"
+        return f"at most {rounded(high, unit, digits)} (95 % interval {ends}; the lower bound cuts it off)"
     if most - high < 0.02 * span:
-        return f"at least {quantity(low, unit, digits)} (95 % interval {ends}; the upper bound cuts it off)"
-    return f"{quantity(middle, unit, digits)} (95 % interval {ends})"
+        return f"at least {rounded(low, unit, digits)} (95 % interval {ends}; the upper bound cuts it off)"
+    return f"{rounded(middle, unit, digits)} (95 % interval {ends})"
 
 
 def _growth(content: xr.Dataset) -> list[Line]:
@@ -62,18 +77,20 @@ def _growth(content: xr.Dataset) -> list[Line]:
     found = []
     for u, name in enumerate(content["unknown"].to_numpy()):
         unit = str(content["unit"].to_numpy()[u])
-        low, middle, high = (quantity(float(one) * DAY, unit, 2) for one in content["rate"][:, u])
-        found.append(Line(f"growth of {name}", f"{middle} per day (95 % interval {low} to {high})"))
+        low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
+        found.append(
+            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high})")
+        )
         if "limit" in content.attrs:
             days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
-            found.append(Line(f"{name} at {limit} in", text))
+            found.append(Line(f"time to {limit}, {_short(name)}", text))
     return found
 
 
 def _days(seconds: float) -> str:
-    return f"{seconds / DAY:.2g} days" if np.isfinite(seconds) else "never"
+    return f"{rounded(seconds / DAY, '1')} days" if np.isfinite(seconds) else "never"
 
 
 def _advice(content: xr.Dataset) -> list[Line]:
@@ -87,10 +104,13 @@ def _advice(content: xr.Dataset) -> list[Line]:
             unit = str(content["unit"].to_numpy()[u])
             widths = content["expected_half_width"][k, :, u].to_numpy()
             shown = ", ".join(
-                f"{quantity(float(width), unit, 2)} ({count})"
+                f"{rounded(float(width), unit)} ({count})"
                 for width, count in zip(widths, counts, strict=True)
             )
-            parts.append(f"{unknown} ± {shown}")
+            parts.append(f"{_short(unknown)} ± {shown}")
+        if len(parts) > 1:
+            related = float(content["expected_correlation"][k, -1])
+            parts.append(f"correlation of errors {related:.2f} ({counts[-1]})")
         found.append(Line(f"by {name}", f"{'; '.join(parts)} revolutions"))
     return found
 

@@ -74,6 +74,7 @@ def counts(one: xr.Dataset) -> bool:
 
 
 def baseline_of(ours: xr.Dataset) -> xr.Dataset | None:
+    """The baseline design, if it is among them."""
     for k, name in enumerate(ours["design"].to_numpy()):
         if str(name).rpartition(" ")[2] == "original":
             return ours.isel(design=k)
@@ -86,7 +87,7 @@ def best_of(ours: xr.Dataset) -> xr.Dataset:
 
 
 def judged(ours: xr.Dataset) -> np.ndarray:
-    """What designs of a case are compared by: infinite for those that keep its constraints less well than others."""
+    """Merit of the designs of a case, (designs,): infinite for those that satisfy its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
         return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
     order = ("", "kept", "cannot be told", "broken")

@@ -5,10 +5,15 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
 
 HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
+
+
+TIGHTENED = 3
+"""Inputs that are named as those to tighten first."""
 
 
 def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
@@ -42,6 +47,49 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
         "tolerances",
         f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}",
     )
+    prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
+    if len(rows) > 1:
+        yield Line("tighten first", _first(list(map(str, names)), *falls, prices))
+
+
+def _first(names: list[str], falls: np.ndarray, errors: np.ndarray, prices: np.ndarray) -> str:
+    """Which inputs to tighten first, three at most: those that bring most, or most for what it costs where that is known."""
+    brings = falls > HALF_WIDTH * errors
+    known = prices.size and bool((prices[brings] > 0.0).all())
+    merit = falls / np.where(prices > 0.0, prices, 1.0) if known else falls
+    chosen = [k for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED]
+    if not chosen:
+        return "none: no single input makes a significant part of the scatter"
+    left = 1.0 - (1.0 - (1.0 - falls[chosen]) ** 2).sum()  # variances of inputs add up
+    together = 1.0 - np.sqrt(max(left, 0.0))
+    listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
+    text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "
+    return text + f"{together:.0%}" + (", most for its cost" if known else "")
+
+
+def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+    """Yield the worst case of a design, and where it lies; none where it was not searched."""
+    found, name = files.get("worst"), str(best["design"].item())
+    if found is None or name not in found["design"].to_numpy():
+        return
+    own = found.sel(design=name)
+    value, corner = float(own["worst"]), float(own["worst_corner"])
+    if not np.isfinite(value):
+        return
+    unit = str(own["worst"].attrs["units"])
+    there = zip(
+        *(own[key].to_numpy() for key in ("input", "searched_at", "input_unit")), strict=True
+    )
+    listed = ", ".join(f"{n} = {quantity(float(x), str(u))}" for n, x, u in there if np.isfinite(x))
+    text = f"f reaches at least {quantity(value, unit)} within the bounds of the random inputs, at {listed} "
+    text += f"({int(own['tried'])} simulations"
+    if np.isfinite(corner) and corner < value:
+        text += f"; {quantity(corner, unit)} at their corners"
+    text += "; a search finds a lower limit)"
+    loose = [str(one) for one in own["input"].to_numpy()[own["without_bounds"].to_numpy() != 0]]
+    if loose:
+        text += f". Without bounds, taken within three standard deviations: {', '.join(loose)}"
+    yield Line("worst case", text)
 
 
 def _listed(parts: list[tuple[str, float, float]]) -> str:
@@ -54,4 +102,4 @@ def share(name: str, value: float, half_width: float) -> str:
     """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
     if value > half_width:
         return f"{name} {value:.0%} ± {half_width:.1%}"
-    return f"{name} 0% within {max(half_width, value):.1%}"
+    return f"{name} below {max(half_width, value):.1%}"

@@ -28,11 +28,13 @@ DRAWN = {
     "random-lhs": "Latin hypercube of the random inputs",
     "qmc": "Sobol sequence of the random inputs",
 }
-"""What samples are samples of, by the method that drew them (attribute ``sampling``)."""
+"""Sampling in words, by method (attribute ``sampling``)."""
 
-INDEPENDENT = "95 % confidence intervals of independent samples"
-USUALLY_WIDER = f"{INDEPENDENT}: those of this method usually vary less"
-CHOSEN = "none: the designs were chosen, they are no random sample"
+INDEPENDENT = "computed for independent samples"
+USUALLY_WIDER = (
+    "computed for independent samples; with this sampling true intervals are usually narrower"
+)
+CHOSEN = "none: the designs were chosen, not sampled at random"
 
 
 class Line(NamedTuple):
@@ -106,10 +108,13 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
     if len(known) < 2:
         return []
     unit, drawn = str(samples["objective"].attrs["units"]), method in DRAWN
-    lines = [Line("samples of", DRAWN[method])] if drawn else []
+    lines = [Line("sampling", DRAWN[method])] if drawn else []
     lines += _moments(known, unit, drawn)
     lines += [
-        Line(f"P{100 * level:.0f} of f", _quantile(f, level, unit, drawn))
+        Line(
+            f"P{100 * level:.0f} of f" if level != 0.5 else "median of f",
+            _quantile(f, level, unit, drawn),
+        )
         for level in (LEVELS if drawn else LEVELS[:1])
     ]
     for joint in samples["joint"].to_numpy() if drawn and "peak_contact_force" in samples else ():
@@ -174,7 +179,7 @@ def _quantile(values: Array, level: float, unit: str, drawn: bool) -> str:
         return f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
     if failed and len(values) >= fewest(level):
         return "not stated: too many samples failed"
-    return f"not stated: it takes {fewest(level)} samples"
+    return f"not stated: it needs {fewest(level)} samples"
 
 
 def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:

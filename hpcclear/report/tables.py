@@ -31,11 +31,13 @@ ROWS: dict[str, tuple[str, ...]] = {
     "verification": ("design",),
     "chaos": ("design",),
     "contributions": ("design", "input"),
+    "worst": ("design", "input"),
     "claims": ("claim",),
     "readings": ("reading", "design"),
     "statistics": ("bin",),
     "wear": ("life", "cycle"),
     "effects": ("variant",),
+    "identify": ("unknown",),
     "timing": ("rank", "stage"),
     "accuracy": ("integrator", "rung"),
 }

@@ -115,7 +115,7 @@ def _own(found: xr.Dataset, scene: Scene) -> Way:
     at = np.log(numerics.rtol)
     bias, price = (
         float(np.interp(at, tolerance[order], values[order]))
-        for values in (known_bias(found), found["tolerance_seconds"].to_numpy())
+        for values in (_largest_bias(found), found["tolerance_seconds"].to_numpy())
     )
     waited, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
     words = f"rtol {_short(numerics.rtol)}, {waited} transient and {averaged} averaged revolutions"
@@ -133,14 +133,6 @@ def _averaging(found: xr.Dataset, transient: int, averaged: int) -> float:
     return float(
         np.exp(np.interp(np.log(averaged), np.log(counts), np.log(np.maximum(error, 1e-16))))
     )
-
-
-def known_bias(found: xr.Dataset) -> Array:
-    """Return the bias of each tolerance less its standard error, shape (tolerances,); 0 where it is the reference."""
-    bias, doubt = (
-        np.nan_to_num(found[name]) for name in ("tolerance_bias", "tolerance_bias_error")
-    )
-    return np.asarray(np.sqrt(np.maximum(bias**2 - doubt**2, 0.0)))
 
 
 def _largest_bias(found: xr.Dataset) -> Array:

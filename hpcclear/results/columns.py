@@ -53,8 +53,13 @@ RESPONSE: Columns = {
     "followed_acceleration_x": number(("time",), "m/s^2", "x acceleration of the followed point"),
     "followed_acceleration_y": number(("time",), "m/s^2", "y acceleration of the followed point"),
     "path_error": number(("time",), "m", "distance of the followed point from its position in the linkage without clearance"),
-    "eccentricity_x": number(("time", "joint"), "m", "x distance of the journal centre from the bearing centre"),
-    "eccentricity_y": number(("time", "joint"), "m", "y distance of the journal centre from the bearing centre"),
+    "eccentricity_x": number(("time", "joint"), "m",
+        "x distance of the journal centre from the bearing centre, of a slider's corner from its guide's line"),
+    "eccentricity_y": number(("time", "joint"), "m",
+        "y distance of the journal centre from the bearing centre, of a slider's corner from its guide's line"),
+    "guide": text(("guide",), "guide with clearance"),
+    "guide_offset": number(("time", "guide"), "m", "distance of the slider's middle from the guide's line, to the left"),
+    "guide_tilt": number(("time", "guide"), "rad", "angle of the slider against the guide's line"),
     "penetration": number(("time", "joint"), "m", "overlap of journal and bearing"),
     "contact_force": number(("time", "joint"), "N", "normal contact force; with an oil film the sum of both"),
     "friction_force": number(("time", "joint"), "N", "tangential contact force"),
@@ -241,9 +246,22 @@ CONTRIBUTIONS: Columns = {
     "halved": number(("design", "input"), "1",
         "fall of the standard deviation with half the scatter of an input, relative", required=True),
     "halved_error": number(("design", "input"), "1", "standard error of it", required=True),
+    "halving_cost": number(("design", "input"), "1", "additional cost of half the scatter of an input, as its cost is given"),
     "unexplained": number(("design",), "1", "share of the variance that no input or pair of them explains", required=True),
     "unexplained_error": number(("design",), "1", "standard error of it"),
     "together": flag(("input",), "whether the input is correlated with others, whose contribution is one"),
+}
+
+WORST: Columns = {
+    "design": text(("design",), "name of the design"),
+    "input": text(("input",), "random input"),
+    "worst": number(("design",), "objective",
+        "largest objective found within the bounds of the random inputs", required=True),
+    "worst_corner": number(("design",), "objective", "the largest at a corner of these bounds", required=True),
+    "searched_at": number(("design", "input"), "", "value of the random input there, in the unit beside it", required=True),
+    "tried": count(("design",), "simulations of the search", required=True),
+    "without_bounds": flag(("input",), "whether the input has no bounds and is taken within three standard deviations"),
+    "input_unit": text(("input",), "unit of the random input"),
 }
 
 CLAIMS: Columns = {

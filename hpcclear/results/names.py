@@ -137,6 +137,7 @@ KINDS = {
     ),
     "chaos": _kind("Sensitivity of the designs to initial conditions", columns.CHAOS),
     "contributions": _kind("Contributions to the scatter of designs", columns.CONTRIBUTIONS),
+    "worst": _kind("Worst case of designs", columns.WORST),
     "claims": _kind("Claims of the paper, tested on these results", columns.CLAIMS),
     "readings": _kind("Designs of the paper under interpretations of its text", columns.READINGS),
     "statistics": _kind("Statistics of many samples", columns.STATISTICS),
@@ -150,7 +151,7 @@ KINDS = {
 
 
 FURTHER_DIMS = {
-    *("body", "point", "pin", "wave", "angle", "mode"),
+    *("body", "point", "pin", "wave", "angle", "mode", "guide"),
     *("revolution", "order", "band", "record", "particle", "feature", "candidate", "revolutions"),
 }
 """Coordinates that only some files have."""
@@ -161,7 +162,7 @@ LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
 
 def designs_in(samples: xr.Dataset) -> dict[str, np.ndarray]:
-    """The design variables in a dataset, by their names or scene paths."""
+    """The design variables in a dataset, each of the shape of its dimensions, by their names or scene paths."""
     return {
         str(variable.attrs["scene_path"]): variable.to_numpy()
         for variable in samples.data_vars.values()

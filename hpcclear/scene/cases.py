@@ -15,7 +15,7 @@ class Case(Table):
     random: tuple[str, ...]
     """Names of `[study.random]`; what is left out has its design's value."""
     objectives: tuple[Goal, ...] | None = None
-    """The things that are made small, two to five; default "mean" and "deviation" of f. A word stands for a statistic without
+    """The things that are made small, one to five; default "mean" and "deviation" of f. A word stands for a statistic without
     further entries."""
     constraints: tuple[Constraint, ...] | None = None
     """What its designs must keep to."""
@@ -40,12 +40,12 @@ class Case(Table):
 
     @model_validator(mode="after")
     def _a_front(self) -> "Case":
-        """That there is something to trade, each thing once, and no more than a front can show."""
+        """That there is something to make small, each thing once, and no more than a front can show."""
         rows = self.goals
-        if len(rows) < 2:
+        if not rows:
             raise invalid(
-                "a case needs two objectives or more",
-                'Add one, such as "deviation" or { formula = "m2 + m3" }',
+                "a case needs an objective",
+                'Add one, such as "mean" or { formula = "m2 + m3" }',
                 "objectives",
             )
         if len(rows) > len(ENDS):

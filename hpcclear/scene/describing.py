@@ -18,8 +18,9 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
         clearance = scene.number(f"{scene.joint_key(name)}.clearance")
         size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
-        kind = "guide" if name in scene.guides() else "joint"
-        yield f"clearance {size} in {kind} {name}" + (f" ({NAMES[name]})" if name in NAMES else "")
+        where = f"joint {name}" if name in scene.pins() else f"guide {name}"
+        where = "the guide" if where == "guide guide" else where
+        yield f"clearance {size} in {where}" + (f" ({NAMES[name]})" if name in NAMES else "")
         joint: Any = scene.clearance_joint(name)
         if joint.out_of_round is not None:
             yield f"joint {name} out of round"

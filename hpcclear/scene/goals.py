@@ -39,6 +39,8 @@ class Goal(Table):
     statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
     """Of f: its mean, its standard deviation, the value that a share `level` of all machines stays below, or the share of them
     beyond `limit`. "cost": what the study variables say that the design costs."""
+    of: str | None = None
+    """Another response than the objective of the study that the statistic is of, by its name: "peak-contact-force", say."""
     formula: str | None = None
     """In place of a statistic: numbers, design variables (SI, as designed) and + - * / **, such as "m2 + m3"."""
     level: Level | None = None
@@ -63,12 +65,24 @@ class Goal(Table):
             raise invalid(
                 "the threshold is missing", "Add limit, the threshold of f", "limit", None
             )
+        if self.of is not None and (self.statistic is None or self.statistic == "cost"):
+            raise invalid("belongs to a statistic of a response", "Remove it", "of")
         for key, owner in (("level", "quantile"), ("limit", "exceedance")):
             if getattr(self, key) is not None and self.statistic != owner:
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
         return self
 
     _priced: tuple[Any, ...] = PrivateAttr(())
+    _place: int = PrivateAttr(0)
+
+    def placed(self, place: int) -> None:
+        """Take the place of its response among what is simulated of designs, from the study; 0 is f."""
+        self._place = place
+
+    @property
+    def place(self) -> int:
+        """Where its response stands among what is simulated of designs (`hpcclear.study.truth`)."""
+        return self._place
 
     def priced_by(self, variables: tuple[Any, ...]) -> None:
         """Take the study variables that say what a design costs."""
@@ -94,22 +108,31 @@ class Goal(Table):
         """Whether it is the same for every design, as far as its spelling shows."""
         if self.formula is not None and other.formula is not None:
             return "".join(self.formula.split()) == "".join(other.formula.split())
-        same = (self.statistic, self.limit) == (other.statistic, other.limit)
+        same = (self.statistic, self.limit, self.of) == (other.statistic, other.limit, other.of)
         return same and self.formula == other.formula and self.order == other.order
 
     def words(self, unit: str) -> str:
         """What it is, for people: "95th percentile of f", "share with f above 0.3 mm" by the `unit` of f."""
         if self.formula is not None:
             return self.formula
+        what, unit = self._response(unit)
         if self.statistic == "quantile":
-            return f"{100 * self.order:g}th percentile of f"
+            return f"{100 * self.order:g}th percentile of {what}"
         if self.statistic == "exceedance":
-            return f"share with f above {self.limit:g} {unit}"
-        return "cost" if self.statistic == "cost" else f"{self.statistic} of f"
+            return f"share with {what} above {self.limit:g} {unit}"
+        return "cost" if self.statistic == "cost" else f"{self.statistic} of {what}"
+
+    def _response(self, unit: str) -> tuple[str, str]:
+        """What it is of, "f" by the `unit` of f, and the unit."""
+        if self.of is None:
+            return "f", unit
+        found = OBJECTIVES.get(self.of)
+        return found.words.partition(",")[0], found.unit
 
     def unit(self, unit: str) -> str:
         """Its unit, "" for none known, by the `unit` of f."""
-        return unit if self.statistic in ("mean", "deviation", "quantile") else ""
+        own = self._response(unit)[1]
+        return own if self.statistic in ("mean", "deviation", "quantile") else ""
 
 
 class Constraint(Goal):
@@ -149,6 +172,11 @@ def _goal(row: Any, unit: str, key: str) -> Any:
     if not isinstance(row, Mapping):
         return row
     made = dict(row)
+    if isinstance(row.get("of"), str):
+        try:
+            unit = OBJECTIVES.get(row["of"]).unit
+        except InputError as error:
+            raise invalid(error.reason, error.remedy, f"{key}.of", row["of"]) from None
     own = unit if row.get("statistic") in ("mean", "deviation", "quantile") else ""
     for name, its in (("limit", unit), ("most", own)):
         if name in made:

@@ -1,10 +1,8 @@
 """Limits of size of holes and shafts by ISO 286, and the clearance of a fit.
 
 Source: ISO 286-1:2010 (standard tolerances, fundamental deviations) and ISO 286-2:2010 (limit deviations), sizes to 500 mm,
-grades 5
-to 11, deviations A to H, JS (holes) and a to h, js,
-k to p (shafts). The numbers were compared with the tables of limit deviations
-of bearing and tool catalogues, a textbook's tables of fundamental deviations, and the package pressfit 0.1.0.
+grades 5 to 11, deviations A to H, JS (holes) and a to h, js, k to p (shafts). The numbers were compared with tables of limit
+deviations of bearing and tool catalogues, a textbook's tables of fundamental deviations, and the package pressfit 0.1.0.
 """
 
 import re
@@ -16,30 +14,8 @@ from hpcclear.scene.fields import invalid
 SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 """Largest size of each range, mm."""
 PARTS = (
-    3,
-    6,
-    10,
-    18,
-    30,
-    40,
-    50,
-    65,
-    80,
-    100,
-    120,
-    140,
-    160,
-    180,
-    200,
-    225,
-    250,
-    280,
-    315,
-    355,
-    400,
-    450,
-    500,
-)
+    3, 6, 10, 18, 30, 40, 50, 65, 80, 100, 120, 140, 160, 180, 200, 225, 250, 280, 315, 355, 400, 450, 500,
+)  # fmt: skip
 """Largest size of each part of a range, mm: of the fundamental deviations a, b and c."""
 
 GRADES = {
@@ -55,86 +31,20 @@ GRADES = {
 
 BELOW = {
     "a": (
-        270,
-        270,
-        280,
-        290,
-        300,
-        310,
-        320,
-        340,
-        360,
-        380,
-        410,
-        460,
-        520,
-        580,
-        660,
-        740,
-        820,
-        920,
-        1050,
-        1200,
-        1350,
-        1500,
-        1650,
+        270, 270, 280, 290, 300, 310, 320, 340, 360, 380, 410, 460, 520, 580, 660, 740, 820, 920, 1050, 1200, 1350, 1500, 1650,
     ),
     "b": (
-        140,
-        140,
-        150,
-        150,
-        160,
-        170,
-        180,
-        190,
-        200,
-        220,
-        240,
-        260,
-        280,
-        310,
-        340,
-        380,
-        420,
-        480,
-        540,
-        600,
-        680,
-        760,
-        840,
+        140, 140, 150, 150, 160, 170, 180, 190, 200, 220, 240, 260, 280, 310, 340, 380, 420, 480, 540, 600, 680, 760, 840,
     ),
     "c": (
-        60,
-        70,
-        80,
-        95,
-        110,
-        120,
-        130,
-        140,
-        150,
-        170,
-        180,
-        200,
-        210,
-        230,
-        240,
-        260,
-        280,
-        300,
-        330,
-        360,
-        400,
-        440,
-        480,
+        60, 70, 80, 95, 110, 120, 130, 140, 150, 170, 180, 200, 210, 230, 240, 260, 280, 300, 330, 360, 400, 440, 480,
     ),
     "d": (20, 30, 40, 50, 65, 80, 100, 120, 145, 170, 190, 210, 230),
     "e": (14, 20, 25, 32, 40, 50, 60, 72, 85, 100, 110, 125, 135),
     "f": (6, 10, 13, 16, 20, 25, 30, 36, 43, 50, 56, 62, 68),
     "g": (2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 18, 20),
     "h": (0,) * len(SIZES),
-}
+}  # fmt: skip
 """How far the largest shaft is below the nominal size, in micrometres; holes are as far above it."""
 ABOVE = {
     "k": (0, 1, 1, 1, 2, 2, 2, 3, 3, 4, 4, 4, 5),

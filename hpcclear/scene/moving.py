@@ -75,10 +75,23 @@ class Moving:
                     name, entry = input_entry(path)
                     if name == row.name:
                         entries[entry] = value
-        found = row.changed(entries) if entries else row.law
+        found = self._changed(row, entries) if entries else row.law
         if row.relative and row.name in design:
             return quantiles.Scaled(found, abs(float(design[row.name])))
         return found
+
+    @cached_property
+    def _made(self) -> dict[tuple[Any, ...], quantiles.Quantiles]:
+        """Distributions that were made: those of fits are tables."""
+        return {}
+
+    def _changed(self, row: RandomInput, entries: Mapping[str, Any]) -> quantiles.Quantiles:
+        key = (row.name, *entries.items())
+        if key not in self._made:
+            if len(self._made) >= MOST_EXTREMES:
+                self._made.clear()
+            self._made[key] = row.changed(entries)
+        return self._made[key]
 
     def reach(self, row: RandomInput) -> Range:
         """Least and largest value that counts of a random input, over all designs; of the difference from the design at the

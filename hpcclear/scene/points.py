@@ -97,12 +97,18 @@ def check_points(
     for joint in scene.pins():
         key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
         pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
+    for joint in scene.guides():
+        key, reason = scene.joint_key(joint), "corners rounder than half of the slider"
+        pairs += [
+            (f"{key}.corner_radius", f"{key}.{size}", reason) for size in ("length", "height")
+        ]
     for small, large, reason in pairs:
         lower, upper = (
             entries(scene, points.paths, points.values, path) for path in (small, large)
         )
-        gap = np.broadcast_to(np.asarray(upper - lower), len(points))
-        _refuse(gap <= 0, gap, f"{large} - {small}", f"makes {reason}", label)
+        times, word = (2.0, "2 ") if small.endswith("corner_radius") else (1.0, "")
+        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
+        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
     _check_laws(scene, points, label)
 
 

@@ -126,7 +126,7 @@ class Scene(SceneTables):
         Raises
         ------
         InputError
-            The scene's own numbers are none of its rows.
+            The scene's own numbers are not among its rows.
         """
         study = self.required_study
         variable = study.variable(name)
@@ -147,7 +147,7 @@ class Scene(SceneTables):
                 return float(k)
         listed = ", ".join(f"{path} = {value}" for path, value in values.items())
         raise InputError(
-            f"study.variables.{name}", listed, "what the scene has is none of its rows",
+            f"study.variables.{name}", listed, "the value of the scene is not among its rows",
             "Write the values of one row into the scene: that is the baseline design",
         )  # fmt: skip
 

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
@@ -61,6 +61,9 @@ class Study(Moving, Table):
     surrogate: Surrogate = Surrogate()
     swarm: Swarm = Swarm()
     verification: Verification = Verification()
+    worst_case: Annotated[bool, Field(strict=True)] = False
+    """Whether the largest f within the bounds of the random inputs is searched for the best designs (at their corners and
+    inside); inputs without bounds are taken within three standard deviations."""
     certificate: CertificateOfEffects | None = None
     """Left out, the stage is."""
 
@@ -175,7 +178,8 @@ class Study(Moving, Table):
             raise invalid(
                 "the distribution is wider than its domain, "
                 f"{row.name} from {lower:g} to {upper:g}",
-                f"Narrow it, or widen study.variables.{row.name}.range",
+                f"Narrow it, or widen study.variables.{row.name}.range"
+                + (f", so that it contains {low:.4g} to {high:.4g}" if row.absolute else ""),
                 key=f"random.{row.name}",
             )
 
@@ -245,6 +249,14 @@ class Study(Moving, Table):
                             key=f"cases.{case.name}.{table}.{k}.formula",
                             value=goal.formula,
                         )
+                if goal.of is not None and goal.of != self.objective:
+                    why = self._not_recorded(goal.of)
+                    if why:
+                        raise invalid(
+                            why, f"Make it study.objective, and name {self.objective!r} in `of` in its place",
+                            key=f"cases.{case.name}.{table}.{k}.of", value=goal.of,
+                        )  # fmt: skip
+                    goal.placed(2 + self.further.index(goal.of))
                 if goal.statistic == "cost":
                     priced = tuple(one for one in self.variables if one.name in own and one.priced)
                     if not priced:
@@ -255,7 +267,35 @@ class Study(Moving, Table):
                         )
                     goal.priced_by(priced)
 
+    @property
+    def further(self) -> Names:
+        """Responses besides its objective that objectives and constraints of cases are of."""
+        asked = (goal.of for case in self.cases for goal in (*case.goals, *case.kept))
+        return tuple(dict.fromkeys(one for one in asked if one not in (None, self.objective)))  # type: ignore[arg-type]
+
+    @staticmethod
+    def _not_recorded(name: str) -> str:
+        """Why samples of a study do not record a response besides its objective; "" if they do."""
+        found = OBJECTIVES.get(name)
+        if found.rate is not None:
+            return "is made of a rate, and a simulation integrates that of its own objective only"
+        if "objective" in found.asks:
+            return "is made of the mean gap, which samples with another objective do not keep"
+        return ""
+
     def _check_names(self) -> None:
+        of_loads = [one.name for one in self.variables if one.over is not None]
+        if len(of_loads) > 1:
+            raise invalid(
+                f"{of_loads[0]} and {of_loads[1]} both are load cases",
+                "Use one catalogue, with a row for each combination",
+                key=f"variables.{of_loads[1]}.over",
+            )
+        for row in self.random:
+            if row.name in of_loads:
+                raise invalid(
+                    "is a load case", "Remove it, or name another entry", f"random.{row.name}"
+                )
         lists: list[tuple[str, Iterable[str]]] = [
             ("surrogate.optimisation", self.surrogate.optimisation or ()),
             *(("surrogate.models", model) for model in self.surrogate.models or ()),
@@ -270,6 +310,11 @@ class Study(Moving, Table):
                     )
             if len(set(names)) < len(names):
                 raise invalid("a variable is named twice", "Remove one", key=key)
+            loads = [n for n in names if n in of_loads]
+            if loads:
+                raise invalid(
+                    f"{loads[0]!r} is a load case, which no design chooses", "Leave it out", key=key
+                )
             odd = [n for n in names if not self.variable(n).paths and "optimisation" not in key]
             if odd:
                 raise invalid(
@@ -397,9 +442,18 @@ class Study(Moving, Table):
 
     @property
     def optimisation(self) -> Names:
-        """Inputs of the model the swarm searches."""
+        """Variables of the optimisation: inputs of the model the swarm searches, and those that only random inputs know."""
         chosen = self.surrogate.optimisation
-        return self.names if chosen is None else chosen
+        return (
+            tuple(one.name for one in self.variables if one.over is None)
+            if chosen is None
+            else chosen
+        )
+
+    @property
+    def load_cases(self) -> Variable | None:
+        """The variable whose values or rows are load cases of every design."""
+        return next((one for one in self.variables if one.over is not None), None)
 
     def design_variables(self, case: str) -> Names:
         """Z of a case: inputs of the optimisation that are not random wherever the design is."""

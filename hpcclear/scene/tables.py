@@ -162,9 +162,12 @@ class SceneTables(Table):
         if contact is not None and contact.has_length:
             for name in clearance:
                 if length_path(self.clearance_joint(name)) is None:
+                    entry, part = (
+                        ("width", "slider") if name in self.guides() else ("length", "bearing")
+                    )
                     raise invalid(
-                        f'the contact geometry "{contact.geometry}" needs the length of the bearing',
-                        'Add length = "20 mm" or so to the joint', f"{self.joint_key(name)}.length", None,
+                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
+                        f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
                     )  # fmt: skip
         if clearance and self.effects.contact is None:
             raise invalid(
@@ -272,13 +275,18 @@ class SceneTables(Table):
         return bound(OBJECTIVES.get(name, self.plugin_texts), name, places, joints, chosen)
 
     def responses_asked(self) -> bool:
-        """Whether each sample records more than gaps and peak forces: ``numerics.responses``, or the study's objective."""
-        asked = self.numerics.responses or self.objective.needs_responses
+        """Whether each sample records more than gaps and peak forces: requested, or required by the study."""
+        asked = self.numerics.responses or any(one.needs_responses for one in self._objectives())
         return asked or self.impacts_asked()
 
     def impacts_asked(self) -> bool:
-        """Whether each sample records measures of impact and noise: ``numerics.impacts``, or the study's objective."""
-        return self.numerics.impacts or self.objective.needs_impacts
+        """Whether each sample records measures of impact and noise: ``numerics.impacts``, or what the study requires of it."""
+        return self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
+
+    def _objectives(self) -> list[Objective]:
+        """The objective, and the further responses of the study."""
+        further = () if self.study is None else self.study.further
+        return [self.objective, *map(self.objective_named, further)]
 
     def worn_joints(self) -> tuple[str, ...]:
         """Labels of the joints that wear, in the order of `clearance_joints`."""

@@ -233,7 +233,7 @@ def _remedy(unit: str, target: str) -> str:
 
     if not target:
         return "Write a plain number"
-    if target == "rad/s" and "hz" in unit.casefold():  # off by 2 pi in every reader's mind
+    if target == "rad/s" and "hz" in unit.casefold():  # readings differ by 2 pi
         return "Hz is ambiguous for an angular speed: write rpm, rad/s or turn/s"
     with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", SPELLINGS.get(unit, unit))
     near = _respelled(unit, fits) or ([with_force] if fits(with_force) else [])

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -40,6 +40,9 @@ class Variable(NamedInput):
     "random.C12.half_width". Written as `path` or `paths`."""
     like: str | None = None
     """Entry whose unit it has, where it drives random inputs; found by the study."""
+    over: Literal["worst"] | tuple[Annotated[float, Quantity("", least=0)], ...] | None = None
+    """Of load cases: no design chooses it, but all are simulated at each of its values or rows, and f is the largest of them
+    ("worst"), or their mean by these weights, one for each."""
     cost: Cost | None = None
     """What a design costs by its value, for the statistic "cost" of a case."""
 
@@ -113,6 +116,8 @@ class Variable(NamedInput):
             if len(set(found)) < len(found):
                 raise invalid("a value stands there twice", "Remove one", "values")
             row["values"] = tuple(sorted(found))
+            if isinstance(weights := row.get("over"), list | tuple) and len(weights) == len(found):
+                row["over"] = [one for _, one in sorted(zip(found, weights, strict=True))]
             if isinstance(cost := row.get("cost"), list | tuple):
                 _same_length(cost, found)  # costs stay with their values
                 row["cost"] = [one for _, one in sorted(zip(found, cost, strict=True))]
@@ -175,6 +180,27 @@ class Variable(NamedInput):
         return self
 
     @model_validator(mode="after")
+    def _load_cases(self) -> "Variable":
+        if self.over is None:
+            return self
+        if self.options is None or self.step is not None:
+            raise invalid(
+                "load cases are values or rows of a catalogue",
+                "Write values = [...] or catalogue = [...] in place of the range", "over",
+            )  # fmt: skip
+        if self.silent or self.cost is not None:
+            raise invalid(
+                "load cases change the mechanism, and no design chooses them", "Remove it", "over"
+            )
+        weights = () if self.over == "worst" else self.over
+        if weights and (len(weights) != len(self.options) or not sum(weights) > 0.0):
+            raise invalid(
+                f"{len(self.options)} load cases need as many weights, some of them above 0",
+                'Give each a weight, or write over = "worst"', "over",
+            )  # fmt: skip
+        return self
+
+    @model_validator(mode="after")
     def _rows_alike(self) -> "Variable":
         if self.catalogue is not None:
             choices.checked_names([row.name for row in self.catalogue], "catalogue")
@@ -196,7 +222,7 @@ class Variable(NamedInput):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Rows of a catalogue or of fits; none of other variables."""
+        """Rows of a catalogue or of fits; empty for other variables."""
         if self.fits is not None:
             return choices.rows_of_fits(self.fits, self.follows)
         return self.catalogue or ()
@@ -220,7 +246,7 @@ class Variable(NamedInput):
 
     @cached_property
     def options(self) -> tuple[float, ...] | None:
-        """All that its column may be, in rising order; None of a variable that is continuous."""
+        """All that its column may be, in rising order; None for a continuous variable."""
         if self.rows:
             return tuple(map(float, range(len(self.rows))))
         if self.step is not None:

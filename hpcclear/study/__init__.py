@@ -87,7 +87,7 @@ def run_study(
         The scene has no study, the directory holds results of
         another run, or all simulations of a stage failed.
     Stopped
-        If asked to end early; everything finished is on disk.
+        If requested to end early; everything finished is on disk.
     """
     if tell is not None:
         warnings.warn("use notify instead of tell", DeprecationWarning, stacklevel=2)

@@ -1,4 +1,4 @@
-"""The certificate of effects as a stage of a study: which effects it could do without."""
+"""The effect screening as a stage of a study: which effects it could do without."""
 
 import json
 from collections.abc import Callable
@@ -16,11 +16,11 @@ from hpcclear.scene.points import Points
 from hpcclear.study.run import Result, StudyRun
 
 Extent = Callable[[Scene, int | None], tuple[int, float]]
-"""Samples of each variant at most, and of the whole scene that all come to, of a scene and a number that is asked for."""
+"""Samples of each variant at most, and of the whole scene that all come to, by scene and requested number."""
 
 
 def certify(run: StudyRun, extent: Extent) -> None:
-    """Simulate with effects on and off, each design of it kept by itself; write effects.nc and tell what can be left out.
+    """Simulate with effects on and off, each design of it kept by itself; write effects.nc and report what can be left out.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """How much of a verified design's scatter is chaos: the same samples once more, with a relative perturbation of 1e-9.
 
 Where motion is chaotic, or settles on an orbit that the smallest perturbation decides, a finite average of it is a random
-number whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `PERTURBATION` tell how much."""
+number whatever the inputs. Its variance adds to theirs: pairs of samples that differ by `PERTURBATION` show how much."""
 
 from collections.abc import Sequence
 

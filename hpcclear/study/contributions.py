@@ -9,6 +9,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
+from hpcclear.scene.choices import input_entry
 from hpcclear.scene.points import Points
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.sensitivity.contributions import contributions
@@ -45,12 +46,13 @@ def of_designs(
     -------
     dict of arrays
         ``contribution``, ``halved`` and their ``_error``, (n, inputs), as `hpcclear.statistics.sensitivity.contributions` has
-        them, NaN for inputs that are none of a design's case; ``unexplained`` and ``unexplained_error``, (n,).
+        them, NaN for inputs that do not belong to a design's case; ``unexplained`` and ``unexplained_error``, (n,).
     """
     names = inputs_of(run)
     result: Result = {name: np.full((len(choices), len(names)), np.nan) for name in _NAMES}
     result["unexplained"], result["unexplained_error"] = np.full((2, len(choices)), np.nan)
-    for row, (choice, (f, _)) in enumerate(zip(choices, made, strict=True)):
+    for row, (choice, one) in enumerate(zip(choices, made, strict=True)):
+        f = one[0]
         random = run.study.case(choice.case).random
         points = drawn(choice, f)
         own = [points.names.index(name) for name in random]
@@ -72,12 +74,30 @@ def _groups(run: StudyRun, random: Sequence[str]) -> list[int]:
     return [len(random) if name in joined else k for k, name in enumerate(random)]
 
 
+def _prices(run: StudyRun, choices: Sequence[Choice], names: Sequence[str]) -> Array:
+    """What half the scatter of random inputs costs more, (designs, inputs), where variables with a law of cost drive it; else
+    NaN."""
+    found = np.full((len(choices), len(names)), np.nan)
+    for variable in run.study.variables:
+        if variable.cost is None or variable.cost.law is None:
+            continue
+        driven = {input_entry(path)[0] for path in variable.input_paths}
+        columns = [k for k, name in enumerate(names) if name in driven]
+        for row, choice in enumerate(choices):
+            width = choice.design.get(variable.name, np.nan)
+            found[row, columns] = variable.costs(width / 2.0) - variable.costs(width)
+    return found
+
+
 def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
     """Write contributions.nc; `found` of `of_designs`, (n, ...) each."""
     names = inputs_of(run)
     coords = {"design": np.array([one.name for one in choices]), "input": np.array(names)}
     joined = () if run.study.correlation is None else run.study.correlation.inputs
     data = {name: found[name] for name in (*_NAMES, "unexplained", "unexplained_error")}
+    prices = _prices(run, choices, names)
+    if np.isfinite(prices).any():
+        data["halving_cost"] = prices
     data["together"] = np.array([name in joined for name in names], np.int8)
     run.write(
         dataset.dataset("contributions", coords, data, objective=run.scene.objective),

@@ -1,4 +1,4 @@
-"""The edge of what a rare failure allows: designs of the best first objective whose probability is just small enough.
+"""The edge of what constraints allow: designs of the best first objective that just keep them, for sure.
 
 A design of the search has some hundred simulations, from which a probability of 1e-3 is extrapolated
 (`hpcclear.statistics.random.tail`). A model of such indices over designs knows which way is safer, but not where the threshold
@@ -36,7 +36,10 @@ AIM, LESS = 0.8, 0.75
 a design that could not be decided."""
 
 NEAR = 0.65
-"""Of the allowed probability: a design that surely keeps it and has more is near enough."""
+"""Of the allowed probability: a design that significantly keeps it and has more is near enough."""
+
+SMALL = 0.02
+"""Of the same for other statistics than probabilities: 0.4 % below the threshold is sought, then 0.8 % and more."""
 
 PARTICLES, ITERATIONS = 48, 60
 STEPS, LOCAL = (0.1, 0.03, 0.01, 0.003), 256
@@ -46,8 +49,8 @@ Judge = Callable[[Array], tuple[Array, Array]]
 
 
 def cases_of(study: Study) -> list[Case]:
-    """Cases that keep a probability of failure small."""
-    return [case for case in study.cases if any(one.statistic == "exceedance" for one in case.kept)]
+    """Cases with a constraint that simulations decide."""
+    return [case for case in study.cases if any(not one.exact for one in case.kept)]
 
 
 def simulations(study: Study) -> int:
@@ -67,13 +70,13 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
     ----------
     run : StudyRun
     known : mapping of case to arrays
-        Sampling coordinates (n, d), what the case makes small (n, goals), what steers to its constraints (n,).
+        Sampling coordinates (n, d), what the case makes small (n, objectives), what steers to its constraints (n,).
 
     Returns
     -------
     dict of arrays
-        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is none of the case's), those that surely
-        break a constraint left out.
+        ``case`` (k,) and ``design`` (k, variables of the optimisation, NaN where one is not the case's), without
+        those that significantly break a constraint.
     """
     found: list[Choice] = []
     for case in cases_of(run.study):
@@ -166,13 +169,18 @@ def _best(judged: Judge, bounds: Array, start: Array, rng: np.random.Generator) 
 
 def _least(judged: Judge, points: Array) -> Array:
     values, broken = judged(points)
-    return np.asarray(points[np.lexsort((values[:, 1], values[:, 0], broken))[0]])
+    return np.asarray(points[np.lexsort((values[:, -1], values[:, 0], broken))[0]])
 
 
 def _gap(case: Case, share: float) -> float:
-    """How much larger the index of a share of the allowed probability is, at most over the constraints of a case."""
-    rates = [one.most for one in case.kept if one.statistic == "exceedance"]
-    return max(of_share(share * most) - of_share(most) for most in rates)
+    """How much larger the index of a share of the allowed probability is, at most over the constraints of a case; of other
+    statistics, whose errors are small, `SMALL` times the rest, relative to the threshold."""
+    return max(
+        of_share(share * one.most) - of_share(one.most)
+        if one.statistic == "exceedance" and one.most > 0.0
+        else SMALL * (1.0 - share)
+        for one in case.kept
+    )
 
 
 def _simulated(run: StudyRun, choice: Choice) -> Result:

@@ -28,8 +28,10 @@ def samples_of(scene: Scene) -> dict[str, int]:
 
 
 def _of_stages(scene: Scene) -> dict[str, int]:
-    """The same of all stages but the certificate, whose size goes by theirs."""
-    return {part: count for stage in STAGES for part, count in stage.samples(scene).items()}
+    """The same of all stages but the effect screening, whose size goes by theirs."""
+    loads = scene.required_study.load_cases
+    cases = 1 if loads is None else len(loads.options or ())
+    return {part: cases * count for stage in STAGES for part, count in stage.samples(scene).items()}
 
 
 def responses_of(scene: Scene) -> int:
@@ -44,7 +46,7 @@ def responses_of(scene: Scene) -> int:
 
 
 CERTIFICATE_SHARE = 0.05
-"""Of a study's samples that its certificate of effects may take."""
+"""Of a study's samples that its effect screening may take."""
 
 
 def certificate_extent(scene: Scene, samples: int | None = None) -> tuple[int, float]:
@@ -58,7 +60,7 @@ def certificate_extent(scene: Scene, samples: int | None = None) -> tuple[int, f
 
 
 def certificate_samples(scene: Scene) -> int:
-    """Samples of a variant, for a certificate of effects that takes a small share of the study it serves.
+    """Samples of a variant, for an effect screening that takes a small share of the study it serves.
 
     Counted are the whole scene, each effect by itself and one set of them; never fewer than a first look needs.
     """
@@ -71,5 +73,5 @@ def certificate_samples(scene: Scene) -> int:
 
 
 def _variants(scene: Scene) -> int:
-    """Variants that a certificate simulates as a rule."""
+    """Variants that an effect screening simulates as a rule."""
     return len(switches(scene)) + 2

@@ -14,10 +14,9 @@ from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail
-from hpcclear.statistics.random.replicates import Estimate, student
 
 SMOOTH = 0.1
-"""Deviations over which a share beyond a limit is smeared where the surrogate is searched, so that it falls before it is 0."""
+"""Standard deviations over which an exceedance is smoothed in the search on the surrogate, so that it has a slope near 0."""
 
 
 SHARE_OF_MOST = 0.02
@@ -26,7 +25,7 @@ SHARE_OF_MOST = 0.02
 
 @dataclass(frozen=True)
 class GoalValue:
-    """A goal of a design by direct simulation: value, limits, and what each replicate shifts (r,)."""
+    """An objective or constraint of a design by simulation: value, interval, and what each replicate shifts (r,)."""
 
     value: float
     lower: float
@@ -37,7 +36,9 @@ class GoalValue:
 def goal_value(
     goal: Goal, values: Array, design: Mapping[str, float], confidence: float
 ) -> GoalValue:
-    """A goal from values of f, (replicates, values), NaN where failed, and the design in SI."""
+    """An objective or constraint from values of f, (replicates, values), NaN where failed, and the design in SI; or from
+    those of all responses, (k, replicates, values)."""
+    values = values[goal.place] if values.ndim == 3 else values
     if goal.exact:
         value = float(goal.of_design(design))
         return GoalValue(value, value, value, np.zeros(len(values)))
@@ -48,17 +49,13 @@ def goal_value(
         found = replicates.exceedance(values, goal.limit, confidence)
     else:
         mean, deviation = replicates.moments(values)
-        return _symmetric(mean if goal.statistic == "mean" else deviation, confidence)
+        one = mean if goal.statistic == "mean" else deviation
+        return GoalValue(one.value, *replicates.limits(one, confidence), one.shifts)
     return GoalValue(found.value, found.lower, found.upper, found.shifts)
 
 
-def _symmetric(one: Estimate, confidence: float) -> GoalValue:
-    reach = one.error * student(confidence, one.freedom) if one.freedom > 0 else np.nan
-    return GoalValue(one.value, one.value - reach, one.value + reach, one.shifts)
-
-
 def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
-    """Half-width of its limits that is asked for, and whether it is relative; a formula is known."""
+    """Half-width of its confidence interval that is requested, and whether it is relative; a formula is known."""
     if goal.statistic == "mean":
         return accuracy.mean, True
     if goal.statistic == "deviation":
@@ -71,15 +68,16 @@ def wanted(goal: Goal, accuracy: MomentAccuracy) -> tuple[float, bool]:
     return 1e-6, True
 
 
-def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy) -> bool:
-    """Whether its limits are as narrow as asked for."""
+def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float = 1.0) -> bool:
+    """Whether its interval is as narrow as requested, or as a part of that."""
     share, relative = wanted(goal, accuracy)
+    share *= part
     half = (one.upper - one.lower) / 2.0
     return bool(half <= share * (abs(one.value) if relative else 1.0))
 
 
 def excess(kept: Sequence[Constraint], values: Array) -> Array:
-    """By how much constraints are broken, relative to their limits, the worst of them; (n, constraints) to (n,).
+    """By how much constraints are broken, relative to their thresholds, the worst of them; (n, constraints) to (n,).
 
     At most 0 where all are kept, NaN where one is not known, -inf without any.
     """
@@ -98,20 +96,21 @@ def shortfall(goal: Goal, most: float, values: Array) -> Array:
 def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, float]) -> float:
     """What steers a search to the constraints, from values of f of a design, NaN where failed: as `excess`, but of
     probabilities the shortfall of their index, which is smooth where counts of exceedances are 0 or jump."""
-    known = values[np.isfinite(values)]
-    if kept and len(known) < replicates.FEWEST:
+    values = values if values.ndim == 3 else values[None]
+    known = [own[np.isfinite(own)] for own in (values[one.place] for one in kept)]
+    if any(len(own) < replicates.FEWEST for own in known):
         return np.nan
     found = [
-        float(shortfall(one, one.most, known[None])[0])
+        float(shortfall(one, one.most, own[None])[0])
         if one.statistic == "exceedance"
         else float(excess([one], np.array([[goal_value(one, values, design, 0.95).value]]))[0])
-        for one in kept
+        for one, own in zip(kept, known, strict=True)
     ]
     return max(found, default=-np.inf)
 
 
 def guessed(goal: Goal, drawn: Array, designs: Mapping[str, Array]) -> Array:
-    """A goal of designs by the surrogate: f at draws of the random inputs (n, s), design variables (n,) each; to (n,)."""
+    """An objective or constraint by the surrogate, (n,): f at draws of the random inputs (n, s), design variables (n,) each."""
     if goal.exact:
         return np.broadcast_to(goal.of_design(designs), len(drawn))
     if goal.statistic == "mean":
@@ -140,7 +139,7 @@ def exact_in(scene: Scene, case: Case) -> list[Callable[[Array], Array] | None]:
 
 
 def names_of(case: Case, unit: str) -> tuple[str, ...]:
-    """The goals of a case in words, by the unit of f."""
+    """Objectives and constraints of a case in words, by the unit of f."""
     return tuple(goal.words(unit) for goal in case.goals)
 
 

@@ -1,7 +1,7 @@
 """Lives in a study whose clearances are random as wear leaves them.
 
-Those of the scene are followed first, and their clearances stand for the input; at the end those of the original and the
-best designs, for what each comes to over lives of its own.
+Those of the scene are followed first, and their clearances stand for the input; at the end those of the baseline design and the
+best designs, for what each comes to over service lives of its own.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ FOLDER = "lives"
 """Where those of designs are kept, in there."""
 
 AGES = 64
-"""Ages of a life that mean and deviation are taken over, evenly up to the largest that an input is taken at, or to its end."""
+"""Ages of a service life for mean and standard deviation, evenly spaced up to the largest of an input, or to its end."""
 
 LEAST = 8
 """Clearances that a distribution is made of, at least."""
@@ -54,12 +54,12 @@ def simulations(scene: Scene) -> int:
 
 
 def simulations_of_designs(scene: Scene) -> int:
-    """How many follow the designs; the original's lives are those of the scene."""
+    """How many follow the designs; the baseline design's lives are those of the scene."""
     return ends_in_all(scene.required_study) * simulations(scene)
 
 
 def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result:
-    """What the original and the ends of the front (alpha, beta) of each case come to over lives of their own.
+    """What the baseline design and the ends of the front (alpha, beta) of each case come to over service lives of their own.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
     Returns
     -------
     dict of arrays, shape (n,)
-        ``mean`` and ``deviation`` of f over lives and ages, and their ``_reach`` (half-width of the limits); NaN of other
+        ``mean`` and ``deviation`` of f over service lives and ages, and their ``_reach`` (95 % half-width); NaN of other
         designs.
     """
     (run.directory / FOLDER).mkdir(exist_ok=True)
@@ -86,7 +86,7 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
 
 
 def _over_life(run: StudyRun, scene: Scene, choice: Choice) -> tuple[float, ...]:
-    """Mean, its half-width, deviation and its half-width of a design; each life is a replicate."""
+    """Mean and standard deviation with their half-widths of a design; each life is a replicate."""
     entries: dict[str, float] = {}
     for name, value in choice.design.items():
         entries |= run.study.variable(name).entries(value)
@@ -119,7 +119,7 @@ def known(run: StudyRun) -> Scene:
     Raises
     ------
     InputError
-        Too few lives reach the age asked for, or their clearances leave the variable's range.
+        Too few lives reach the age requested, or their clearances leave the variable's range.
     Stopped, StorageError, RankFailed
     """
     run.announce("wear")

@@ -1,4 +1,4 @@
-"""Robust optimisation of each case: fronts of mean and deviation, or of what it makes small, and their ends (eqs. 19 to 23)."""
+"""Robust optimisation of each case: fronts of mean and standard deviation or others, and their ends (eqs. 19 to 23)."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +17,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
 from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import Box, box, to_physical
+from hpcclear.scene.goals import Goal
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
 from hpcclear.scene.study import Study
@@ -27,6 +28,7 @@ from hpcclear.statistics.search.asking import Search, Task, made, minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study import surrogates
 from hpcclear.study.goals import ends_in_all, excess, guessed, shortfall
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import coordinate, method_of
@@ -40,7 +42,7 @@ PROBES = 64
 
 TOGETHER = 256
 """Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a kernel that is no product of
-them, and for all that is not mean and deviation."""
+them, and for all that is not mean and standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,13 @@ class Problem:
     region : Box
         Their bounds in sampling coordinates.
     objective : RobustObjective
-        Mean and deviation of designs in SI.
+        Mean and standard deviation of designs in SI.
     scene : Scene
     case : Case
     draws : callable
         Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides.
+    further : tuple of RobustObjective
+        The same of `Study.further`, responses besides f that cases require.
     """
 
     names: tuple[str, ...]
@@ -67,6 +71,7 @@ class Problem:
     scene: Scene
     case: Case
     draws: Drawn
+    further: tuple[RobustObjective, ...] = ()
 
     def physical(self, coordinates: Array) -> Array:
         """The nearest designs that exist, in SI, shape (n, d)."""
@@ -77,24 +82,29 @@ class Problem:
         return snapped(self.scene.required_study, self.names, coordinates)
 
     def searched(self, designs: Array) -> Array | tuple[Array, Array]:
-        """What the case makes small of designs in SI, (n, goals); with constraints, how much it breaks them, (n,), besides."""
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
         if self.case.plain:
             return self.objective(designs)
-        drawn = self.objective.sampled(designs, self.draws(designs))
+        draws = self.draws(designs)
+        each = [one.sampled(designs, draws) for one in (self.objective, *self.further)]
         named = dict(zip(self.names, designs.T, strict=True))
-        found = np.column_stack([guessed(goal, drawn, named) for goal in self.case.goals])
+
+        def of(goal: Goal) -> Array:
+            return each[max(goal.place - 1, 0)]
+
+        found = np.column_stack([guessed(goal, of(goal), named) for goal in self.case.goals])
         if not self.case.kept:
             return found
         broken = [
-            shortfall(one, one.most, drawn)
+            shortfall(one, one.most, of(one))
             if one.statistic == "exceedance"
-            else excess([one], guessed(one, drawn, named)[:, None])
+            else excess([one], guessed(one, of(one), named)[:, None])
             for one in self.case.kept
         ]
         return found, np.maximum(np.max(broken, axis=0), 0.0)
 
     def moments(self, designs: Array) -> Array:
-        """Mean and deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
+        """Mean and standard deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
         found = np.full((len(designs), 2), np.nan)
         for row, design in enumerate(designs):
             try:
@@ -104,8 +114,10 @@ class Problem:
         return found
 
 
-def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
-    """The problem of one case on a surrogate of its objective.
+def problem_of(
+    scene: Scene, case: str, model: Piecewise, others: Sequence[Piecewise] = ()
+) -> Problem:
+    """The problem of one case on a surrogate of its objective, and on those of further responses.
 
     A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
     the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
@@ -172,7 +184,18 @@ def problem_of(scene: Scene, case: str, model: Piecewise) -> Problem:
         objective = averaged((study.swarm.monte_carlo_samples, rng))
     rng = generator(study.seed, "goals", case)
     points = _drawn(scene, case, names, sobol(len(random), rng, 0, TOGETHER).T)
-    return Problem(names, region, objective, scene, study.case(case), points)
+    further = tuple(
+        RobustObjective(
+            other,
+            names,
+            inputs,
+            derived=derived,
+            probes=to_physical(scene, names, probes),
+            draws=points,
+        )
+        for other in others
+    )
+    return Problem(names, region, objective, scene, study.case(case), points, further)
 
 
 def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:
@@ -227,13 +250,14 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
     Returns
     -------
     dict of arrays
-        For case number k ``front_k`` (runs, solutions, d + goals): design coordinates, and what the case makes
+        For case number k ``front_k`` (runs, solutions, d + objectives): design coordinates, and what the case makes
         small, NaN-padded; ``hypervolume_k`` and ``gain_k`` (runs,).
     """
     result: Result = {}
+    others = surrogates.of_further(run, model)
     for index, case in enumerate(run.study.cases):
         fronts, gains = [], []
-        problem = problem_of(run.scene, case.name, model)
+        problem = problem_of(run.scene, case.name, model, others)
         for number in range(run.study.swarm.runs):
             front = _search(run, problem, run.rng("swarm", case.name, str(number)))
             fronts.append(np.column_stack([problem.snapped(front.points), front.values]))
@@ -254,7 +278,7 @@ def optimise(run: StudyRun, model: Piecewise) -> Result:
 
 
 def check(scene: Scene) -> None:
-    """That the surrogate and the search a study asks for can be had, before anything is simulated.
+    """That the surrogate and the search a study requires can be had, before anything is simulated.
 
     Raises
     ------
@@ -297,7 +321,7 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
         return problem.searched(problem.physical(coordinates))
 
     def nearest(coordinates: Array) -> Array:
-        """Where no design keeps the constraints: how much it breaks them, and the first goal."""
+        """Where no design keeps the constraints: how much it breaks them, and the first objective."""
         values, broken = function(coordinates)
         return np.column_stack([broken, values[:, 0]])
 
@@ -332,7 +356,7 @@ class Choice:
     place : (int, int) or None
         Run of the swarm and solution, for one that stands on a front.
     origin : str
-        "search", or "given": the original, and what a publication prints.
+        "search", or "given": the baseline design, and what a publication prints.
     """
 
     name: str
@@ -348,7 +372,7 @@ def chosen_in_all(study: Study) -> tuple[int, int]:
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:
-    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of least deviation.
+    """Designs with the least of each that a case makes small, by the surrogate: of least mean and of lowest standard deviation.
 
     Averaged over the runs, as the paper makes its alpha and beta, in sampling coordinates, so that the
     average keeps the bounds; and the best single ones.

@@ -2,7 +2,8 @@
 
 Of a probability of 1e-4 a hundred thousand samples show ten. Where a constraint allows less than `RARE`, designs that plain
 samples do not decide are sampled where they fail (`hpcclear.statistics.random.importance`), for all of them at once; longer and
-longer while a verdict is open and `most_samples` allows. Where plain and weighted samples contradict each other, both count.
+longer while a verdict is open and `most_samples` allows. A few of their draws are taken again at a stricter tolerance, and what
+that changes is part of the interval. Where plain and weighted samples contradict each other, both count.
 """
 
 from collections.abc import Generator, Sequence
@@ -18,7 +19,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
-from hpcclear.study import goals, verdicts
+from hpcclear.study import goals, tolerance, verdicts
 from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
@@ -51,7 +52,7 @@ class Found(NamedTuple):
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
-    """What is known of verified designs (`hpcclear.study.truth.simulate`), rare failures that are open in it decided as far as
+    """What is known of verified designs (`hpcclear.study.tolerance.verified`), rare failures that are open decided as far as
     they can be; besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     where = [
@@ -78,7 +79,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
-    """Limits by weighted samples in place of those by plain ones; both together where they do not meet."""
+    """Intervals by weighted samples in place of those by plain ones; both together where they do not meet."""
     lower, upper = (true[name][row, column] for name in names)
     apart = one.lower > upper or one.upper < lower
     ends = (min(one.lower, lower), max(one.upper, upper)) if apart else (one.lower, one.upper)
@@ -110,6 +111,7 @@ def probabilities(
             k for k in open_
             if rates[k].begun_anew() or not _enough(run, asked[k], rates[k], many[k])
         ]  # fmt: skip
+    _pair(run, asked, rates)
     return [
         Found(
             one.interval(run.study.verification.confidence),
@@ -119,6 +121,14 @@ def probabilities(
         )
         for one, number in zip(rates, many, strict=True)
     ]
+
+
+def _pair(run: StudyRun, asked: Sequence[Failing], rates: Sequence[Rare]) -> None:
+    """Take a few draws of each probability that is known again at a stricter tolerance."""
+    scene, left = tolerance.stricter(run.scene)
+    tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known]
+    _together(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
+    run.simulations.next = tight.simulations.next
 
 
 def _limit(one: Failing) -> float:
@@ -156,22 +166,23 @@ def _together(
     going: Sequence[Generator[Array, Array, None]],
     stage: str,
 ) -> None:
-    """Answer procedures of several designs by f, all they ask for at a time in one batch."""
+    """Answer procedures of several designs by f, all that they request at a time in one batch."""
     wanted = {k: next(one) for k, one in enumerate(going)}
     while wanted:
-        parts = _simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
+        parts = simulated(run, [(asked[k].choice, u) for k, u in wanted.items()], stage)
         fresh = {}
         for k, part in zip(wanted, parts, strict=True):
             try:
-                fresh[k] = going[k].send(part)
+                fresh[k] = going[k].send(part[max(asked[k].goal.place - 1, 0)])
             except StopIteration:
                 continue
         wanted = fresh
 
 
-def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
-    """f of designs at standard normals, (n,) each; NaN where it failed, or where inputs so far out make no mechanism."""
-    rows = [_rows(run, choice, u) for choice, u in where]
+def simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str) -> list[Array]:
+    """Responses of designs at standard normals, (k, n) each: f, and `Study.further`; NaN where it failed, or where inputs so
+    far out make no mechanism."""
+    rows = [rows_of(run, choice, u) for choice, u in where]
     makes = [_valid(run, names, values) for names, values in rows]
     batches = [
         run.simulations.filled(names, values[good])
@@ -179,14 +190,14 @@ def _simulated(run: StudyRun, where: Sequence[tuple[Choice, Array]], stage: str)
     ]
     values = np.concatenate([one.values for one in batches])
     points = Points(batches[0].names, values, batches[0].paths)
-    f = np.empty(0)
+    f = np.empty((1 + len(run.study.further), 0))
     if len(values):
-        f = run.simulations.objective(run.simulations.records(points, stage))
-    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1])
+        f = run.simulations.judged(points, stage)[1]
+    parts = np.split(f, np.cumsum([len(one) for one in batches])[:-1], axis=1)
     found = []
     for good, part in zip(makes, parts, strict=True):
-        whole = np.full(len(good), np.nan)
-        whole[good] = part
+        whole = np.full((len(f), len(good)), np.nan)
+        whole[:, good] = part
         found.append(whole)
     return found
 
@@ -204,7 +215,7 @@ def _valid(run: StudyRun, names: tuple[str, ...], values: Array) -> Booleans:
     return np.ones(len(values), bool)
 
 
-def _rows(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
+def rows_of(run: StudyRun, choice: Choice, u: Array) -> tuple[tuple[str, ...], Array]:
     """Names and values, (n, d), of a design at standard normals u, (n, random inputs)."""
     random = run.study.case(choice.case).random
     design = dict(choice.design)

@@ -1,6 +1,6 @@
 """The front by direct simulation: the swarm's designs and others are simulated, and where it is decided, more.
 
-A surrogate of f that is good to a percent is no judge of deviations that differ by less: the swarm
+A surrogate of f that is good to a percent is no judge of standard deviations that differ by less: the swarm
 finds what its errors flatter. So its designs are only where the search begins. Every design here
 is simulated; models of the moments themselves say where to look next, until some rounds
 win nothing or all are spent.
@@ -16,6 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import ENDS
 from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.sampling import unit_lhs
@@ -56,11 +57,11 @@ class Tried:
         Design variables.
     coordinates : array, shape (n, d)
         Sampling coordinates.
-    values : array, shape (n, goals)
-        What its case makes small: mean and deviation, if nothing else is asked for.
+    values : array, shape (n, objectives)
+        What its case makes small: mean and standard deviation, if nothing else is requested.
     excess : array, shape (n,)
         By how much its constraints are broken (`hpcclear.study.goals.steered`).
-    errors : array, shape (n, goals)
+    errors : array, shape (n, objectives)
         Standard errors of the values.
     """
 
@@ -95,7 +96,7 @@ def length(study: Study) -> int:
 
 
 def by_statistics(study: Study, r2: float) -> bool:
-    """Whether statistics over designs are modelled in place of f: as the study asks, or where a surrogate of f has less than
+    """Whether statistics over designs are modelled in place of f: if the study says so, or if a surrogate of f has less than
     `ROUGH` on fresh points."""
     asked = study.surrogate.of
     return not r2 >= ROUGH if asked is None else asked == "statistics"
@@ -140,7 +141,7 @@ def search(
         for name, its in met.items()
         if not _stands(run, name, its, patience) and (won := _won(run, name, its[-2:]))
     ]
-    named = [choice for choice in start if choice.name]
+    named = [] if statistics else [choice for choice in start if choice.name]
     finalists = [
         one
         for name, its in met.items()
@@ -154,13 +155,15 @@ def search(
 
 
 def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
-    """Designs of a case in each round. A search by statistics has as many in all as the other one, first designs included."""
+    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included:
+    those of the swarm between its ends are left out."""
     settings = run.study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
     each = length(run.study) * REPLICATES
     cases = len(run.study.cases)
-    left = sum(simulations(run.study)) // each // cases - len(begun["case"]) // cases
+    most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
+    left = (most - len(begun["case"])) // cases
     count = max(settings.infill_designs // PARTS, 1)
     return [count] * (left // count)
 
@@ -171,14 +174,15 @@ def _stands(run: StudyRun, name: str, met: Sequence[Tried], patience: int = PATI
 
 
 def _begin(run: StudyRun, start: Sequence[Choice]) -> Result:
-    """The swarm's designs, and rays along each variable through its design of least deviation."""
+    """The swarm's designs, and rays along each variable through its design of lowest standard deviation."""
     chosen = []
     for case in run.study.cases:
         own = [choice for choice in start if choice.case == case.name]
         chosen += _distinct(own)
         names = run.study.design_variables(case.name)
         region, rng = box(run.scene, names), run.rng("search", case.name)
-        middle = next(choice for choice in own if choice.name == f"{case.name} best beta")
+        end = ENDS[min(len(case.goals), 2) - 1]
+        middle = next(choice for choice in own if choice.name == f"{case.name} best {end}")
         centre = to_coordinates(run.scene, names, np.array([list(middle.design.values())]))[0]
         for k in range(len(names)):
             ray = np.tile(np.clip(centre, region.lower, region.upper), (RAYS, 1))
@@ -229,7 +233,7 @@ def _go_on(
 
 
 def _problem(run: StudyRun, name: str, one: Tried) -> tuple[Known, Space]:
-    """What is known of a case, and where to look: at least each objective, and mean + 2 standard deviations, the usual merit."""
+    """What is known of a case, and where to look: each objective, and mean + 2 standard deviations, the usual merit."""
     case = run.study.case(name)
     directions = np.eye(len(case.goals))
     if case.plain:
@@ -253,7 +257,7 @@ def _choices(run: StudyRun, case: str, coordinates: Array) -> list[Choice]:
 
 
 def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
-    """Cases, designs (NaN where a variable is none of the case's), what they make small, by how much they break constraints."""
+    """Cases, designs (NaN where a variable is not the case's), what they make small, by how much they break constraints."""
     names = run.study.optimisation
     most = most_of(run.study.cases)
     if not choices:
@@ -296,7 +300,7 @@ def _tried(run: StudyRun, case: str, found: Result, before: Tried | None) -> Tri
 def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
     """What was won from the first to the last of what was known, in words; empty if nothing that counts.
 
-    That is the accuracy asked for: many small steps are one large one. Designs that only stand between those of the earlier
+    That is the accuracy requested: many small steps are one large one. Designs that only stand between those of the earlier
     front count for nothing.
     """
     before, now = met[0], met[-1]
@@ -321,7 +325,7 @@ def _won(run: StudyRun, name: str, met: Sequence[Tried]) -> str:
 
 
 def _gains(old: Array, new: Array, relative: Sequence[bool]) -> Array:
-    """What each new design wins over each old one, (old, new, goals): relative, or as it is."""
+    """What each new design wins over each old one, (old, new, objectives): relative, or as it is."""
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.sign(old[:, None]) * (1.0 - new / old[:, None])
     return np.asarray(np.where(relative, shares, old[:, None] - new))
@@ -341,6 +345,7 @@ def _finalists(
     where = tried.coordinates[best[cut(tried.values[best], most)]]
     with contextlib.suppress(InputError):  # too few designs that did not fail for a model
         if statistics:
+            most = run.study.verification.designs
             where = improvement.finalists(*_problem(run, case, tried), most, rng)
         else:
             believed = believed_ends(

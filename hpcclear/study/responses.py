@@ -1,4 +1,4 @@
-"""Responses of the original and the optimised designs, side by side (the paper's Fig. 10)."""
+"""Responses of the baseline and the optimised designs beside each other (the paper's Fig. 10)."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -28,7 +28,7 @@ STATISTICS = ("mean", "fluctuation", "peak")
 
 
 def compared(run: StudyRun, designs: Sequence[Choice]) -> list[tuple[str, Choice]]:
-    """Names and designs whose responses are compared: the original, alpha, beta (and further ends) of each case."""
+    """Names and designs whose responses are compared: the baseline design, alpha, beta (and further ends) of each case."""
     known = {choice.name: choice for choice in designs}
     cases = run.study.cases
     original = known[f"{cases[0].name} original"]
@@ -62,9 +62,9 @@ def _changes(run: StudyRun, choice: Choice, revolutions: int) -> dict[str, objec
 
 
 def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Statistics of each design's steady response and of copies perturbed at their start, stretch by stretch.
+    """Statistics of each design's steady response and of copies perturbed at their start, segment by segment.
 
-    Where motion is chaotic one response says little of a design: copies see other stretches of the
+    Where motion is chaotic one response says little of a design: copies see other segments of the
     same motion.
 
     Returns
@@ -118,7 +118,7 @@ def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
 
 
 def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:
-    """Statistics of each stretch of a steady response, (windows, statistics, quantities); NaN if it failed."""
+    """Statistics of each segment of a steady response, (windows, statistics, quantities); NaN if it failed."""
     shape = (windows, len(STATISTICS), _quantities(scene))
     if response["status"] != Status.OK:
         return np.full(shape, np.nan)

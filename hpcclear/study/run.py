@@ -108,10 +108,11 @@ class StudyRun:
         """Write a result file, with what made it; `attributes` where that differs from the study's."""
         content.attrs.update(self.checkpoint.attributes | dict(attributes or {}))
         for variable in self.study.variables:
-            if variable.rows and variable.name in content:
-                content[variable.name].attrs["options"] = "; ".join(
-                    row.name for row in variable.rows
-                )
+            own = content.get(variable.name)
+            if own is not None and variable.rows:
+                own.attrs["options"] = "; ".join(row.name for row in variable.rows)
+            if own is not None and variable.silent:
+                own.attrs["of_random_inputs"] = ", ".join(variable.input_paths)
         with self.ranks.stage("results"), self.ranks.writing():
             dataset.write(content, self.directory / name)
 

@@ -15,6 +15,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
+from hpcclear.study import loads as loading
 
 
 class Simulations:
@@ -97,13 +98,43 @@ class Simulations:
         return points
 
     def records(self, points: Points, stage: str) -> np.ndarray:
-        """Outcome records of designs in all study variables, in their order.
+        """Outcome records of designs in all study variables, in their order; of load cases that which counts.
 
         Raises
         ------
         InputError
             If every single simulation failed.
         """
+        return self.judged(points, stage)[0]
+
+    def judged(self, points: Points, stage: str) -> tuple[np.ndarray, Array]:
+        """The same, and the responses of the study: its objective and `Study.further`, (k, n), NaN where it failed."""
+        loads = self.scene.required_study.load_cases
+        if loads is None:
+            records = self._records(points, stage)
+            return records, self._responses(records)
+        records = self._records(loading.at_all(loads, points), stage)
+        return loading.combined(records, self._responses(records), loads)
+
+    def _responses(self, records: np.ndarray) -> Array:
+        further = [self.scene.objective_named(name) for name in self.scene.required_study.further]
+        fine = records["status"] == Status.OK
+        found = [np.where(fine, one.of(records), np.nan) for one in further]
+        return np.stack([self.objective(records), *found])
+
+    def met(self) -> tuple[Array, Array]:
+        """All designs so far, (n, d) in the study's variables, SI, and their responses, (k, n)."""
+        self._checkpoint.flush()
+        records, values = self._checkpoint.contents()
+        before = records["sample"] < self.next
+        records, values = records[before], values[before]
+        loads, found = self.scene.required_study.load_cases, self._responses(records)
+        if loads is not None:
+            found = loading.combined(records, found, loads)[1]
+            values = values[:: len(loads.options or ())]
+        return values, found
+
+    def _records(self, points: Points, stage: str) -> np.ndarray:
         style = self.style if len(points) >= 1000 else "quiet"
         progress = Progress(stage, style=style)
         records = sample_points(

@@ -30,6 +30,7 @@ from hpcclear.study import (
     truth,
     verdicts,
     verification,
+    worst,
 )
 from hpcclear.study.certificate import Extent
 from hpcclear.study.goals import ends_in_all
@@ -48,8 +49,8 @@ class Stage:
     run: Callable[..., Any]
     """Does it, from the run and the results of `needs`; what it returns is its result."""
     needs: tuple[str, ...] = ()
-    """Stages, all of them earlier, whose results it takes: None of one that does not apply. Beside them
-    there are "scene", as it was written, and "extent", which counts what the certificate of effects may take."""
+    """Stages, all of them earlier, whose results it takes: None for one that does not apply. Beside them
+    there are "scene", as it was written, and "extent", which counts what the effect screening may take."""
     applies: Callable[[Scene], bool] = lambda scene: True
     """Whether a study of this scene has it."""
     words: Mapping[str, str] = field(default_factory=dict)
@@ -106,7 +107,7 @@ def _search(run: StudyRun, models: Models) -> Found:
     fronts.write(run, found, [*ends, *between], models.searched)
     statistics = refinement.by_statistics(run.study, surrogates.checked_r2(run.study, models.kept))
     better, remarks = refinement.search(run, [*ends, *between], statistics)
-    designs = [*ends, *(better or between)]
+    designs = better if better and statistics else [*ends, *(better or between)]
     return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
 
 
@@ -115,10 +116,10 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}
     remarks = list(found.remarks)
+    text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
     if run.study.paired:
-        text, more = tolerance.reached(run, true, [choice.name for choice in table.choices])
         run.notify(text)
-        remarks += more
+    remarks += more
     remarks += verification.missed(run, table.choices, true, models.searched)
     for text in remarks:
         run.notify(text)
@@ -126,12 +127,8 @@ def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
 
 
 def _moments(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """Moments of designs to the accuracy that is asked, or to the usual one of the samples alone."""
-    if run.study.paired:
-        true = tolerance.verified(run, designs)
-    else:
-        true = truth.simulate(run, designs, "verification")
-    return rare.decided(run, designs, true, "verification")
+    """Moments of designs, with what the tolerance does to them and with rare failures."""
+    return rare.decided(run, designs, tolerance.verified(run, designs), "verification")
 
 
 def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result | None) -> None:
@@ -140,6 +137,11 @@ def _front(run: StudyRun, models: Models, verified: Verified, over_life: Result 
     verification.write(
         run, table, true, models.searched, verified.remarks, printed, over_life or {}
     )
+
+
+def _worst(run: StudyRun, verified: Verified) -> None:
+    choices = verified.table.choices
+    worst.write(run, choices, run.stage("worst", worst.of_designs, choices))
 
 
 def _chaos(run: StudyRun, verified: Verified) -> None:
@@ -234,7 +236,7 @@ STAGES = (
             "optimisation": "search on the surrogate",
             "check": "simulation of its designs",
             "infill": "adaptive refinement of the Pareto front",
-            "edge": "search along constraints on rare failures",
+            "edge": "search along constraints",
         },
         files=("front.nc",), samples=_of_search,
     ),
@@ -252,6 +254,11 @@ STAGES = (
     Stage(
         "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
         needs=("verification",), files=("contributions.nc",),
+    ),
+    Stage(
+        "worst", _worst, needs=("verification",), applies=lambda scene: scene.required_study.worst_case,
+        words={"worst": "worst case of the best designs"}, files=("worst.nc",),
+        samples=lambda scene: {"worst": worst.simulations(scene) if scene.required_study.worst_case else 0},
     ),
     Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
     Stage(
@@ -289,7 +296,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
     run : StudyRun
         Of the scene as written.
     extent : function
-        How much the certificate of effects simulates (`hpcclear.study.extent.certificate_extent`).
+        How much the effect screening simulates (`hpcclear.study.extent.certificate_extent`).
     """
     results: dict[str, Any] = {"scene": run.scene, "extent": extent}
     for stage in stages_of(run.scene):
@@ -298,7 +305,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
 
 
 class Announcer:
-    """Tells each stage of a study of this scene as it begins, on standard error."""
+    """Reports each stage of a study of this scene as it begins, on standard error."""
 
     def __init__(self, scene: Scene) -> None:
         self._counted = [stage.words for stage in stages_of(scene) if stage.words]

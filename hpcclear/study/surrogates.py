@@ -9,7 +9,7 @@ from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.choices import snapped
-from hpcclear.scene.domain import Box, box
+from hpcclear.scene.domain import Box, box, to_coordinates
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
@@ -109,6 +109,44 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
     method = method_of(scene)
     while arrays := beginning(result, f"model{len(found)}_"):
         found.append(Piecewise.from_arrays(arrays, method))
+    return found
+
+
+def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
+    """Surrogates of responses besides f that cases require (`Study.further`), of the designs simulated so far in the inputs of
+    the model that is searched, as it is of f.
+
+    Raises
+    ------
+    InputError
+        Nearly all of these simulations failed.
+    """
+    study, names = run.study, run.study.models[-1]
+    if not study.further:
+        return []
+    values, responses = run.simulations.met()
+    columns = [study.names.index(name) for name in names]
+    loads = study.load_cases
+    rest = [
+        k
+        for k, name in enumerate(study.names)
+        if k not in columns and (loads is None or name != loads.name)
+    ]
+    here = values[:, rest] == np.array([run.scene.baseline(study.names[k]) for k in rest])
+    points = to_coordinates(run.scene, names, values[:, columns])
+    inside = (points >= model.lower) & (points <= model.upper)
+    rows = here.all(axis=1) & inside.all(axis=1)
+    unknown, accepted = np.full(1, np.nan), np.zeros(1, bool)
+    found = []
+    for name, one in zip(study.further, responses[1:], strict=True):
+        leaf = method_of(run.scene).fit(
+            points[rows],
+            one[rows],
+            np.column_stack([model.lower, model.upper]),
+            rng=run.rng("kriging", name),
+            names=[coordinate(study.variable(n)) for n in names],
+        )
+        found.append(Piecewise((leaf,), unknown, unknown, accepted))
     return found
 
 

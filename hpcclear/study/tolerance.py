@@ -1,8 +1,9 @@
-"""What the tolerance of the integration takes of an accuracy that is asked of a study (`study.accuracy`).
+"""Effect of the integration tolerance on verified designs: part of all their intervals, and of a requested accuracy.
 
 The tolerance moves every sample, and no number of samples shows it. So the best designs of each case, its ends, are simulated
 again at a stricter tolerance, at the same points. Both of a pair meet the same scatter, so their moments differ by what the
-tolerance does. That is part of all limits of the case, and the samples have to meet what it leaves of the accuracy.
+tolerance does. That is added to all confidence intervals of the case. With `study.accuracy`, the samples have to meet what it
+leaves; elsewhere pairs take no more than `COST` of the study.
 
 Sources: M. B. Giles, "Multilevel Monte Carlo methods", Acta Numerica 24 (2015), doi:10.1017/S096249291500001X (bias and
 variance of paired samples).
@@ -38,8 +39,14 @@ HIDDEN = 0.25
 ROOM = 0.75
 """Share of an accuracy from which on the tolerance dominates: the samples then have to meet the accuracy by themselves."""
 
+COST = 0.02
+"""Of a study's simulations that pairs may take where no accuracy is requested, beyond the first of them."""
+
+DRAWS = 16
+"""Of independent draws pairs are made of one in so many, and of so many at least."""
+
 NOTHING = 1e-9
-"""Share of the mean below which a deviation is round-off."""
+"""Share of the mean below which a standard deviation is round-off."""
 
 Taken = tuple[Array, Array]
 """Of a design, (k,) each: what the tolerance takes of each estimate of `truth.estimates_of`, without what chance made; and
@@ -48,9 +55,14 @@ the standard error."""
 
 def simulations(study: Study) -> int:
     """Simulations in pairs, at the fewest."""
-    if not study.paired:
-        return 0
+    draws = study.verification.draws
+    if draws is not None:
+        return goals.ends_in_all(study) * _of_draws(draws)
     return goals.ends_in_all(study) * REPLICATES * _first(truth.first_length(study.verification))
+
+
+def _of_draws(draws: int) -> int:
+    return min(max(draws // DRAWS, DRAWS), draws)
 
 
 def stricter(scene: Scene) -> tuple[Scene, float]:
@@ -66,26 +78,20 @@ def stricter(scene: Scene) -> tuple[Scene, float]:
 
 
 def verified(run: StudyRun, designs: Sequence[Choice]) -> Result:
-    """What `truth.simulate` returns, with what the tolerance takes in all limits.
+    """What `truth.results_of` returns, with what the tolerance takes in all confidence intervals.
 
     Returns
     -------
     dict of arrays over the designs
-        Besides ``tolerance`` and ``tolerance_error``, (n, 2): what the tolerance takes of mean and deviation of the designs of
-        its case, at worst, relative; and to what standard error that is known.
+        Besides ``tolerance`` and ``tolerance_error``, (n, 2): largest relative error of mean and standard deviation by the
+        tolerance, of the designs of its case; and its standard error.
     """
-    settings, everything = run.study.verification, range(len(designs))
-    made = [np.empty((2, REPLICATES, 0))] * len(designs)
-    length = truth.first_length(settings)
-    truth.lengthen(run, designs, made, everything, "verification", "verification", length)
+    made = truth.begun(run, designs) if run.study.paired else truth.made(run, designs)
     taken: dict[int, Taken] = {}
     while fresh := sorted(set(_ends(run, designs, made)) - set(taken)):
         taken |= _taken(run, designs, made, fresh)
-        made = truth.doubled(
-            run, designs, "verification", "verification", length, settings.most_samples, made,
-            _left(run.study.wanted, list(taken.values())),
-        )  # fmt: skip
-        made = truth.contested(run, designs, made, "verification", "verification")
+        if run.study.paired:
+            made = truth.made(run, designs, made, _left(run.study.wanted, list(taken.values())))
     true = _widened(run, designs, truth.results_of(run, designs, made), taken)
     return true | truth.explained(run, designs, made)
 
@@ -98,11 +104,11 @@ def _ends(run: StudyRun, designs: Sequence[Choice], made: Sequence[Array]) -> li
 
 
 def _left(wanted: MomentAccuracy, taken: Sequence[Taken]) -> MomentAccuracy:
-    """What the tolerance leaves the samples of an accuracy: squares of both add up to its own."""
+    """What the tolerance leaves the samples of an accuracy."""
     share = np.max([one[0][:2] for one in taken], axis=0)
     asked = np.array([wanted.mean, wanted.deviation])
     share = np.where(share < ROOM * asked, share, 0.0)
-    mean, deviation = np.sqrt(asked**2 - share**2).tolist()
+    mean, deviation = (asked - share).tolist()
     return wanted.model_copy(update={"mean": mean, "deviation": deviation})
 
 
@@ -115,29 +121,62 @@ def _taken(
     run: StudyRun, designs: Sequence[Choice], made: Sequence[Array], rows: Sequence[int]
 ) -> dict[int, Taken]:
     """What the tolerance takes of some designs: by more and more of their points until that is known well enough, or all are
-    paired."""
+    paired, or pairs have cost enough."""
     scene, left = stricter(run.scene)
-    wanted = run.study.wanted
-    asked = HIDDEN * np.array([wanted.mean, wanted.deviation])
-    strict = [np.empty((2, REPLICATES, 0))] * len(designs)
-    tight, open_, length = run.of(scene), list(rows), _first(min(made[k].shape[2] for k in rows))
-    found: dict[int, Taken] = {}
+    tight, draws = run.of(scene), run.study.verification.draws
+    if draws is None:
+        strict = _sequences(run, tight, designs, made, rows)
+    else:
+        chosen = [designs[k] for k in rows]
+        strict = dict(
+            zip(
+                rows,
+                truth.drawn(tight, chosen, "pairs", "verification", _of_draws(draws)),
+                strict=True,
+            )
+        )
+    run.simulations.next = tight.simulations.next
+    return {k: _known(run, designs[k], made[k], strict[k], left) for k in rows}
+
+
+def _sequences(
+    run: StudyRun,
+    tight: StudyRun,
+    designs: Sequence[Choice],
+    made: Sequence[Array],
+    rows: Sequence[int],
+) -> dict[int, Array]:
+    """Points of each replicate of some designs at the stricter tolerance, (k, replicates, values) each."""
+    asked = HIDDEN * np.array([run.study.wanted.mean, run.study.wanted.deviation])
+    strict = [truth.nothing(run)] * len(designs)
+    open_, length = list(rows), _first(min(made[k].shape[2] for k in rows))
+    _, left = stricter(run.scene)
+    most = np.inf if run.study.paired else COST * run.simulations.next
+    spent = 0
     while open_:
         more = length - strict[open_[0]].shape[2]
         truth.lengthen(tight, designs, strict, open_, "pairs", "verification", more)
-        for k in open_:
-            bias, error = _apart(run, designs[k], made[k][0][:, :length], strict[k][0])
-            bias, error = bias / (1.0 - left), error / (1.0 - left)
-            # a bias that chance may have made counts for nothing
-            found[k] = np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0))), error
+        spent += len(open_) * REPLICATES * more
+        known = {k: _known(run, designs[k], made[k], strict[k], left)[1] for k in open_}
         length *= 2
-        open_ = [k for k in open_ if (found[k][1][:2] > asked).any() and length <= made[k].shape[2]]
-    run.simulations.next = tight.simulations.next
-    return found
+        open_ = [
+            k for k in open_
+            if (known[k][:2] > asked).any() and length <= made[k].shape[2] and 2 * spent <= most
+        ]  # fmt: skip
+    return {k: strict[k] for k in rows}
+
+
+def _known(run: StudyRun, choice: Choice, made: Array, strict: Array, left: float) -> Taken:
+    """What the tolerance takes of a design, from values (k, replicates, n) and the first of them at the stricter one."""
+    _, replicates, length = strict.shape
+    bias, error = _apart(run, choice, made[:, :replicates, :length], strict)
+    bias, error = bias / (1.0 - left), error / (1.0 - left)
+    # a bias that chance may have made counts for nothing
+    return np.nan_to_num(np.sqrt(np.maximum(bias**2 - error**2, 0.0))), error
 
 
 def _apart(run: StudyRun, choice: Choice, ours: Array, theirs: Array) -> Taken:
-    """By how much the results of a design differs in paired values (replicates, n) of f, and the standard errors."""
+    """By how much the results of a design differs in paired values (k, replicates, n), and the standard errors."""
     both = np.isfinite(ours) & np.isfinite(theirs)
     one, other = (
         truth.estimates_of(run, choice, np.where(both, x, np.nan)) for x in (ours, theirs)
@@ -161,7 +200,7 @@ def _scales(run: StudyRun, choice: Choice, values: Array) -> Array:
 def _widened(
     run: StudyRun, designs: Sequence[Choice], true: Result, taken: dict[int, Taken]
 ) -> Result:
-    """All limits with what the tolerance takes, the worst of the ends of a case for all its designs."""
+    """All intervals with what the tolerance takes, the worst of the ends of a case for all its designs."""
     true["tolerance"], true["tolerance_error"] = np.zeros((2, len(designs), 2))
     for k, choice in enumerate(designs):
         ends = [one for row, one in taken.items() if designs[row].case == choice.case]
@@ -176,15 +215,15 @@ def _widened(
         )
         wider = share * _scales(run, choice, values)
         for name, more in zip(("mean_reach", "deviation_reach"), wider[:2], strict=True):
-            true[name][k] = np.hypot(true[name][k], more)
+            true[name][k] += more
         for lower, upper, value, more in (
             (true["percentile_lower"][k:], true["percentile_upper"][k:], values[2:3], wider[2:3]),
             (true["goal_lower"][k], true["goal_upper"][k], values[3:], wider[3:]),
             (true["sure_lower"][k], true["sure_upper"][k], values[3 + first :], wider[3 + first :]),
         ):
             number = len(value)
-            lower[:number] = value - np.hypot(value - lower[:number], more)
-            upper[:number] = value + np.hypot(upper[:number] - value, more)
+            lower[:number] -= more
+            upper[:number] += more
     return verdicts.decided(run, designs, true)
 
 
@@ -198,27 +237,29 @@ def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, lis
     tight, _ = stricter(run.scene)
     numerics, level = tight.numerics, f"{run.study.verification.confidence:.0%}"
     pairs = f"target error {numerics.target_error:g}" if numerics.target_error else f"rtol {numerics.rtol:.0e}"  # fmt: skip
+    target = f" (target: {_shares(wanted)})" if run.study.paired else ""
     text = (
-        f"Largest half-widths at {level}: {_shares(worst)} (target: {_shares(wanted)}). The integration tolerance contributes "
+        f"Largest half-widths at {level}: {_shares(worst)}{target}. The integration tolerance contributes "
         f"{_shares(share)}, by pairs at {pairs}."
     )
+    limit = ROOM * (wanted if run.study.paired else worst)
     remarks = []
-    if (share > ROOM * wanted).any():
-        tenths = np.ceil(np.log((share / (0.5 * wanted)).max()) / -np.log(FALL))
+    if (share > limit).any():
+        tenths = max(np.ceil(np.log((share / limit).max() * 1.5) / -np.log(FALL)), 1.0)
         lower = "numerics.target_error"
         if run.scene.numerics.target_error is None:
             lower = f"numerics.rtol, to {run.scene.numerics.rtol / 10.0**tenths:.0e} say"
         remarks.append(
-            f"The integration tolerance dominates: it contributes {_shares(share)} (target: {_shares(wanted)}). Lower {lower}."
+            f"The integration tolerance dominates: it contributes {_shares(share)}{target}. Lower {lower}."
         )
-    elif (doubt > 2.0 * HIDDEN * wanted).any():
+    elif run.study.paired and (doubt > 2.0 * HIDDEN * wanted).any():
         remarks.append(
             f"Chaotic motion hides the error of the integration tolerance: its standard error is {_shares(doubt)}."
         )
     missed = [
         name for name, row in zip(names, within, strict=True) if not (row <= 1.0001 * wanted).all()
     ]
-    if missed and not (share > ROOM * wanted).any():
+    if run.study.paired and missed and not (share > limit).any():
         remarks.append(
             f"{len(missed)} of {len(names)} designs did not reach the target, {missed[0]} among them. "
             "Raise study.verification.most_samples."

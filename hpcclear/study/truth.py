@@ -1,4 +1,4 @@
-"""Designs through the true dynamics: mean, deviation and 95th percentile with confidence limits."""
+"""Simulated designs: mean, standard deviation and 95th percentile with confidence intervals."""
 
 from collections.abc import Sequence
 
@@ -6,11 +6,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
+from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.replicates import Estimate, moments, quantile, student
+from hpcclear.statistics.random.replicates import Estimate, limits, moments, quantile
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import contributions, goals, verdicts
 from hpcclear.study.optimisation import Choice
@@ -20,7 +21,10 @@ FIRST = 512
 """Simulations of a design from which its accuracy is judged, as far as it may have so many."""
 
 TIED = 0.4
-"""Of the accuracy asked for: designs that differ by less are one in an objective, and which is better need not be known."""
+"""Of the accuracy requested: designs that differ by less are one in an objective, and which is better need not be known."""
+
+CLOSE = 0.25
+"""Of the accuracy requested: what a constraint that is not decided is known to, unless it is a probability."""
 
 QUANTILE = 0.95
 """Probability of staying below the percentile that is reported."""
@@ -58,33 +62,40 @@ def _of_design(
     )
 
 
-def simulate(
-    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str = "verification"
-) -> Result:
-    """Moments of designs, by as many simulations as the study asks for.
+def begun(run: StudyRun, choices: Sequence[Choice]) -> list[Array]:
+    """The first points of each replicate of designs, (k, replicates, values) each as `doubled` returns them."""
+    made = [nothing(run)] * len(choices)
+    length = first_length(run.study.verification)
+    lengthen(run, choices, made, range(len(choices)), "verification", "verification", length)
+    return made
 
-    Returns
-    -------
-    dict of arrays over the designs
-        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
-        limits) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
-        ``goal``, ``goal_lower``, ``goal_upper`` (n, goals), ``goal_shifts`` (n, goals, replicates): what the case makes small,
-        then what it keeps below a limit, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
-        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
-        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+
+def made(
+    run: StudyRun,
+    choices: Sequence[Choice],
+    before: Sequence[Array] = (),
+    wanted: MomentAccuracy | None = None,
+) -> list[Array]:
+    """f of designs, by as many simulations as the study requires, (2, replicates, values) each as `doubled` returns them.
 
     Raises
     ------
     InputError
         If all simulations fail.
     """
-    settings = run.study.verification
+    settings, stage = run.study.verification, "verification"
     if settings.draws is not None:
-        made = _values(run, choices, stage, purpose, settings.draws, None)
-    else:
-        made = doubled(run, choices, stage, purpose, first_length(settings), settings.most_samples)
-        made = contested(run, choices, made, stage, purpose)
-    return results_of(run, choices, made) | explained(run, choices, made, purpose)
+        return drawn(run, choices, stage, stage, settings.draws)
+    length, most = first_length(settings), settings.most_samples
+    found = doubled(run, choices, stage, stage, length, most, before, wanted)
+    return contested(run, choices, found, stage, stage)
+
+
+def drawn(
+    run: StudyRun, choices: Sequence[Choice], stage: str, purpose: str, count: int
+) -> list[Array]:
+    """f of so many independent draws of designs, (2, draws, 1) each."""
+    return _values(run, choices, stage, purpose, count, None)
 
 
 def explained(
@@ -112,8 +123,8 @@ def first_length(settings: Verification) -> int:
 
 
 def expected(study: Study) -> int:
-    """Simulations of a design, on average: what the deviation of the paper's designs took, whose limits were 1.4 % of it after
-    512 and fell as the power 0.6 of the simulations."""
+    """Simulations of a design, on average: those for the standard deviation of the paper's designs, whose half-width was
+    1.4 % after 512 and fell as the power 0.6 of their number."""
     settings = study.verification
     if settings.draws is not None:
         return settings.draws
@@ -140,16 +151,15 @@ def doubled(
     before: Sequence[Array] = (),
     wanted: MomentAccuracy | None = None,
 ) -> list[Array]:
-    """Objectives and whether beyond Hertz's range, (2, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study asks, or as `wanted`) or beyond `most` simulations; what was made `before` is gone on
-    from."""
+    """Objectives and whether beyond Hertz's range, (k, replicates, values) of each design: `length` points of each replicate,
+    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; `before` is continued."""
     wanted = wanted or run.study.wanted
-    made = list(before) or [np.empty((2, REPLICATES, 0))] * len(choices)
+    made = list(before) or [nothing(run)] * len(choices)
     many = verdicts.rivals(choices)
     while True:
         rows = [
             k for k, one in enumerate(made)
-            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one[0], wanted, many[k]))
+            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one, wanted, many[k]))
         ]  # fmt: skip
         if not rows:
             return made
@@ -201,7 +211,7 @@ def _contenders(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array])
         ]
         if not rows:
             continue
-        estimates = [_goals(run, choices[k], made[k][0])[: len(case.goals)] for k in rows]
+        estimates = [_goals(run, choices[k], made[k])[: len(case.goals)] for k in rows]
         values = np.array([[one.value for one in row] for row in estimates])
         shifts = np.moveaxis(np.array([[one.shifts for one in row] for row in estimates]), 1, 0)
         less = Compared(values, shifts, settings.confidence).less
@@ -227,72 +237,89 @@ def _values(
     count: int,
     first: int | None,
 ) -> list[Array]:
-    """Objectives and whether beyond Hertz's range, (2, replicates, values) each: `count` draws, or points from
+    """f, whether beyond Hertz's range, and further responses, (k, replicates, values) each: `count` draws, or points from
     `first` on of each replicate."""
     if first is None:
         batches = [samples_of(run, choice, count, purpose) for choice in choices]
-        shape = (2, count, 1)
+        shape = count, 1
     else:
         batches = [scattered(run, choice, count, purpose, first) for choice in choices]
-        shape = (2, REPLICATES, count)
+        shape = REPLICATES, count
     values = np.concatenate([batch.values for batch in batches])
-    records = run.simulations.records(Points(batches[0].names, values, batches[0].paths), stage)
+    points = Points(batches[0].names, values, batches[0].paths)
+    records, responses = run.simulations.judged(points, stage)
     beyond = (records["flags"] & Flag.BEYOND_HERTZ) != 0
-    both = np.stack([run.simulations.objective(records), beyond])
-    return [part.reshape(shape) for part in np.split(both, len(choices), axis=1)]
+    found = np.stack([responses[0], beyond, *responses[1:]])
+    return [part.reshape(len(found), *shape) for part in np.split(found, len(choices), axis=1)]
 
 
 def _reaches(settings: Verification, values: Array) -> tuple[float, float]:
-    """Half-widths of the limits of mean and deviation."""
-    return tuple(
-        one.error * student(settings.confidence, one.freedom) if one.freedom > 0 else np.nan
-        for one in moments(values)
-    )  # type: ignore[return-value]
+    """Half-widths of the confidence intervals of mean and standard deviation, the larger one where they are not symmetric."""
+    mean, deviation = (limits(one, settings.confidence)[1] - one.value for one in moments(values))
+    return mean, deviation
 
 
 def _accurate(
     run: StudyRun, choice: Choice, values: Array, wanted: MomentAccuracy, many: int
 ) -> bool:
-    """Whether all limits are as narrow as asked for; a deviation of nothing but round-off is, and so is a probability or
-    quantile that surely keeps or breaks its threshold, as one of `many` designs."""
+    """Whether all confidence intervals are as narrow as requested. A standard deviation of round-off is, and so is what
+    significantly keeps or breaks its threshold, as one of `many` designs. Others are simulated further until decided."""
     settings, case = run.study.verification, run.study.case(choice.case)
-    mean, deviation = (one.value for one in moments(values))
-    reach = _reaches(settings, values)
+    mean, deviation = (one.value for one in moments(values[0]))
+    reach = _reaches(settings, values[0])
     good = reach[0] <= wanted.mean * abs(mean)
     good &= reach[1] <= wanted.deviation * max(deviation, 1e-9 * abs(mean))
     if good and not case.plain:
         good = all(
-            goals.accurate(goal, one, wanted)
-            or (goal in case.kept and verdicts.settled(goal, values, choice, settings, many))
+            goals.accurate(goal, one, wanted, 1.0 if goal.statistic == "exceedance" else CLOSE)
+            or verdicts.settled(goal, values, choice, settings, many)
+            if isinstance(goal, Constraint)
+            else goals.accurate(goal, one, wanted)
             for goal, one in zip(
                 (*case.goals, *case.kept), _goals(run, choice, values), strict=True
             )
-            if goal.statistic in ("quantile", "exceedance")
-            and not (goal in case.kept and verdicts.rare(goal, settings))
+            if not goal.exact and not (goal in case.kept and verdicts.rare(goal, settings))
         )
     return bool(good)
 
 
 def _goals(run: StudyRun, choice: Choice, values: Array) -> list[goals.GoalValue]:
-    """What a design comes to in all that its case asks."""
+    """What a design comes to in all that its case requires."""
     case, level = run.study.case(choice.case), run.study.verification.confidence
     asked = (*case.goals, *case.kept)
     return [goals.goal_value(goal, values, choice.design, level) for goal in asked]
 
 
 def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate | goals.GoalValue]:
-    """Mean, deviation, percentile and all that the case of a design asks, from values of f (replicates, n)."""
-    percentile = quantile(values, QUANTILE, run.study.verification.confidence)
-    return [*moments(values), percentile, *_goals(run, choice, values)]
+    """Mean, standard deviation, percentile, objectives and constraints of a design, from its simulations (k, replicates, n)."""
+    percentile = quantile(values[0], QUANTILE, run.study.verification.confidence)
+    return [*moments(values[0]), percentile, *_goals(run, choice, values)]
+
+
+def nothing(run: StudyRun) -> Array:
+    """What was simulated of a design before it is: f, whether beyond Hertz's range, further responses."""
+    return np.empty((2 + len(run.study.further), REPLICATES, 0))
 
 
 def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) -> Result:
-    """Results of designs from their simulations, shape (2, replicates, values) each; as `simulate` returns it."""
+    """Results of designs from their simulations, shape (2, replicates, values) each.
+
+    Returns
+    -------
+    dict of arrays over the designs
+        ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
+        interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
+        ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
+        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
+        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+    """
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
     held = max(len(case.kept) for case in run.study.cases)
     rows: list[dict[str, object]] = []
-    for choice, (values, beyond), many in zip(choices, made, verdicts.rivals(choices), strict=True):
+    for choice, whole, many in zip(choices, made, verdicts.rivals(choices), strict=True):
+        values, beyond = whole[:2]
         row: dict[str, object] = {
             "samples": values.size,
             "failed": int(np.isnan(values).sum()),
@@ -305,19 +332,19 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         found = quantile(values, QUANTILE, settings.confidence)
         row |= {"percentile": found.value, "percentile_lower": found.lower}
         row["percentile_upper"] = found.upper
-        estimates = _goals(run, choice, values)
+        estimates = _goals(run, choice, whole)
         missing = [np.nan] * (most - len(estimates))
         row["goal"] = [one.value for one in estimates] + missing
         row["goal_lower"] = [one.lower for one in estimates] + missing
         row["goal_upper"] = [one.upper for one in estimates] + missing
-        nothing = np.full(len(values), np.nan)
-        row["goal_shifts"] = [one.shifts for one in estimates] + [nothing] * len(missing)
+        unknown = np.full(len(values), np.nan)
+        row["goal_shifts"] = [one.shifts for one in estimates] + [unknown] * len(missing)
         sure = verdicts.level(settings, many, values.size)
         kept = run.study.case(choice.case).kept
-        certain = [goals.goal_value(goal, values, choice.design, sure) for goal in kept]
+        certain = [goals.goal_value(goal, whole, choice.design, sure) for goal in kept]
         missing = [np.nan] * (held - len(kept))
         row["counted"] = [float(values.size)] * len(certain) + missing
-        row["excess"] = goals.steered(kept, values, choice.design)
+        row["excess"] = goals.steered(kept, whole, choice.design)
         row["sure_lower"] = [one.lower for one in certain] + missing
         row["sure_upper"] = [one.upper for one in certain] + missing
         rows.append(row)

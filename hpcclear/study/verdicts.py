@@ -1,4 +1,4 @@
-"""Whether designs satisfy their constraints: decided by confidence limits that hold for all designs and all looks at once.
+"""Whether designs satisfy their constraints: decided by confidence intervals that hold for all designs and all looks at once.
 
 A design is verified by more and more simulations, and is looked at after each doubling; and the best of those that satisfy a
 constraint is recommended. Both favour luck: of many designs near a threshold some look better than they are. So each verdict
@@ -91,7 +91,7 @@ _NOTHING = np.empty(0)
 
 
 def of_interval(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> Verdict:
-    """How a design stands to a constraint, from limits at a two-sided confidence by so many simulations, and its price."""
+    """How a design stands to a constraint, from an interval at a two-sided confidence by so many simulations, and its price."""
     if one.upper <= goal.most:
         return Verdict(Standing.KEPT, np.nan)
     if one.lower > goal.most:
@@ -100,10 +100,10 @@ def of_interval(goal: Constraint, one: GoalValue, simulations: int, confidence: 
 
 
 def _price(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> float:
-    """Simulations after which limits are as near to a value as the threshold is: they approach by the root of the number."""
+    """Simulations after which an interval would just exclude the threshold: its width falls as the root of their number."""
     gap = abs(goal.most - one.value)
     if goal.statistic == "exceedance" and one.value == 0.0:
-        needed = without_any(goal.most, confidence)  # limits fall as one over the number
+        needed = without_any(goal.most, confidence)  # the interval narrows as one over the number
     elif not (gap > 0.0 and np.isfinite([one.value, one.lower, one.upper]).all()):
         return np.nan
     else:
@@ -142,7 +142,7 @@ def usual(goal: Constraint, settings: Verification) -> float:
 
 
 def usual_in(case: Case, settings: Verification) -> int:
-    """Simulations of a design for the rare failures of its case, beside those for mean and deviation."""
+    """Simulations of a design for the rare failures of its case, beside those for mean and standard deviation."""
     return int(sum(usual(one, settings) for one in case.kept if rare(one, settings)))
 
 
@@ -172,9 +172,10 @@ def settled(
     goal: Constraint, values: Array, choice: Choice, settings: Verification, many: int
 ) -> bool:
     """Whether a constraint of a design is decided, as one of `many`."""
-    sure = level(settings, many, values.size)
+    count = values[0].size if values.ndim == 3 else values.size
+    sure = level(settings, many, count)
     one = goals.goal_value(goal, values, choice.design, sure)
-    return of_interval(goal, one, values.size, sure).standing is not Standing.UNDECIDED
+    return of_interval(goal, one, count, sure).standing is not Standing.UNDECIDED
 
 
 def words(case: Case, unit: str, values: Sequence[Array], standings: Array, prices: Array) -> str:
@@ -185,8 +186,8 @@ def words(case: Case, unit: str, values: Sequence[Array], standings: Array, pric
     case : Case
     unit : str
         Of f.
-    values : sequence of arrays, shape (goals,)
-        Values, lower and upper limits of what its case makes small and, behind these, of its constraints.
+    values : sequence of arrays, shape (objectives,)
+        Values, lower and upper ends of the intervals of what its case makes small and, behind these, of its constraints.
     standings, prices : array, shape (constraints,)
     """
     texts = []

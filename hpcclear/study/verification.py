@@ -33,7 +33,7 @@ def original(run: StudyRun) -> list[Choice]:
 
 
 def predicted(run: StudyRun, choices: Sequence[Choice], model: Piecewise) -> Array:
-    """Mean and deviation by the surrogate, (n, 2); NaN outside its domain."""
+    """Mean and standard deviation by the surrogate, (n, 2); NaN outside its domain."""
     problems = {case.name: problem_of(run.scene, case.name, model) for case in run.study.cases}
     found = [
         problems[choice.case].moments(
@@ -53,11 +53,12 @@ def missed(run: StudyRun, choices: Sequence[Choice], true: Result, model: Piecew
         errors = guess / [true["mean"][k], true["deviation"][k]] - 1.0
         good = abs(errors) <= (settings.tolerance, settings.deviation_tolerance)  # False for NaN
         if not good.all():
-            texts.append(
-                f"Surrogate error at {choices[k].name}: mean {100 * errors[0]:+.1f} %, standard deviation "
-                f"{100 * errors[1]:+.1f} %. Use the simulated values."
-            )
-    return texts
+            mean, deviation = 100.0 * errors
+            texts.append(f"{choices[k].name} {mean:+.1f} % and {deviation:+.1f} %")
+    if not texts:
+        return []
+    found = "; ".join(texts)
+    return [f"Surrogate errors of mean and standard deviation: {found}. Use the simulated values."]
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class Table:
     same_as : list of str
         The first design before it that it is statistically indistinguishable from; empty if there is none.
     dominated : list of bool
-        Whether another design of its case is surely better in all that the case makes small.
+        Whether another design of its case is significantly better in all that the case makes small.
     """
 
     choices: list[Choice]
@@ -86,10 +87,10 @@ class Table:
 def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     """Verified designs under the names that they have earned.
 
-    Of what its case makes small, alpha has the least of the first, beta of the second: mean and deviation, if
-    nothing else is asked for; gamma, delta and epsilon of further ones. Of designs that are indistinguishable from it at the
-    study's confidence it is the best in the others. Each design of the front is surely better than each
-    other in one of them. They are chosen among the designs that surely satisfy all constraints, if there are any.
+    Of what its case makes small, alpha has the least of the first, beta of the second: mean and standard deviation, if
+    nothing else is requested; gamma, delta and epsilon of further ones. Of designs that are indistinguishable from it at the
+    study's confidence it is the best in the others. Each design of the front is significantly better than each
+    other in one of them. They are chosen among the designs that significantly satisfy all constraints, if there are any.
     """
     table = Table([], [], [], [])
     for case in run.study.cases:
@@ -139,8 +140,8 @@ def _name_case(
 
 
 def _nearest(rows: Sequence[int], standing: Array, broken: Array) -> list[int]:
-    """Of some designs those that surely satisfy all constraints; if none does, those that may, first those whose estimates do;
-    else the one that comes nearest. `standing`, `broken`: the worst standing and excess of all designs, (n,)."""
+    """Designs that significantly satisfy all constraints; if none does, those that may, first those whose estimates do; else
+    the nearest one. `standing`, `broken`: the worst standing and excess of all designs, (n,)."""
     best = min((standing[k] for k in rows), default=np.nan)
     level = [k for k in rows if standing[k] == best]
     if best == Standing.KEPT or not level:
@@ -164,7 +165,7 @@ def _on_bounds(run: StudyRun, choice: Choice) -> str:
 
 
 def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
-    """What cases make small and keep, with limits, in words and numbers; empty where all ask for mean and deviation."""
+    """Objectives and constraints of the cases with confidence intervals; empty if all have mean and standard deviation only."""
     if all(case.plain for case in run.study.cases):
         return {}
     unit, data = run.scene.objective.unit, {}
@@ -215,7 +216,7 @@ def write(
     run : StudyRun
     table : Table
     true : dict of arrays, shape (n, ...)
-        Of `hpcclear.study.truth.simulate`, over the same designs.
+        Of `hpcclear.study.tolerance.verified`, over the same designs.
     model : Piecewise
         The surrogate that was searched.
     remarks : sequence of str
@@ -234,7 +235,8 @@ def write(
     data["case"] = np.array([choice.case for choice in choices])
     for column, name in enumerate(("mean", "deviation")):
         data[f"{name}_true"] = true[name]
-        data[f"{name}_lower"] = true[name] - true[f"{name}_reach"]
+        least = 0.0 if name == "deviation" else -np.inf
+        data[f"{name}_lower"] = np.maximum(true[name] - true[f"{name}_reach"], least)
         data[f"{name}_upper"] = true[name] + true[f"{name}_reach"]
         data[f"{name}_surrogate"] = surrogate[:, column]
         data[f"{name}_error"] = surrogate[:, column] / true[name] - 1.0
@@ -244,7 +246,7 @@ def write(
             data[f"life_{name}_lower"], data[f"life_{name}_upper"] = value - reach, value + reach
         if study.paired:
             data[f"{name}_within"] = true[f"{name}_reach"] / abs(true[name])
-            data[f"{name}_tolerance"] = true["tolerance"][:, column]
+        data[f"{name}_tolerance"] = true["tolerance"][:, column]
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     for name in ("percentile", "percentile_lower", "percentile_upper"):
@@ -265,7 +267,7 @@ def write(
     )
     if "first_goal" in content:
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
-        asked = f"{', '.join(others)} and {last}"
+        asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
         for name in ("same_as", "dominated"):
             words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)

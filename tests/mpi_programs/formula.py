@@ -220,6 +220,8 @@ if __name__ == "__main__":
     replace_dynamics()
     if len(sys.argv) > 3:
         BIAS = float(sys.argv[3])
+    if len(sys.argv) > 4:
+        FIELD = sys.argv[4]
 
     def program(ranks: Ranks) -> None:
         scene = load_scene(sys.argv[1])

@@ -1,1 +1,1 @@
-"""Where surfaces of joints with clearance touch: one file a geometry of contact, one door (`registry`)."""
+"""Where surfaces of joints with clearance touch: one file a geometry of contact, one registry (`registry`)."""

@@ -30,9 +30,9 @@ class Geometry:
     """One kind of contact between two bodies.
 
     ``force(effects, work, par, joint, relative, frame, i, W)`` is a lane function. `relative`: a place of the journal's body
-    relative to one of the bearing's (ex, ey, vx, vy), and the angular velocities of journal and bearing, None of what never
-    turns; `frame`: what the geometry asks for besides (`along_a_line`, or cosines and sines of surfaces out of round).
-    It writes gap, normal force, rate and what effects ask for, and returns the force on the bearing at its place (the journal
+    relative to one of the bearing's (ex, ey, vx, vy), and the angular velocities of journal and bearing, None for what never
+    turns; `frame`: what the geometry requires besides (`along_a_line`, or cosines and sines of surfaces out of round).
+    It writes gap, normal force, rate and what effects require, and returns the force on the bearing at its place (the journal
     gets the opposite at its own), the moments on bearing and journal about these places, and the power that is lost.
     """
 

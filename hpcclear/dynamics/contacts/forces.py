@@ -74,7 +74,7 @@ def store_impacts(effects, work, par, joint, touch, normal, i, W):
 
 @lane_function
 def store_contact(effects, work, par, joint, touch, forces, direction, i, W):
-    """Write down what effects ask for of a contact; `touch` and `forces` as of `lost`, `direction`: of the normal."""
+    """Write down what effects require of a contact; `touch` and `forces` as of `lost`, `direction`: of the normal."""
     _, rate, sliding = touch
     normal, tangential = forces
     nx, ny = direction
@@ -119,14 +119,14 @@ def force_that_wears(threshold, par, joint, normal, i, W):
 
 @lane_function
 def store_rate(flag, work, row, value, i, W):
-    """Write down a rate that an effect asks for."""
+    """Write down a rate that an effect requires."""
     if flag is not None:
         work[(at.RATE_NOW + row) * W + i] = value
 
 
 @lane_function
 def switched(latched, force, active):
-    """A latched contact is on or off for a whole step, so that a step ends exactly at an impact."""
+    """A `latched` contact is on or off for a whole step, so that a step ends exactly at an impact."""
     if latched is not None:
         return force * active
     else:

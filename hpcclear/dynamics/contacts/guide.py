@@ -71,7 +71,7 @@ def shape(get: Get) -> Shape:
 
 
 def reach(parameters: Any, place: int) -> Array:
-    """Of a corner's centre from the line."""
+    """Of a corner's centre from the line, m, shape (...): of samples."""
     found: Array = parameters.bearing_radius[..., place] - parameters.journal_radius[..., place]
     return found
 

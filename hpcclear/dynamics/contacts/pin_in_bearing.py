@@ -32,7 +32,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     """Contact, friction and film in one open joint.
 
     `relative`: the journal's position and velocity relative to the bearing's centre (ex, ey, vx, vy), and the angular
-    velocities of journal and bearing, None of what never turns; `turns`: cosines and sines of the angles of bearing and
+    velocities of journal and bearing, None for what never turns; `turns`: cosines and sines of the angles of bearing and
     journal, for surfaces that are out of round. Gap (|e| - c of round ones), normal force (with a film: the size of both
     forces) and gap rate go to their rows.
     Returns the force on the bearing (the journal gets the opposite), the moments of friction force, waves and film on
@@ -91,7 +91,7 @@ def shape(get: Get) -> Shape:
 
 
 def reach(parameters: Any, place: int) -> Array:
-    """The clearance."""
+    """The clearance, m, shape (...): of samples."""
     found: Array = parameters.clearance[..., place]
     return found
 

@@ -1,4 +1,4 @@
-"""The one door to geometries of contact: a new one is a file here, and its name in this list."""
+"""The registry of geometries of contact: a new one is a file here, and its name in this list."""
 
 from hpcclear.dynamics.contacts import guide, pin_in_bearing
 from hpcclear.dynamics.contacts.declared import Geometry

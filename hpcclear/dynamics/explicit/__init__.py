@@ -1,1 +1,1 @@
-"""The block stepper: Runge-Kutta pairs over lanes in lockstep."""
+"""The block stepper: Runge-Kutta pairs over a batch of lanes."""

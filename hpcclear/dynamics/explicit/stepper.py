@@ -1,4 +1,4 @@
-"""The block stepper: W samples in lockstep, each with its own time, step, contact state and outcome.
+"""The block stepper: W samples in a batch, each with its own time, step, contact state and outcome.
 
 A lane whose sample ends takes the next one from the queue. The stepper returns after a budget of steps with
 its whole state in the arrays it was given, and goes on from there bit for bit.

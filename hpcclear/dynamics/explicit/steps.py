@@ -81,7 +81,7 @@ def weigh_error(work, first, row, e, i, W):
 def weigh_rates(effects, work, first, row, b, e, lanes, W):
     """Add a stage's rates, times the weights b and e of its method, to the sums over the step.
 
-    One loop over all gaps of all lanes, whose rows stand side by side: shorter ones the compiler unrolls instead of
+    One loop over all gaps of all lanes, whose rows are contiguous: shorter ones the compiler unrolls instead of
     vectorising. One product a sum: of two it might fuse either, and lanes would differ from a single response in the last bit.
     What has no weight, as one or two of the stages of every pair, is left out.
     """

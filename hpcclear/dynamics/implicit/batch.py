@@ -1,7 +1,7 @@
 """Implicit steps where the motion is stiff (see `switching`): batches of eight stiff samples, one to a SIMD lane.
 
 A stiff lane takes one step of Radau IIA where the others take an explicit one. Everything around the step (impacts, ends of
-revolutions, books, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit
+revolutions, sums, outcome) is the block stepper's: the implicit step leaves its result in the lane's rows as an explicit
 step would. A sample keeps its column of the eight for as long as it is stiff, and none depends on what its neighbours hold.
 """
 
@@ -238,7 +238,7 @@ def norms_of_jacobians(n, m):
 
 @scalar_function
 def solve_steps(effects, moved, W, work, m):
-    """Solve for the stages of all columns: mem.ITERATIONS tell how it went."""
+    """Solve for the stages of all columns: the outcome is in mem.ITERATIONS."""
     cut_at_kinks(effects, moved, W, work, m)
     new_jacobian(moved, m)
     norms_of_jacobians(moved.n, m)

@@ -56,9 +56,9 @@ LARGEST_SHRINK, LARGEST_GROWTH = 0.2, 8.0
 
 @scalar_function
 def loosened(rtol, strictness, steep, smooth):
-    """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol asks.
+    """Relative tolerance for an error estimate of order 3 that makes the fifth-order result as good as rtol requires.
 
-    Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff stretches are full of kinks, where
+    Where the motion is smooth an exponent of 2/3 would do, as in RADAU5; but stiff segments are full of kinks, where
     the result is no better than the estimate, most of all where a steep friction ramp sticks and tears loose. There the
     energy balance closes as well as elsewhere only with an exponent of 1, which costs next to nothing: kinks hold the
     steps down anyway.
@@ -73,7 +73,7 @@ def fit_to_ramp(par, lane, W, m, i, settings):
     """Relative tolerance of implicit steps and reach of the Jacobian's differences: both keep well within friction's ramp.
 
     Where joints stick, the sliding speed lies within the ramp: an error as wide as the ramp would throw it to and fro,
-    and every step would begin off the slow motion and end at a kink. Looser than this is dearer. A difference taken across the
+    and every step would begin off the slow motion and end at a kink. A looser one costs more. A difference taken across the
     ramp's end would hide its slope. A film is squeezed as slowly where it carries: an error of that speed would be one of all
     forces, and the energy balance would not close.
     """

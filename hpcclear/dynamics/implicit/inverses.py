@@ -1,4 +1,4 @@
-"""Inverses of eight small matrices side by side, real and complex: a matrix to each column of rows of eight.
+"""Inverses of eight small matrices batched, real and complex: a matrix to each column of rows of eight.
 
 Rows are exchanged in each matrix for itself: compared with the pivot's row one after the other, and taken instead where they
 are larger. No column's numbers depend on another's.

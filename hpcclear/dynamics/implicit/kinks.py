@@ -16,7 +16,7 @@ BEYOND = 1e-4
 """How far beyond a kink a step ends, in units of the kink's function (of order 1)."""
 
 GUESSED_BEYOND = 0.03
-"""A guess shows a kink where a stage is so far beyond it; whether a nearer one is real the solution tells."""
+"""A guess shows a kink where a stage is so far beyond it; the solution shows whether a nearer one is real."""
 
 NEAR = 5e-4
 """A kink this near the start of a step, in these units, is stepped over."""

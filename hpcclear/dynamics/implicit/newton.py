@@ -112,7 +112,7 @@ def observe_stages(effects, moved, m, integrated):
 
 @scalar_function
 def guess(n, m):
-    """First guess of the stages where it is asked for: the polynomial of the step before, or of the longer try from the same
+    """First guess of the stages where it is requested: the polynomial of the step before, or of the longer try from the same
     start; without either, the velocities at the start."""
     asked = fetch(m, mem.ASKED)
     old, h = number(m, mem.POLYNOMIAL_STEP), number(m, mem.STEP)
@@ -131,7 +131,7 @@ def guess(n, m):
 
 @scalar_function
 def guess_from_start(n, m):
-    """First guess of the stages where it is asked for: the accelerations at the start."""
+    """First guess of the stages where it is requested: the accelerations at the start."""
     asked, h = fetch(m, mem.ASKED), number(m, mem.STEP)
     for k in range(n):
         a = h * fetch(m, mem.START + k)
@@ -228,7 +228,7 @@ def solved(n, m, r):
 
 @scalar_function
 def correct(n, m):
-    """One correction of simplified Newton where it is asked for; its size relative to the tolerance to mem.NOW, squared and
+    """One correction of simplified Newton where it is requested; its size relative to the tolerance to mem.NOW, squared and
     times 3 n."""
     asked = fetch(m, mem.ASKED)
     h = number(m, mem.STEP)
@@ -252,7 +252,7 @@ def correct(n, m):
 
 @scalar_function
 def take_in(n, m, iteration):
-    """What the last correction says of each column that asked for it: whether it goes on, and how many iterations it took.
+    """What the last correction says of each column that requested it: whether it goes on, and how many iterations it took.
     Returns how many columns go on."""
     going = 0
     for i in range(COLUMNS):
@@ -271,7 +271,7 @@ def take_in(n, m, iteration):
 
 @scalar_function
 def newton(moved, m):
-    """Solve for the stages of all columns that ask for it, whose first guess was evaluated (mem.ITERATIONS)."""
+    """Solve for the stages of all columns that require it, whose first guess was evaluated (mem.ITERATIONS)."""
     for i in range(COLUMNS):
         if m[mem.ASKED * COLUMNS + i] == 1.0:
             begin_iteration(m, i)
@@ -327,7 +327,7 @@ def filtered_error(n, m):
 
 @scalar_function
 def refilter_error(moved, m):
-    """The estimate once more where it is asked for, from the start moved by the estimate: for a first try that looked too
+    """The estimate once more where it is requested, from the start moved by the estimate: for a first try that looked too
     inaccurate."""
     n = moved.n
     first, asked = fetch(m, mem.NOW), fetch(m, mem.ASKED)

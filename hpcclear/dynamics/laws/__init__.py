@@ -25,6 +25,6 @@ def laws(kind: str) -> dict[str, Any]:
 
 
 def names(kind: str) -> tuple[str, ...]:
-    """Their names; none of them is loaded."""
+    """Their names; without loading them."""
     package = importlib.import_module(f"{__name__}.{FOLDERS[kind]}")
     return tuple(one.name.replace("_", "-") for one in pkgutil.iter_modules(package.__path__))

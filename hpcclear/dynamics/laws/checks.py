@@ -50,7 +50,7 @@ SAME = 1e-4
 
 
 def check_shape(law: Law) -> None:
-    """LawError unless the law's functions ask for what there is, are arithmetic, and fit their rows."""
+    """LawError unless the law's functions require known quantities, are arithmetic, and fit their rows."""
     own = {one.name for one in law.parameters}
     given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
     for name in own & (JOINT.keys() | VARYING[law.kind].keys()):

@@ -37,7 +37,7 @@ VARYING = {
     "friction": {"speed": "m/s", "force": "N", "deflection": "m", "deflection_rate": "m/s"},
 }
 """What varies from instant to instant, by the kind of law, with units: penetration, its rate, the rate at the start of this
-contact (a law that asks for it is latched) and one over it; the sliding speed, the normal force, and the deflection of
+contact (a law that requires it is `latched`) and one over it; the sliding speed, the normal force, and the deflection of
 bristles with its rate."""
 
 
@@ -84,7 +84,7 @@ class Law:
     Raises
     ------
     TypeError
-        If a function asks for what nobody gives.
+        If a function requires an unknown quantity.
     """
 
     words: str
@@ -112,7 +112,7 @@ class Law:
     @staticmethod
     @cache
     def arguments(function: Function) -> tuple[str, ...]:
-        """Names of what a function asks for."""
+        """Names of what a function requires."""
         return tuple(signature(function).parameters)
 
     def worked_out(self) -> tuple[Function, ...]:
@@ -127,7 +127,7 @@ class Law:
 
     @cached_property
     def read(self) -> tuple[str, ...]:
-        """Numbers of a sample that they ask for, in the order of their rows."""
+        """Numbers of a sample that they require, in the order of their rows."""
         varying = VARYING[self.kind]
         functions = [*self.functions().values(), *self.afterwards()]
         asked = [name for one in functions for name in self.arguments(one)]
@@ -138,7 +138,7 @@ class Law:
         return []
 
     def unit(self, name: str) -> str:
-        """Unit of what a function may ask for; raises KeyError."""
+        """Unit of what a function may require; raises KeyError."""
         own = {one.name: one.unit for one in self.parameters}
         return {**JOINT, **VARYING[self.kind], **own, **self.numbers}[name]
 
@@ -197,7 +197,7 @@ class ContactLaw(Law):
     exponent: Function | None = None
     """Of the depth in the elastic part, near a depth; by default by differences."""
     damping: Function | None = None
-    """Factor of the rate (latched: of the rate over the impact speed), s/m or 1; by default by differences."""
+    """Factor of the rate (`latched`: of the rate over the impact speed), s/m or 1; by default by differences."""
     deepest: Function | None = None
     """Depth beyond which a result is flagged, m; by default where theories of small contacts end (`parameters.HERTZ_RANGE`)."""
     without_loss: str = ""
@@ -230,7 +230,7 @@ class ContactLaw(Law):
 
     @property
     def latched(self) -> bool:
-        """Whether it asks for the impact speed."""
+        """Whether it requires the impact speed."""
         asked = {name for one in self.functions().values() for name in self.arguments(one)}
         return bool(asked & {"impact_speed", "inverse_impact_speed"})
 

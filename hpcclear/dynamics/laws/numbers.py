@@ -157,7 +157,7 @@ def depth_at(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> Array
 
 
 def shape_near(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Exponent of the depth and factor of the rate (latched: over the impact speed), as F ~ d^n (1 + c d') where the elastic
+    """Exponent of the depth and factor of the rate (`latched`: over the impact speed), as F ~ d^n (1 + c d') where the elastic
     part is `force` (m,): what peaks between steps are found by."""
     if law.exponent is not None and law.damping is not None:
         return evaluate(law.exponent, numbers), evaluate(law.damping, numbers)

@@ -16,7 +16,7 @@ from hpcclear.dynamics.laws.translate import LawError, written
 
 @cache
 def rate_in_lanes(objective: Objective) -> InLanes:
-    """An objective's rate ready to be written out, as ``rate``: of a joint, None of one that is of the whole mechanism, and of
+    """An objective's rate ready to be written out, as ``rate``: of a joint, None for one that is of the whole mechanism, and of
     direction and speed of the drive's body; it reads the other rates. A root mean square integrates its square.
 
     Raises
@@ -61,7 +61,7 @@ _ROWS = {
     "acceleration_x": _rate("at.FOLLOWED_ACCELERATION"),
     "acceleration_y": _rate("at.FOLLOWED_ACROSS"),
 }
-"""Where what an objective's rate asks for stands."""
+"""Where what an objective's rate requires stands."""
 
 
 _RANGES = {
@@ -84,7 +84,7 @@ _RANGES = {
 
 
 def check_objective(objective: Objective) -> None:
-    """LawError unless an objective asks for what there is, is finite, and has its units."""
+    """LawError unless an objective requires known quantities, is finite, and has its units."""
     if objective.rate is None and objective.value is None:
         raise LawError("has neither a rate nor a value", "Declare one of them, or both")
     if objective.made not in MADE:

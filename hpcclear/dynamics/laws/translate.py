@@ -118,7 +118,7 @@ class _Writer:
         return isinstance(last, ast.Return)
 
     def local(self, name: str) -> str:
-        """A name that none of the words has."""
+        """A name that is not among the words."""
         return f"{name}_"
 
     def let(self, value: str) -> str:

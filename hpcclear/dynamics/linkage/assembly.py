@@ -41,9 +41,9 @@ class Assembly:
         return forest.offsets[body] + (0.0 if k is None else float(self.q[k]))
 
     def report(self) -> list[str]:
-        """A line a body: the angle taken, and the rough one it was found from, in degrees."""
+        """A line for each body: its angle, and the estimate in the scene, in degrees."""
         return [
-            f"{body.name}: {_degrees(self.angle(body.name))} deg (from {_degrees(body.start_angle)})"
+            f"{body.name}: {_degrees(self.angle(body.name))} deg (estimate {_degrees(body.start_angle)})"
             for body in self.loops.mechanism.bodies
         ]
 
@@ -111,7 +111,7 @@ def _ideal(mechanism: Mechanism, loops: Loops) -> Booleans:
 
 
 def _least_change(loops: Loops, jacobian: Array, asked: Array, rcond: float) -> Array:
-    """The smallest scaled change (n, m) that gives constraints what is asked of them (rows, m)."""
+    """The smallest scaled change (n, m) that gives constraints what is required of them (rows, m)."""
     inverse = np.linalg.pinv(jacobian * _columns(loops), rcond=rcond)
     change: Array = (inverse @ asked.T[..., None])[..., 0].T
     return change

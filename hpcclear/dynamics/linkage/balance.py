@@ -32,7 +32,7 @@ class Twist(NamedTuple):
 
 
 class Balance:
-    """Mass matrix and forces of a forest; forces are added to `pulls` and `twists` before a row is asked for."""
+    """Mass matrix and forces of a forest; forces are added to `pulls` and `twists` before a row is requested."""
 
     def __init__(self, forest: Forest, kinematics: Kinematics, writer: Writer, gravity: bool):
         self.forest = forest
@@ -149,7 +149,7 @@ class Balance:
 
     # ---- forces ---------------------------------------------------------------------------------
     def force(self, column: Column) -> Term:
-        """What moves along a column: pulls and moments, gravity, and what turning frames ask for."""
+        """What moves along a column: pulls and moments, gravity, and what turning frames require."""
         total = ZERO
         for pull in self.pulls:
             found = self.kinematics.columns(self.kinematics.point(pull.place)).get(column)
@@ -214,7 +214,7 @@ class Balance:
         return -(whole * self.writer.parameter("gravity"))
 
     def _turning(self, column: Column) -> Term:
-        """What centripetal, Coriolis and prescribed accelerations ask for."""
+        """What centripetal, Coriolis and prescribed accelerations require."""
         pairs: dict[tuple[Term, ...], list[tuple[Term, Held, Held]]] = {}
         known = ZERO
         for body in self.forest.mechanism.bodies:

@@ -1,7 +1,7 @@
 """Bars that bend between their ends: terms of the motion's text, their numbers, and the energy.
 
 The axis of a bar of length L, seen from the line between its ends a (s = 0) and b, is displaced across by
-w = sum of q_i sin(i pi s/L), and along by u(s) = -1/2 of the integral of w'^2 from a to s: bending does not stretch it, so b
+w = sum of q_i sin(i pi s/L), and along by u(s) = -1/2 of the integral of w'^2 from a to s: bending does not lengthen it, so b
 comes nearer to a by delta = sum of kappa_i q_i^2/2. Kinetic energy is kept to second order in w, as of which u counts,
 strain energy is that of Euler and Bernoulli's beam. With P the place of the straight bar's mass centre, (e, n) the axes
 along and across,

@@ -22,7 +22,7 @@ from hpcclear.dynamics.linkage.parts import (
 
 
 class Row(NamedTuple):
-    """One constraint: derivatives by columns, and the sum of these times accelerations that is asked for.
+    """One constraint: derivatives by columns, and the required sum of these times accelerations.
 
     `others`: derivatives by what is prescribed or held, for its reactions; `error` and `rate`: the constraint and its
     first derivative.

@@ -1,4 +1,4 @@
-"""What generated motions call besides the contact law: springs, drives, tables, loops that fold flat. Plain, of arrays."""
+"""Functions of generated motions besides the contact law: springs, drives, tables, near-singular loops. Plain, of arrays."""
 
 import math
 
@@ -77,7 +77,7 @@ def harmonic(mean, amplitude, rate, sine, cosine):
 
 @lane_function
 def held_inverse(pivot, scale):
-    """1 / pivot of a multiplier, both negative; where a loop folds flat no more than 1e8 / scale.
+    """1 / pivot of a multiplier, both negative; in a singular configuration no more than 1e8 / scale.
 
     There one direction of the loop is not held, neither by geometry nor by its forces, which would be zero by zero: a
     free linkage goes on as its inertia has it until the loop holds again, some 1e-4 rad further on.

@@ -211,7 +211,7 @@ class _Generator:
         self.losses.append(loss)
 
     def _frame(self, contact: Contact) -> str:
-        """What a geometry asks for besides: the unit vector from a guide's line to the face, or cosines and sines of the
+        """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
         angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
         if isinstance(contact.joint, Slide):
@@ -379,7 +379,7 @@ class _Generator:
         return coupled(moving, factored, found) if moving else found
 
     def _passed(self, block: list[int]) -> dict[int, list[int]]:
-        """Multipliers of pins in a free linkage, which may fold flat, with those of the same pin.
+        """Multipliers of pins in a free linkage, which may become singular, with those of the same pin.
 
         What is driven at a given speed may not get stuck unheard at a dead centre, so nothing is eased there.
         """
@@ -500,7 +500,7 @@ class _Generator:
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
     def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
-        """Moment of a drive: what is given, or what the prescribed angle asks for."""
+        """Moment of a drive: what is given, or what the prescribed angle requires."""
         column = Column("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]

@@ -36,7 +36,7 @@ class Linkage:
     waves : bool
         Whether surfaces of joints with clearance are out of round.
     follow : str
-        A guided body, or a point ``body.point``, whose acceleration responses tell of; "" for none.
+        A guided body, or a point ``body.point``, whose acceleration is a response; "" for none.
     objective : str
         The objective's own rate: "joints", or "whole" of the mechanism; "" for none.
     bristled : bool
@@ -47,7 +47,7 @@ class Linkage:
     Raises
     ------
     InputError
-        If it needs more parameters than there is room for.
+        If it needs more parameters than the kernel holds.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Linkage:
 
     @property
     def follows_a_point(self) -> bool:
-        """Whether it is a point that responses tell of."""
+        """Whether it is a point that responses follow."""
         return "." in self.follow
 
     @property

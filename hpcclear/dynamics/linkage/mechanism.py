@@ -115,7 +115,7 @@ def modes_of(mechanism: Mechanism) -> int:
 def joined(mechanism: Mechanism, kinds: type | tuple[type, ...] = object) -> list[set[str]]:
     """Which bodies hang together by joints of some kinds: sets of names, the ground's first.
 
-    Guides with clearance, which let their sliders turn, are none of a kind that is named.
+    Guides with clearance, which let their sliders turn, have no kind of their own.
     """
     groups = [{GROUND}, *({body.name} for body in mechanism.bodies)]
     for joint in mechanism.joints if kinds is object else mechanism.ideal:

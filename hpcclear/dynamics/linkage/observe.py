@@ -32,7 +32,7 @@ def new_lane(par: Array) -> Array:
 
 @scalar_function
 def _observe(motion, W, lanes, tables, states, contacts, times, out):
-    """`observe` by lanes at hand; those that are left over at the end repeat the last instant."""
+    """`observe` by free lanes; those that are left over at the end repeat the last instant."""
     n, count = states.shape[1] // 2, len(times)
     for first in range(0, count, W):
         for i in range(W):
@@ -76,7 +76,7 @@ class Seen(NamedTuple):
 
 
 def new_seen(n: int, par: Array, joints: int = 2) -> Seen:
-    """Room for n coordinates and so many joints of the lane with these parameters (PARAMETERS,)."""
+    """Memory for n coordinates and so many joints of the lane with these parameters (PARAMETERS,)."""
     return Seen(np.empty(2 * n + joints), np.zeros((joints, 3)), new_lane(par))
 
 
@@ -85,8 +85,8 @@ def new_seen(n: int, par: Array, joints: int = 2) -> Seen:
 def derivative(motion, tables, contacts, time, y, out, joints, lane):
     """Rates of y = (coordinates, velocities, integrals of the absolute gaps) at `time` since the start of the revolution.
 
-    `motion`: address of a motion of one lane; `contacts`: whether each joint is latched, then 1/d'_0 of each. `out`, `joints`,
-    `lane`: as in `Seen`.
+    `motion`: address of a motion of one lane; `contacts`: whether each joint is `latched`, then 1/d'_0 of each. Others as in
+    `Seen`.
     """
     n = (len(y) - len(joints)) // 2
     put_state(lane, contacts, time, y, n, 1, 0)

@@ -102,7 +102,7 @@ class Clearance(Revolute):
         return (np.hypot(*self.start_eccentricity) - self.clearance,)
 
     @property
-    def without_play(self) -> Revolute:
+    def without_clearance(self) -> Revolute:
         """The same without clearance."""
         return Revolute(self.name, self.journal, self.bearing)
 
@@ -186,7 +186,7 @@ class LooseSlide(Slide):
         }
 
     @property
-    def without_play(self) -> Slide:
+    def without_clearance(self) -> Slide:
         """The same without clearance."""
         return Slide(self.name, self.point, self.line, self.angle)
 

@@ -255,7 +255,7 @@ def _reactions(
     margin: Array,
     tabulated: Mapping[str, Callable[[Array], Array]],
 ) -> Prescribed:
-    """Accelerations and reactions from the equations of motion, instants side by side as rows of arrays."""
+    """Accelerations and reactions from the equations of motion, instants batched as rows of arrays."""
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
     holds = 3 * n + 1
     rates = holds + len(assembly.loops.owners)

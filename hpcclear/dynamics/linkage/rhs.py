@@ -17,7 +17,7 @@ from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
 
 LONG = 200
-"""Lines of a text from which half of its vectors stand side by side: of all of them there are more instructions than the
+"""Lines of a text from which half of its vectors stand batched: of all of them there are more instructions than the
 processor keeps decoded."""
 
 
@@ -35,7 +35,7 @@ def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Any:
     - It reads coordinates and velocities of the stage (n rows each from QS and VS on), STAGE_TIME (s since the start of the
       revolution), of each joint with clearance its contact state (ACTIVE, INVERSE_IMPACT), and parameters.
     - It writes accelerations (n rows from ACC on) and, from RATE_NOW on, each joint's gap, normal force and rate of the gap,
-      and of the other rates those that are asked for.
+      and of the other rates those that are requested.
     - It may use CURVES. All other rows it leaves alone: no state of its own, nothing kept between calls.
     - `tables` holds the tabulated curves, ``layout.TABLES`` numbers.
 

@@ -64,8 +64,8 @@ def half_circle_angle(a, s, r2):
 def film_thickness(gap, clearance, floor):
     """Least film thickness over the clearance, for a `gap` |e| - c of the centres.
 
-    It is the depth, 1 less the eccentricity over the clearance, from twice the `floor` on, and the floor where surfaces touch,
-    a parabola between: so does the mean gap between surfaces whose heights are spread evenly.
+    It is the depth, 1 less the eccentricity over the clearance, from twice the `floor` on, the `floor` where surfaces touch,
+    and a parabola between: so does the mean gap between surfaces whose heights are spread evenly.
     """
     inverse = 1.0 / (clearance * floor)  # one for both: quotients are what a film's force costs
     depth = -gap * (inverse * floor)

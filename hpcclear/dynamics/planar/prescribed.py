@@ -8,12 +8,12 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.curves import curve_at
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import Revolute, Slide, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.path import rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, scene_of
 from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved
@@ -24,7 +24,7 @@ from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
 
 PER_REVOLUTION = 720
-"""Instants of a revolution, where no number of them is asked for."""
+"""Instants of a revolution, if no number is requested."""
 
 _NODES, _WEIGHTS = (
     0.5 * (np.polynomial.legendre.leggauss(5)[0] + 1.0),
@@ -38,7 +38,7 @@ OF_CONTACTS = (
 
 
 def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
-    """Largest moment of the drive (N m), deviation of the followed acceleration (m/s2) and its largest size, of samples (m, 3).
+    """Samples (m, 3): largest torque of the drive (N m), standard deviation and largest size of followed acceleration (m/s2).
 
     NaN of those that do not turn, and where nothing is followed.
     """
@@ -90,7 +90,7 @@ def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
 
 
 def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, Array]]:
-    """Instants (t,) and the time series of a response; 720 a revolution where every step is asked for.
+    """Instants (t,) and the time series of a response; 720 a revolution where every step is requested.
 
     ``pin_force_x`` and ``pin_force_y`` (t, pins) are the forces of the ideal pins on their journals' bodies. Works are
     sums by Gauss's rule between the instants: with links nearly in line the powers peak sharply.

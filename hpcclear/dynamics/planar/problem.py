@@ -10,13 +10,13 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics import bending, bristles
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
 from hpcclear.dynamics.linkage.trees import forest
+from hpcclear.dynamics.planar import bristles, swings
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import refused
 from hpcclear.scene import Scene
@@ -217,7 +217,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
     speed = at.TURN / float(period_of(linkage.mechanism)) * float(driven_length(linkage.mechanism))
     rate = 1e3 * min(1.0, speed / 25.0)
     first, second = bristles.tolerances(scene, float(period_of(linkage.mechanism)))
-    bent = bending.tolerances(linkage.mechanism, a, rate * a)
+    bent = swings.tolerances(linkage.mechanism, a, rate * a)
     return (
         *first,
         *bent,
@@ -230,7 +230,7 @@ def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
-    """The status of a scene whose own linkage cannot turn, and what to say; None of one that can, or is not to be judged.
+    """The status of a scene whose own linkage cannot turn, and what to say; None for one that can, or is not to be judged.
 
     Raises
     ------

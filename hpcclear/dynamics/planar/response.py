@@ -11,6 +11,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, as_complex, split
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
@@ -70,6 +71,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         **frame,
         **balance_series(stored, seen.works),
         **mode_series(scene.modes, seen.q, seen.v, strain),
+        **guide_series(mechanism, pose),
         **held,
     }
 
@@ -156,8 +158,33 @@ def mode_series(modes: int, q: Array, v: Array, strain: Array) -> dict[str, Arra
     }
 
 
+def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
+    """Series (t, guides) of the guides with clearance: how far the slider is to the left of the line, and its tilt."""
+    guides = [joint for joint in mechanism.clearances if isinstance(joint, LooseSlide)]
+    if not guides:
+        return {}
+    found = []
+    for joint in guides:
+        (middle, angle), (line, turned) = (_place(mechanism, pose, one) for one in joint.places)
+        along = np.exp(1j * (turned + joint.angle))
+        tilt = np.angle(np.exp(1j * angle) / along)
+        found.append((((middle - line) * along.conjugate()).imag, tilt))
+    offsets, tilts = (np.array(part).T for part in zip(*found, strict=True))
+    return {"guide_offset": offsets, "guide_tilt": tilts}
+
+
+def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Any]:
+    """Where a place is (t,), x + iy, and the angle of its body."""
+    name = split(place)[0]
+    if name == GROUND:
+        return as_complex(mechanism.at(place)), 0.0
+    k = [body.name for body in mechanism.bodies].index(name)
+    arm = as_complex(mechanism.at(place)) - as_complex(mechanism.bodies[k].center)
+    return pose.x[k] + 1j * pose.y[k] + arm * np.exp(1j * pose.angle[k]), pose.angle[k]
+
+
 def contacts_on(scene: Scene, contacts: Array) -> Array:
-    """Whether a penetration of each open joint counts, (t, joints): under latched laws only while in contact."""
+    """Whether a penetration of each open joint counts, (t, joints): under `latched` laws only while in contact."""
     latched = scene.effects.contact is not None and scene.effects.contact.latched
     joints = list(scene.open_places)
     return contacts[:, joints] if latched else np.ones((len(contacts), len(joints)))

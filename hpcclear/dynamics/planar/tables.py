@@ -7,7 +7,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.curves import angle_cells
 from hpcclear.dynamics.laws.hertz_contact import (
     contact_stiffness,
     reduced_compliance,
@@ -16,6 +15,7 @@ from hpcclear.dynamics.laws.hertz_contact import (
 from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.loads import KINDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
+from hpcclear.dynamics.planar.curves import angle_cells
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,

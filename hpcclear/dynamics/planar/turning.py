@@ -58,7 +58,7 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
     return tuple(
-        joint.without_play if isinstance(joint, Loose) else joint for joint in mechanism.joints
+        joint.without_clearance if isinstance(joint, Loose) else joint for joint in mechanism.joints
     )
 
 
@@ -134,7 +134,7 @@ def _narrowest(walk: Passage) -> Node | None:
 
 
 def _closes(assembly: Assembly, walk: Passage, node: Node) -> bool:
-    """Whether the loops close at a pose where they change branch, to rounding: else they pass beside it, too near to tell."""
+    """Whether the loops close, to rounding, at a pose where they change branch; else they pass very near to it."""
     ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time]))
     error = np.abs(assembly.loops.at(q, v, node.time).error).max()
     return bool(error <= CLOSED * np.abs(q).max())
@@ -152,7 +152,7 @@ def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: No
 
 
 def refused(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Status, InputError] | None:
-    """The status of a linkage that cannot turn, and what to say; None of one that can, or is not to be judged."""
+    """The status of a linkage that cannot turn, and what to say; None for one that can, or is not to be judged."""
     found = passage(mechanism, gravity, rounds)
     if found is None or found[1].ended is None:
         return None
@@ -206,7 +206,7 @@ def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) ->
 
 
 def _clear(loops: Loops, samples: Made) -> Booleans:
-    """Which samples (m,) surely turn."""
+    """Which samples (m,) are certain to turn."""
     sample = samples.numbers
     tables: dict[str, Any] = {
         "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,

@@ -1,1 +1,1 @@
-"""The steady mean of the objective with its limits, whatever the motion does: regular, settling, unsteady or chaotic."""
+"""The steady mean of the objective with its confidence interval, of regular, settling, unsteady and chaotic motion."""

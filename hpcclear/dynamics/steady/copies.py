@@ -1,6 +1,6 @@
 """Copies of a sample that start a little beside it, and how far they come apart.
 
-Where motion is regular they come together again; where it is chaotic they part until each sees another stretch of the
+Where motion is regular they come together again; where it is chaotic they part until each sees another segment of the
 same motion, and their averages are independent of each other.
 """
 

@@ -1,6 +1,6 @@
-"""What the procedures of steady means share: a design, the stretches of it that are asked for, what was found.
+"""What the procedures of steady means share: a design, the segments of it that are requested, what was found.
 
-Each procedure is a generator: it yields the `Stretch` it wants simulated, is sent its `Outcome`, and returns a `Mean`. So
+Each procedure is a generator: it yields the `Segment` it wants simulated, is sent its `Outcome`, and returns a `Mean`. So
 that thousands of designs share the lanes, and a design's numbers depend on nothing but the design.
 """
 
@@ -38,7 +38,7 @@ class Sample:
     free: bool  # crank: its speed is the last velocity
 
     def speeds(self, outcomes: "list[Outcome]") -> Array | None:
-        """Of a free crank at the ends of stretches, shape (stretches, copies)."""
+        """Of a free crank at the ends of segments, shape (segments, copies)."""
         if not self.free:
             return None
         n = len(self.scale) // 2
@@ -46,7 +46,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Segment:
     """Revolutions of some copies to simulate, the average over all of them.
 
     Parameters of a copy hold how many times stricter than `rtol` its own tolerance is.
@@ -64,10 +64,10 @@ class Mean:
 
     regime: Regime
     limit: float
-    """Half-width of the limits of f, m; NaN where there is no steady mean."""
+    """Half-width of the confidence interval of f, m; NaN where there is no steady mean."""
     outcomes: Outcome
-    """Shape (stretches, copies): what the average is made of."""
-    stretch: int
+    """Shape (segments, copies): what the average is made of."""
+    segment: int
     """Revolutions of each of these."""
     rtol: float
     """The looser of the two tolerances, the other one is `STRICTER` times tighter."""
@@ -76,7 +76,7 @@ class Mean:
     growth: float = np.nan
     """Of a perturbation, per revolution: mean of the logarithm, as far as the look showed."""
     growth_limit: float = np.nan
-    """Half-width of its limits, if it was measured on purpose."""
+    """Half-width of its confidence interval, if it was measured on purpose."""
     attractors: int | None = None
     """Kinds of motion found from several starts, if they were looked for."""
     status: Status = Status.OK
@@ -97,7 +97,7 @@ class Mean:
 
 @dataclass
 class Effort:
-    """What was simulated so far, and how a stretch of it is asked for."""
+    """What was simulated so far, and how a segment of it is requested."""
 
     sample: Sample
     budget: int
@@ -114,11 +114,11 @@ class Effort:
 
     def run(
         self, rtol: float, revolutions: int, start: Start, strictness: Array
-    ) -> Generator[Stretch, Outcome, Outcome]:
-        """A stretch of each of these copies; how many times stricter each one's tolerance is, shape (copies,)."""
+    ) -> Generator[Segment, Outcome, Outcome]:
+        """A segment of each of these copies; how many times stricter each one's tolerance is, shape (copies,)."""
         par = np.repeat(self.sample.par, len(start), axis=0)
         Parameters(par).strictness = strictness**2  # squared, as the kernel keeps it
-        outcome = yield Stretch(rtol, revolutions, par, start)
+        outcome = yield Segment(rtol, revolutions, par, start)
         self.revolutions += revolutions * len(start)
         self.evaluations += float(outcome.evaluations.sum())
         bad = outcome.status[outcome.status != Status.OK]
@@ -134,6 +134,6 @@ class Effort:
         """Some copy did not reach its end."""
         assert self.failed is not None
         return self.mean(
-            regime=Regime.UNJUDGED, limit=np.nan, outcomes=outcome[None], stretch=1, rtol=rtol, met=False,
+            regime=Regime.UNJUDGED, limit=np.nan, outcomes=outcome[None], segment=1, rtol=rtol, met=False,
             status=self.failed,
         )  # fmt: skip

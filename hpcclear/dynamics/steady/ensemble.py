@@ -1,4 +1,4 @@
-"""An irregular motion's mean: perturbed copies at two tolerances, as many revolutions as its limits take."""
+"""An irregular motion's mean: perturbed copies at two tolerances, as many revolutions as its interval needs."""
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ from hpcclear.dynamics.steady.effort import (
     Effort,
     Mean,
     Sample,
-    Stretch,
+    Segment,
 )
 from hpcclear.dynamics.views import Outcome, Start
 
@@ -29,7 +29,7 @@ LOOSEST_LATCHED = 1e-6
 """Likewise with a damping that keeps the impact speed."""
 
 LEVEL = 0.96
-"""Of the limits that are called 95 %: at 0.95 they hold 92 to 93 %, as a mean is looked at until they are narrow enough."""
+"""Of the intervals that are called 95 %: at 0.95 they hold 92 to 93 %, as a mean is looked at until they are narrow enough."""
 
 SHIFT = 2e-3
 """What the looser of these tolerances moves a mean by as a rule, relative."""
@@ -46,26 +46,26 @@ DOUBTED = 3.5
 COPIES = 32
 """Copies of an ensemble at first, every other one at the stricter tolerance."""
 
-STRETCH = 4
+SEGMENT = 4
 """Revolutions between two looks at an ensemble, and those that its peaks are reported for."""
 
 PARTED = 12
 """Revolutions before the first look at an ensemble, from when the perturbations have grown to the size of the motion."""
 
 FIRST = 4, 6
-"""Stretches before it, at least and at most."""
+"""Segments before it, at least and at most."""
 
 MEMORY, LONG_MEMORY = 3.0, 10.0
 """Revolutions over which a start that differs from the steady motion by the scatter of one may still be felt, unseen in what
-copies scatter by; longer with a latched damping or a free crank. On six of nine scenes whose limits had missed the mean,
+copies scatter by; longer with a `latched` damping or a free crank. On six of nine scenes whose intervals had missed the mean,
 means of the first 24 revolutions were off by 1 to 12 of them times that scatter: by memory, or by what weak chaos makes of a
-tolerance. Limits are widened by it as far as the target allows: no revolution is simulated for what cannot be seen."""
+tolerance. Intervals are widened by it as far as the target allows: no revolution is simulated for what cannot be seen."""
 
 LASTING = 40
-"""Stretches before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
+"""Segments before copies on different orbits are taken for what they seem: they may wander on from orbit to orbit."""
 
 APPROACH = 0.85
-"""Revolutions until the next look over those that seem to be needed: limits scatter, and what is too much is not undone."""
+"""Revolutions until the next look over those that seem to be needed: intervals scatter, and what is too much is not undone."""
 
 LEAST = 0.05
 """Revolutions until the next look over those so far, at least: each look is another chance to stop too early."""
@@ -76,14 +76,14 @@ RESTLESS = 4
 
 @dataclass
 class _Copies:
-    """Stretches of all copies so far."""
+    """Segments of all copies so far."""
 
     start: Start
     strictness: Array
     outcomes: list[Outcome] = field(default_factory=list)
 
     def gaps(self) -> Array:
-        """Shape (stretches, copies, 2)."""
+        """Shape (segments, copies, 2)."""
         return np.stack([outcome.mean_gap for outcome in self.outcomes])
 
     def kept(self, seen: "_Interval") -> Outcome:
@@ -95,7 +95,7 @@ class _Copies:
 class _Interval:
     """What an ensemble says at a look: mean of f, its limit and standard error, m; what to do about it."""
 
-    first: int  # stretch that the average begins with
+    first: int  # segment that the average begins with
     pooled: bool  # whether both tolerances count, or the stricter alone
     f: float
     limit: float
@@ -106,7 +106,7 @@ class _Interval:
     moved: float  # by the average, over the latest quarter, m; 0 where it does not drift
     settling: float  # how far it still may move
     copies_count: bool  # more copies help, more revolutions do not
-    short: bool  # too few stretches to see a drift
+    short: bool  # too few segments to see a drift
 
     def half_width(self, most: float) -> float:
         """The limit that is stated, m: with what is unseen as far as that leaves it within `most`; NaN if there is none."""
@@ -121,12 +121,12 @@ class _Interval:
 
 def ensemble(
     effort: Effort, target: float, rtol: float, growth: float
-) -> Generator[Stretch, Outcome, Mean]:
-    """Go on with copies from perturbed starts until the limits of their mean are narrow enough, or the budget is spent."""
+) -> Generator[Segment, Outcome, Mean]:
+    """Simulate perturbed copies until the confidence interval of their mean is narrow enough, or the budget is spent."""
     copies = _new_copies(effort, COPIES)
-    stretches, moved, restless = _first(effort.sample, growth), 0.0, 0
+    segments, moved, restless = _first(effort.sample, growth), 0.0, 0
     while True:
-        yield from _extend(effort, copies, rtol, stretches)
+        yield from _extend(effort, copies, rtol, segments)
         if effort.failed is not None:
             return effort.failure(copies.outcomes[-1], rtol)
         seen = _interval(copies, effort.sample)
@@ -135,7 +135,7 @@ def ensemble(
         if seen.biased(0.25 * level) and rtol / STRICTER >= TIGHTEST and not spent:
             if (yield from _tighten(effort, copies, rtol / STRICTER)):
                 rtol = rtol / STRICTER
-            stretches = 0
+            segments = 0
             continue
         drifting = seen.settling > 0.5 * level
         restless = restless + 1 if drifting and seen.moved > STEADY * moved else 0
@@ -147,23 +147,23 @@ def ensemble(
             regime = Regime.UNSTEADY if unsteady else Regime.SETTLING if drifting else seen.regime
             return effort.mean(
                 regime=regime, limit=np.nan if unsteady else seen.half_width(level if met else np.inf),
-                outcomes=copies.kept(seen), stretch=STRETCH, rtol=rtol, met=bool(met and not unsteady),
+                outcomes=copies.kept(seen), segment=SEGMENT, rtol=rtol, met=bool(met and not unsteady),
                 growth=growth,
             )  # fmt: skip
         if early:
-            stretches = LASTING - len(copies.outcomes)
+            segments = LASTING - len(copies.outcomes)
         elif drifting:
-            stretches = 1 if seen.short else len(copies.outcomes)
+            segments = 1 if seen.short else len(copies.outcomes)
         else:
-            stretches = yield from _more(effort, copies, rtol, seen, level - seen.settling)
+            segments = yield from _more(effort, copies, rtol, seen, level - seen.settling)
 
 
 def _first(sample: Sample, growth: float) -> int:
-    """Stretches before the first look: fewer if perturbations grow fast, unless a speed or a latched damping lasts longer."""
+    """Segments before the first look: fewer if perturbations grow fast, unless a speed or a `latched` damping lasts longer."""
     if sample.free or sample.latched or not growth > 0.0:
         return FIRST[1]
     parting = -np.log(PERTURBATION) / growth
-    return int(np.clip(np.ceil((parting + PARTED) / STRETCH), *FIRST))
+    return int(np.clip(np.ceil((parting + PARTED) / SEGMENT), *FIRST))
 
 
 def _new_copies(effort: Effort, count: int) -> _Copies:
@@ -171,7 +171,7 @@ def _new_copies(effort: Effort, count: int) -> _Copies:
     return _Copies(effort.more_starts(count), strictness)
 
 
-def _tighten(effort: Effort, copies: _Copies, rtol: float) -> Generator[Stretch, Outcome, bool]:
+def _tighten(effort: Effort, copies: _Copies, rtol: float) -> Generator[Segment, Outcome, bool]:
     """Put copies at a tenth of `rtol` in the place of those at the looser tolerance; False if the budget ends before.
 
     What was simulated at the stricter tolerance is kept: it is the looser one now.
@@ -195,10 +195,10 @@ def _woven(first: Array, second: Array) -> Array:
 
 
 def _extend(
-    effort: Effort, copies: _Copies, rtol: float, stretches: int
-) -> Generator[Stretch, Outcome, None]:
-    for _ in range(stretches):
-        outcome = yield from effort.run(rtol, STRETCH, copies.start, copies.strictness)
+    effort: Effort, copies: _Copies, rtol: float, segments: int
+) -> Generator[Segment, Outcome, None]:
+    for _ in range(segments):
+        outcome = yield from effort.run(rtol, SEGMENT, copies.start, copies.strictness)
         copies.outcomes.append(outcome)
         copies.start = outcome.end()
         if effort.failed is not None or effort.revolutions >= effort.budget:
@@ -207,15 +207,15 @@ def _extend(
 
 def _more(
     effort: Effort, copies: _Copies, rtol: float, seen: _Interval, level: float
-) -> Generator[Stretch, Outcome, int]:
-    """Add copies where their orbits differ for good; how many further stretches to ask for."""
+) -> Generator[Segment, Outcome, int]:
+    """Add copies where their orbits differ for good; how many further segments to request."""
     used, total = len(copies.outcomes) - seen.first, len(copies.outcomes)
     missing = min((seen.limit / max(level, 1e-300)) ** 2, 1e6)
     count = len(copies.start)
     left = max(effort.budget - effort.revolutions, 0)
     if seen.copies_count:
         wanted = min(
-            int(count * max(APPROACH * missing - 1.0, LEAST)), 3 * count, left // (STRETCH * total)
+            int(count * max(APPROACH * missing - 1.0, LEAST)), 3 * count, left // (SEGMENT * total)
         )
         wanted = max(wanted - wanted % 2, 2)
         new = _new_copies(effort, wanted)
@@ -223,7 +223,7 @@ def _more(
         if len(new.outcomes) == total:
             _join(copies, new)
         return 0
-    affordable = -(-left // (STRETCH * count))
+    affordable = -(-left // (SEGMENT * count))
     wanted = int(np.ceil(used * max(APPROACH * missing - 1.0, LEAST)))
     return int(np.clip(wanted, 1, min(3 * total, max(affordable, 1))))
 
@@ -241,7 +241,7 @@ def _join(copies: _Copies, new: _Copies) -> None:
 def _interval(copies: _Copies, sample: Sample) -> _Interval:
     speeds = sample.speeds(copies.outcomes)
     gaps = copies.gaps()
-    y = judging.projected(gaps)  # (stretches, copies)
+    y = judging.projected(gaps)  # (segments, copies)
     total = len(y)
     between = y.var(axis=1, ddof=1)
     chance = float(np.median(between[total // 2 :])) / y.shape[1]  # of the mean over copies
@@ -268,7 +268,7 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
     if not pooled:
         limit = float(np.hypot(limit, LEFT * np.sqrt(excess)))
     memory = LONG_MEMORY if sample.latched or sample.free else MEMORY
-    unseen = memory * float(error) * np.sqrt(kept.shape[1] / (STRETCH * len(kept)))
+    unseen = memory * float(error) * np.sqrt(kept.shape[1] / (SEGMENT * len(kept)))
     within = float(kept.var(axis=0, ddof=1).mean()) if len(kept) > 1 else np.nan
     apart = float(kept.mean(axis=0).var(ddof=1))
     coherent = len(kept) >= 3 and float(between[first:].mean()) < 0.3 * float(within)

@@ -12,10 +12,10 @@ from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, response
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import scales
-from hpcclear.dynamics.steady.effort import Mean, Sample, Stretch
+from hpcclear.dynamics.steady.effort import Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.steady.procedure import steady_mean
 from hpcclear.dynamics.views import Outcome, Start
 from hpcclear.scene import Scene
@@ -25,7 +25,7 @@ TURN_SECONDS = 0.02
 """How long one set of lanes works before the next one does."""
 
 
-Procedure = Callable[[Sample], Generator[Stretch, Outcome, Mean]]
+Procedure = Callable[[Sample], Generator[Segment, Outcome, Mean]]
 
 
 def _to_target(scene: Scene) -> Procedure:
@@ -36,24 +36,24 @@ def _to_target(scene: Scene) -> Procedure:
 
 
 class _Ask:
-    """A design's procedure, the stretch it waits for, and what of that has come in."""
+    """A design's procedure, the segment it waits for, and what of that has come in."""
 
-    def __init__(self, sample: int, par: Array, asking: Generator[Stretch, Outcome, Mean]) -> None:
+    def __init__(self, sample: int, par: Array, asking: Generator[Segment, Outcome, Mean]) -> None:
         self.sample = sample
         self.par = par
         self.asking = asking
-        self.stretch = next(asking)
+        self.segment = next(asking)
         self._rows: dict[int, Array] = {}
 
     def take(self, copy: int, row: Array) -> Mean | None:
         """A copy's outcome; the procedure's result if that was the last thing it waited for."""
         self._rows[copy] = row
-        if len(self._rows) < len(self.stretch.start):
+        if len(self._rows) < len(self.segment.start):
             return None
         outcome = Outcome(np.stack([self._rows[k] for k in range(len(self._rows))]))
         self._rows = {}
         try:
-            self.stretch = self.asking.send(outcome)
+            self.segment = self.asking.send(outcome)
         except StopIteration as end:
             mean: Mean = end.value
             return mean
@@ -61,7 +61,7 @@ class _Ask:
 
     @property
     def asks_anew(self) -> bool:
-        """Whether nothing of the stretch it waits for has come in."""
+        """Whether nothing of the segment it waits for has come in."""
         return not self._rows
 
 
@@ -81,7 +81,7 @@ class SteadyEvaluator:
     Raises
     ------
     InputError
-        If the scene asks for what the kernel cannot do.
+        If the scene requires what the kernel cannot do.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class SteadyEvaluator:
         self._responses, self._worn = responses_reported(problem), bool(problem.effects.wear)
 
     def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
-        """The lanes for stretches of this kind."""
+        """The lanes for segments of this kind."""
         if (rtol, revolutions) not in self._sets:
             changes = {
                 "numerics.rtol": rtol,
@@ -138,14 +138,14 @@ class SteadyEvaluator:
         self._queue([self._asks[sample] for sample in numbers])
 
     def _queue(self, asks: "list[_Ask]") -> None:
-        """Hand the stretches that procedures ask for to the lanes."""
+        """Hand the segments that procedures request to the lanes."""
         by_kind: dict[tuple[float, int], list[_Ask]] = {}
         for ask in asks:
-            by_kind.setdefault((ask.stretch.rtol, ask.stretch.revolutions), []).append(ask)
+            by_kind.setdefault((ask.segment.rtol, ask.segment.revolutions), []).append(ask)
         for kind, group in by_kind.items():
             self._lanes_of(*kind).queue(
-                np.concatenate([ask.stretch.par for ask in group]),
-                Start(np.concatenate([ask.stretch.start.rows for ask in group])),
+                np.concatenate([ask.segment.par for ask in group]),
+                Start(np.concatenate([ask.segment.start.rows for ask in group])),
                 np.concatenate([_labels(ask) for ask in group]),
             )
 
@@ -185,14 +185,14 @@ _MOST_COPIES = 1 << 20
 
 
 def _labels(ask: _Ask) -> Integers:
-    return ask.sample * _MOST_COPIES + np.arange(len(ask.stretch.start))
+    return ask.sample * _MOST_COPIES + np.arange(len(ask.segment.start))
 
 
 def record_of(
     sample: int, par: Array, mean: Mean, responses: Sequence[str] = (), worn: bool = False,
     judged: Objective = MEAN_GAP,
 ) -> Records:  # fmt: skip
-    """What was found as a record (1,): means over stretches and copies, of the peaks too unless the motion is regular.
+    """What was found as a record (1,): means over segments and copies, of the peaks too unless the motion is regular.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def record_of(
     record[RATE] = (each[RATE] ** power).mean(axis=0) ** (1.0 / power)
     if judged.made == "peak":
         record[RATE] = each[RATE].max(axis=0)
-    if mean.stretch == 1:
+    if mean.segment == 1:
         record["peak_contact_force"] = each["peak_contact_force"].max(axis=0)
         for name in ("peak_crank_moment", "peak_point_acceleration"):
             record[name] = each[name].max()

@@ -1,18 +1,17 @@
-"""What revolutions of several copies say: periods, whether they have settled, means with limits. Plain arrays, no mechanism."""
+"""Periods, steady state and means with confidence intervals, from revolutions of several copies. Plain arrays, no mechanism."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.revolutions import objective
 
 LEVEL = 0.97
-"""Of the limits that are called 95 %: a mean is looked at several times until its limits are narrow enough, and each look is
-one more chance to stop on limits that are too narrow."""
+"""Of intervals that are called 95 %: a mean is looked at until its interval is narrow enough, and each look is
+one more chance to stop on intervals that are too narrow."""
 
 PARTS = 8
-"""Of a copy's stretches, at most, whose scatter tells that of its mean: each as long as it can be."""
+"""Of a copy's segments, at most, whose scatter gives that of its mean: each as long as it can be."""
 
 APART = 1.5
 """Variance between means of copies over that which their parts explain, from which on it alone counts."""
@@ -25,6 +24,14 @@ SLOWEST = 0.97
 
 DRIFT = 3.5
 """Standard errors of a drift, or of a difference between tolerances, that is no chance."""
+
+
+def objective(gaps: Array) -> Array:
+    """f (eq. 13), m, from mean gaps of all joints, m: shape (..., joints) to (...)."""
+    total: Array = np.hypot(gaps[..., 0], gaps[..., 1])
+    for k in range(2, gaps.shape[-1]):
+        total = np.hypot(total, gaps[..., k])  # by 0 it stays what it is, to the last bit
+    return total
 
 
 @dataclass(frozen=True)
@@ -104,13 +111,13 @@ def speed_settling(speeds: Array, tolerance: float) -> float:
 
 
 def student(values: Array) -> tuple[float, float, float]:
-    """Mean of independent values (n,), its standard error, and the half-width of its limits."""
+    """Mean of independent values (n,), its standard error, and the half-width of its confidence interval."""
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
     return float(np.mean(values)), error, quantile(len(values) - 1, LEVEL) * error
 
 
 def quantile(freedom: float, level: float) -> float:
-    """Of Student's distribution with so many degrees of freedom: half-width of limits over the standard error."""
+    """Of Student's distribution with so many degrees of freedom: half-width of an interval over the standard error."""
     # here, as it is loaded for a quarter of a second that a first result need not wait
     from scipy.special import stdtrit
 
@@ -120,14 +127,14 @@ def quantile(freedom: float, level: float) -> float:
 def variance_of_mean(groups: list[Array]) -> tuple[float, float]:
     """Variance of the mean over time of one copy, and its degrees of freedom.
 
-    Copies are independent of each other: how their means differ needs no model of how stretches depend on one another. Parts of
+    Copies are independent of each other: how their means differ needs no model of how segments depend on one another. Parts of
     them say the same with more degrees of freedom where only neighbours depend on each other: variance of a part and twice
     the covariance of two. Both count by their degrees of freedom; where copies differ by more than parts explain, they alone.
 
     Parameters
     ----------
-    groups : list of ndarray, shape (stretches, copies)
-        Of copies that share a mean; all of as many stretches.
+    groups : list of ndarray, shape (segments, copies)
+        Of copies that share a mean; all of as many segments.
     """
     off = np.concatenate([group - group.mean() for group in groups], axis=1)
     n, copies = off.shape
@@ -154,7 +161,7 @@ def projected(gaps: Array) -> Array:
 
 
 def spin_up(series: Array, noise: float = 0.0) -> int:
-    """Values at the start of a series (n,) to leave out, at most half of them: those that widen the limits of its mean.
+    """Values at the start of a series (n,) to leave out, at most half: those that widen the confidence interval of its mean.
 
     MSER: the cut that makes the standard error of what is left least (White 1997, doi:10.1177/003754979706900601); the
     first that makes it nearly so, since in noise the least is anywhere. No cut makes the scatter of what is left less than
@@ -166,7 +173,7 @@ def spin_up(series: Array, noise: float = 0.0) -> int:
 
 
 def parted(between: Array) -> int:
-    """First of the stretches from which on copies are as far apart as they get: variances between copies (n,) to an index."""
+    """First of the segments from which on copies are as far apart as they get: variances between copies (n,) to an index."""
     lasting = np.median(between[len(between) // 2 :])
     return int(np.argmax(between >= 0.3 * lasting))
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import effort as given
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import PERTURBATION, perturbed, separation
-from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Outcome, Start
 
 SHARE = 0.1
@@ -33,7 +33,7 @@ PATIENCE = 16
 
 SWINGS = 2.0
 """What an average may still be off by, over the larger of its two latest movements: an approach that swings, or slows down
-as a slower one takes over, comes to a rest for a quarter and goes on. Limits that knew the last movement alone missed by
+as a slower one takes over, comes to a rest for a quarter and goes on. Intervals from the last movement alone missed by
 up to nine times their width."""
 
 TOLERANCES = 10.0
@@ -42,7 +42,7 @@ TOLERANCES = 10.0
 ORBITS, COARSE = 6e-3, 3e-3
 """Likewise, relative, with a damping that keeps the impact speed, where the target is no stricter than the second: at the
 tolerances that serve it all copies may be caught by one orbit of several. Of 40 such scenes four had means that were off by
-0.1 to 0.6 % so. As with irregular motions, what is unseen widens stated limits as far as the target allows and buys no
+0.1 to 0.6 % so. As with irregular motions, what is unseen widens stated intervals as far as the target allows and buys no
 revolution."""
 
 
@@ -78,7 +78,7 @@ def _growth(apart: list[float]) -> float:
         return float(np.log(distance[far] / distance[0]) / far)
 
 
-def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mean | float, float]]:
+def look(effort: Effort, target: float) -> Generator[Segment, Outcome, tuple[Mean | float, float]]:
     """Four copies, revolution by revolution: a regular motion's mean, or the tolerance at which it turned out irregular."""
     sample = effort.sample
     rtol = min((SHARE_LATCHED if sample.latched else SHARE) * target, LOOSEST)
@@ -102,7 +102,7 @@ def look(effort: Effort, target: float) -> Generator[Stretch, Outcome, tuple[Mea
         step = _judge(history, sample, target, rtol)
         if isinstance(step, _Found) and (step.final or spent):
             return effort.mean(
-                regime=step.regime, limit=step.limit, outcomes=step.outcomes, stretch=1, rtol=rtol,
+                regime=step.regime, limit=step.limit, outcomes=step.outcomes, segment=1, rtol=rtol,
                 met=step.met, period=step.period, growth=growth,
             ), growth  # fmt: skip
         if step == "irregular" or spent:

@@ -6,10 +6,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
-from hpcclear.dynamics.revolutions import objective
 from hpcclear.dynamics.steady import judging
 from hpcclear.dynamics.steady.copies import LENGTH, perturbed
-from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.dynamics.views import Outcome, Parameters, Start
 
 RTOL = 1e-8
@@ -40,7 +40,7 @@ REPEATS = 1e-5
 """Relative difference of f between two revolutions of a periodic motion that are a period apart."""
 
 
-def mapped(sample: Sample, sure: float = SURE) -> Generator[Stretch, Outcome, Mean]:
+def mapped(sample: Sample, sure: float = SURE) -> Generator[Segment, Outcome, Mean]:
     """Judge the motion of one cell.
 
     The other starts end with the first look at the exponent: by then they show where they end.
@@ -125,7 +125,7 @@ def _set_back(start: Start, shadow: Start, scale: Array) -> tuple[Array, Start]:
 
 
 def _exponent(logs: Array) -> tuple[float, float]:
-    """Mean and half-width of its limits, of logarithms (revolutions, copies): copies times four stretches of revolutions."""
+    """Mean and half-width of its confidence interval, of logarithms (revolutions, copies) in four segments of each copy."""
     pieces = np.concatenate([piece.mean(axis=0) for piece in np.array_split(logs, 4)])
     mean, _, limit = judging.student(pieces)
     return mean, limit
@@ -152,7 +152,7 @@ def _judged(
     kinds = _kinds(every, doubts, mean)
     kept = Outcome(np.stack([outcome.rows for outcome in outcomes]))
     return effort.mean(
-        regime=regime, limit=limit, outcomes=kept, stretch=1, rtol=RTOL, met=True, period=period, growth=growth,
+        regime=regime, limit=limit, outcomes=kept, segment=1, rtol=RTOL, met=True, period=period, growth=growth,
         growth_limit=growth_limit, attractors=kinds,
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 
-from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Stretch
+from hpcclear.dynamics.steady.effort import Effort, Mean, Sample, Segment
 from hpcclear.dynamics.steady.ensemble import LOOSEST, LOOSEST_LATCHED, ensemble
 from hpcclear.dynamics.steady.look import look
 from hpcclear.dynamics.views import Outcome, Parameters
@@ -12,15 +12,15 @@ USUAL = 1e-4
 off by 1 %, more than their difference from 1e-5."""
 
 
-def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Stretch, Outcome, Mean]:
-    """Find the steady mean of a design to a relative error, 95 % limits, or say that it is missed or does not exist.
+def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Segment, Outcome, Mean]:
+    """Find the steady mean of a design to a relative error (95 % CI), or report that it is missed or does not exist.
 
     Parameters
     ----------
     sample : Sample
     target : float
     budget : int
-        Revolutions of all copies together, at most (a stretch that is under way is finished).
+        Revolutions of all copies together, at most (a segment that is under way is finished).
 
     Returns
     -------

@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Booleans, Records
 from hpcclear.base.outcome import Flag, Regime, Status
-from hpcclear.dynamics.revolutions import objective
+from hpcclear.dynamics.steady.judging import objective
 from hpcclear.scene import Scene
 
 NAMED = 8
@@ -34,7 +34,7 @@ def why_missed(record: Any, target: float | None) -> str:
 
 
 def in_a_line(record: Any, seconds: float | None = None) -> str:
-    """f of one record, or of a dataset of it, with its limits: "3.36 +- 0.03 um (chaotic, 6200 revolutions, 1.9 s)"."""
+    """f of one record, or of a dataset of it, with its half-width: "3.36 +- 0.03 um (chaotic, 6200 revolutions, 1.9 s)"."""
     f = float(objective(np.asarray(record["mean_gap"]))) * 1e6
     limit = float(record["objective_limit"]) * 1e6
     regime, period = Regime(int(record["regime"])), float(record["period"])
@@ -86,7 +86,7 @@ def recorded(scene: Scene, records: Records) -> dict[str, str]:
 
 
 def in_short(scene: Scene, records: Records) -> str:
-    """What a trial came to: share of samples that met their target, their limits, share that is chaotic; else ""."""
+    """What a trial came to: share of samples that met their target, their intervals, share that is chaotic; else ""."""
     if scene.numerics.target_error is None or not scene.clearance_joints():
         return ""
     good = records[records["status"] == Status.OK]

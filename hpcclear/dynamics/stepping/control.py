@@ -1,7 +1,7 @@
 """Step-size control, acceptance and commit of a step over all lanes, without branches in the lane loop.
 
 Proportional-integral control after Gustafsson 1991 (doi:10.1145/210232.210242) with the exponents of Hairer, Norsett
-and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair at hand.
+and Wanner's DOPRI5 (Solving ODEs I, II.4), scaled to the order of the pair available.
 """
 
 import math
@@ -32,7 +32,7 @@ def count_up(count, flag):
 
 @lane_function
 def choose_step(work, par, free, W):
-    """Take the step asked for, or what is left of the revolution (prescribed speed)."""
+    """Take the step requested, or what is left of the revolution (prescribed speed)."""
     if free:
         for i in range(W):
             work[at.STEP * W + i] = work[at.NEXT_STEP * W + i]

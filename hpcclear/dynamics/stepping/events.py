@@ -37,7 +37,7 @@ def interior_peak(d0, m0, d1, m1):
 def root(d0, m0, d1, m1, end):
     """Where the cubic changes sign between 0 and `end`: Halley's iteration from the chord on, kept inside a shrinking bracket.
 
-    With derivatives f1, f2 and f3 a change e leaves an error of some ((f2/2f1)**2 + |f3/6f1|) e**3, which tells whether
+    With derivatives f1, f2 and f3 a change e leaves an error of some ((f2/2f1)**2 + |f3/6f1|) e**3, which shows whether
     another would matter.
     """
     low, high = 0.0, end

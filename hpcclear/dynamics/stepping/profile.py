@@ -98,7 +98,7 @@ SIGNATURE = types.void(_NUMBERS, _NUMBERS)
 @cache
 def profile_code(effects: at.Effects, W: int) -> Any:
     """The compiled `profiles` of these effects for W lanes; its ``address`` is what steppers take, as that of a motion."""
-    places = tuple(k for k, flag in enumerate(at.open_of(effects)) if flag is not None)
+    places = tuple(at.places_of(effects))
     counts = {"bearing": effects.bearing_waves or 0, "journal": effects.journal_waves or 0}
     text = one_text(profiles, f"profiles_{W}", places=places, W=W, **counts)
     return c_function(SIGNATURE, text, fastmath=FASTMATH)

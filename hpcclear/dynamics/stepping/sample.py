@@ -128,7 +128,7 @@ def finish(lane, W, n, status, block, queue, settings):
 
 @lane_event
 def finish_averages(lane, W, work, book, out, slot, settings):
-    """Means, peak and deviation over the averaged revolutions; those of rates that no effect asked for mean nothing."""
+    """Means, peak, standard deviation over the averaged revolutions; meaningless for rates that no effect requested."""
     time = book[at.TIME_SUM * W + lane]
     if time > 0.0:
         for r in range(RATES + int(settings[PROFILED])):
@@ -178,7 +178,7 @@ def book_objective(lane, W, book, f):
 
 @lane_event
 def book_averages(lane, W, work, book, time, settings):
-    """Add a revolution to the books of the averaged ones."""
+    """Add a revolution to the sums of the averaged ones."""
     for r in range(RATES + int(settings[PROFILED])):
         integral = work[(at.INTEGRAL + at.INTEGRATED_RATES[r]) * W + lane]
         book[(at.AVERAGED + r) * W + lane] += integral
@@ -196,7 +196,7 @@ def book_averages(lane, W, work, book, time, settings):
 
 @lane_event
 def end_revolution(lane, W, work, book, settings):
-    """Close the books of a revolution; the status of the sample when it was the last one, else UNFINISHED."""
+    """Complete the sums of a revolution; the status of the sample when it was the last one, else UNFINISHED."""
     time = work[at.TIME * W + lane]
     book[at.ELAPSED * W + lane] += time
     revolution = book[at.REVOLUTION * W + lane] + 1.0

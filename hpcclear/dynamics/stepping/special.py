@@ -36,7 +36,7 @@ from hpcclear.dynamics.stepping.stops import (
 )
 
 NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION, END_OF_SAMPLE = range(4)
-"""What may be asked; the status of a sample that ends stands in `FOUND`."""
+"""What may be requested; the status of a sample that ends stands in `FOUND`."""
 
 
 @scalar_function
@@ -67,7 +67,7 @@ def end_of_step(rules, lane, W, n, block, settings):
 
 @scalar_function
 def answer(numbers, rules, block, queue, settings):
-    """Do what is asked for of one lane; by how much the number of running lanes changes is left in `FOUND`."""
+    """Do what is requested of one lane; by how much the number of running lanes changes is left in `FOUND`."""
     asked, lane, W, n = numbers[ASKED], numbers[LANE], numbers[WIDTH], numbers[COORDINATES]
     ends = True
     status = UNFINISHED

@@ -31,7 +31,7 @@ LONG_AT_REST = 1e3
 def meet_impact(lane, W, work, settings, p):
     """Where in this step joint p, in flight, strikes, as a fraction; 2 if it does not or is in contact, 1 if at the end.
 
-    At the start of the step the contact is latched here.
+    At the start of the step the contact is `latched` here.
     """
     if work[(at.ACTIVE + p) * W + lane] == 1.0:
         return 2.0
@@ -90,7 +90,7 @@ def stop_at_impacts(rules, lane, W, work, settings):
 
 @lane_event
 def cut(lane, W, work, fraction):
-    """Reject the step and ask for a part of it; all of it where an impact stands at its start."""
+    """Reject the step and request a part of it; all of it where an impact stands at its start."""
     h = work[at.STEP * W + lane]
     work[at.ACCEPT * W + lane] = 0.0
     work[at.NEXT_STEP * W + lane] = fraction * h if fraction > 0.0 else h

@@ -1,16 +1,16 @@
 """One life: dynamics at a state of wear, a jump of many revolutions at the rate found there, dynamics again.
 
 The state is the sliding work that each worn joint has done, w; a revolution adds E(w) to it, which copies of a
-simulation tell with Student's limits. A jump of n revolutions is taken twice: at once, w + n E(w), and in two halves, w + n/2
-E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). What is gone on from is twice the one less the other, w + n E_half,
-whose error is an order smaller, so the difference is a bound and no estimate of it. f is judged at the same states:
-how far it is, half-way, from the middle between both ends. What limits of E and f leave open is not held against a jump.
+simulation estimate with Student's intervals. A jump of n revolutions is taken twice: at once, w + n E(w), and in two halves,
+w + n/2 E(w) + n/2 E(w + n/2 E(w)). They differ by n/2 (E_half - E). The next state is twice the one less the other,
+w + n E_half, whose error is an order smaller, so the difference bounds it. f is judged at the same states:
+how far it is, half-way, from the middle between both ends. What the intervals of E and f leave open is not held against a jump.
 
 Where profiles are followed (`relief`), the moments of the work go with it: of what is done in a jump they have the share
 found at its start, or half-way.
 
 Copies of odd number wait longer before they are measured. Where they differ from the others by more than both scatter, the
-transient is not over: their difference widens the limits, and is reported.
+transient is not over: their difference widens the intervals, and is reported.
 """
 
 import math
@@ -51,12 +51,12 @@ class Plan:
     """Revolutions of a jump, at least."""
     copies: int
     most_copies: int
-    """copies and most_copies: simulations at a state of wear: at first, and where limits are wider than the tolerance
+    """copies and most_copies: simulations at a state of wear: at first, and where intervals are wider than the tolerance
     allows."""
     limits: Mapping[str, float] = field(default_factory=dict)
     """What ends a life, by name as of `curves.first_passed`, SI."""
     beyond: bool = False
-    """Whether lives go on past their limits; none goes on once a bearing is worn through."""
+    """Whether lives go on past their thresholds; none goes on once a bearing is worn through."""
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ def _placed(half: Node, here: Node, end: Node, joints: Joints) -> Node:
 def _look(
     found: Life, joints: Joints, plan: Plan, relief: Relief, state: State, length: float | None
 ) -> Generator[Asked, Seen, Node]:
-    """Simulate a state of wear until its limits are within what a jump of that length may be off, or copies run out.
+    """Simulate a state of wear until its intervals are within what a jump of that length may be off, or copies run out.
 
     `state`: revolutions, work done and its moments.
     """
@@ -316,8 +316,8 @@ def _node(state: State, seen: list[Seen]) -> Node:
 
 
 def _drift(values: Array) -> Array:
-    """By how much means of copies (copies, n) that waited longer, those of odd number, and of the others differ beyond 95 %
-    limits of their scatter, (n,); 0 of fewer than two each, whose scatter is not known."""
+    """By how much means of copies (copies, n) that waited longer, those of odd number, and of the others differ beyond the 95 %
+    intervals of their scatter, (n,); 0 of fewer than two each, whose scatter is not known."""
     groups = values[0::2], values[1::2]
     sizes = [len(one) for one in groups]
     if min(sizes) < 2:

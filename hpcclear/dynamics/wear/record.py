@@ -11,7 +11,7 @@ from hpcclear.base.outcome import Status
 
 @dataclass(frozen=True)
 class Node:
-    """What is known at a state of wear; limits are 95 % half-widths.
+    """What is known at a state of wear; `limit` is a 95 % half-width.
 
     `work`: done so far (joints,), J; `rate`: added in a revolution, J; `peak`: mean of the copies' peak forces of every
     joint of the scene, N; `drift`: difference beyond scatter between copies that waited longer and the others, of the
@@ -37,7 +37,7 @@ class Life:
     """A life as far as it went: states at the ends of jumps, those half-way, and how it ended.
 
     `ended`: revolutions; the last jump may go beyond. `reason`: the limit that ended it, as of `curves.first_passed`, "" of
-    none. `limit`: 95 % half-width (joints,) of the clearance at the end for what the limits of the rates leave open, m;
+    none. `limit`: 95 % half-width (joints,) of the clearance at the end for what the intervals of the rates leave open, m;
     `error`: sum over jumps (joints,) of what two half jumps and one differ by, by the greater change of the rate in either
     half, m; `drift`: the largest of any rate or f at any state; `sharpest`: as of `Relief`, likewise.
     """

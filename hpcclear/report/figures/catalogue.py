@@ -9,8 +9,11 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import (
     accuracy,
+    curves,
     designs,
     effects,
+    guides,
+    identified,
     maps,
     motion,
     portraits,
@@ -36,6 +39,8 @@ class Entry(NamedTuple):
     """Of the file."""
     draw: "Callable[[xr.Dataset], Figure]"
     caption: str
+    along: str = "time"
+    """A dimension that the file must have; any file of a response has instants."""
 
 
 def section_figure(found: xr.Dataset) -> "Figure":
@@ -71,33 +76,33 @@ RESULTS: tuple[Entry, ...] = (
         "sensitivities",
         "sensitivity",
         surrogates.sensitivity_figure,
-        "Sensitivities against clearance: lines with bands over the whole interval, marks with bars where they "
-        "stopped changing; two standard errors.",
+        "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: "
+        "from the ranges at which they converged.",
     ),
     Entry(
         "sobol",
         "sensitivity",
         surrogates.sobol_figure,
-        "Global sensitivities: first-order Sobol indices (a variable by itself) and total ones (with interactions, "
-        "so that their sum may exceed 1), with two standard errors.",
+        "Global sensitivities with two standard errors: first-order Sobol indices (each variable alone) and total "
+        "indices (with interactions; their sum may exceed 1).",
     ),
     Entry(
         "surface-fit",
         "sensitivity",
         surrogates.fit_figure,
-        "Fit of the response surfaces on test points, against clearance and length of the interval.",
+        "Fit of the response surfaces on test points, against clearance and length of the ranges.",
     ),
     Entry(
         "surrogates",
         "kriging",
         surrogates.surfaces_figure,
-        "Objective over pairs of design variables at the least and the largest clearance, by Kriging.",
+        "Objective by Kriging over pairs of design variables, at the smallest and the largest clearance.",
     ),
     Entry(
         "parity",
         "kriging",
         surrogates.parity_figure,
-        "Surrogate against simulation: each point predicted without itself; R² on test points.",
+        "Surrogate against simulation: leave-one-out predictions; R² on test points.",
     ),
     Entry(
         "wear",
@@ -115,7 +120,25 @@ RESULTS: tuple[Entry, ...] = (
         "wear-profile",
         "wear",
         wear.profile_figure,
-        "Depth of wear around bearings and journals by the angle in their bodies, at several ages: medians over all runs.",
+        "Depth of wear around bearings and journals, at several ages (medians over all runs).",
+    ),
+    Entry(
+        "posterior",
+        "identify",
+        identified.posterior_figure,
+        "Posterior of each unknown with its calibrated 95 % interval.",
+    ),
+    Entry(
+        "features",
+        "identify",
+        identified.features_figure,
+        "Measured less predicted features of the last record, in standard deviations of the prediction.",
+    ),
+    Entry(
+        "growth",
+        "identify",
+        identified.growth_figure,
+        "Unknowns over the dates of the records, with 95 % intervals and the median rate.",
     ),
     Entry("timing", "timing", timing.timing_figure, "Time of the ranks, by rank and by stage."),
 )
@@ -132,10 +155,12 @@ RESPONSE: tuple[Entry, ...] = (
         "contact force by its direction",
     ),
     Entry("penetration", "response", response.penetration_figure, "penetration"),
+    Entry("guide", "response", guides.guide_figure, "offset, tilt and contacts in guides", "guide"),
     Entry("phase", "response", portraits.phase_figure, "phase portraits"),
     Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
     Entry("spectrum", "response", response.spectrum_figure, "spectra"),
     Entry("energy", "response", response.energy_figure, "energy balance"),
+    Entry("tables", "response", curves.tables_figure, "tables of the scene, as they are simulated"),
 )
 """Of a response, beside `response_figure`."""
 
@@ -166,5 +191,7 @@ def drawings(
     if responses:
         one = responses.get("original", next(iter(responses.values())))
         made["response"] = partial(response.response_figure, one)
-        made |= {entry.name: partial(entry.draw, one) for entry in RESPONSE}
+        made |= {
+            entry.name: partial(entry.draw, one) for entry in RESPONSE if entry.along in one.dims
+        }
     return made

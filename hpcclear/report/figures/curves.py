@@ -3,9 +3,12 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import xarray as xr
 
+from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.scene import Scene
+from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.planar import Planar, turns_of
 
 if TYPE_CHECKING:
@@ -48,6 +51,19 @@ def tabulated(scene: Scene) -> list[Tabulated]:
         for key, rows, unit in entries
         if isinstance(rows, tuple)
     ]
+
+
+@style.drawn
+def tables_figure(found: xr.Dataset) -> "Figure":
+    """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
+    tables = tabulated(scene_of_text(str(found.attrs["scene"]), "scene"))
+    if not tables:
+        reason = "nothing in the scene is given by a table"
+        raise InputError("scene", "tables", reason, "Draw another figure")
+    figure = style.page(HEIGHT * len(tables))
+    figure.set_layout_engine("none")
+    draw(figure, tables, 1.0, 1.0 / len(tables))
+    return figure
 
 
 def draw(figure: "Figure", curves: list[Tabulated], top: float, height: float) -> None:

@@ -258,7 +258,7 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
     entries: dict[str, Any] = {}
     for panel in axes[0]:
         entries |= {w: h for h, w in zip(*panel.get_legend_handles_labels(), strict=True)}
-    texts = [labels.literal(text) for text in entries]
+    texts = [labels.literal("baseline" if text == "original" else text) for text in entries]
     where: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "columnspacing": 1.0}
     figure.legend(list(entries.values()), texts, **where)
     style.settle(axes, 4)

@@ -54,13 +54,9 @@ def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> s
     one = content.isel(variant=variant)
     share = saving(content, variant, seconds)
     change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
-    text = f"{label(named(content, variant))} changes f by {change.replace(' ± ', ' % ± ')}"
-    cost = (
-        f"disabling it saves {100 * share:.0f} %"
-        if share >= 0.005
-        else "disabling it saves nothing"
-    )
-    return f"{text}: {cost}{_verdict(one, float(content.attrs['tolerance']))}."
+    text = f"Without {label(named(content, variant))} f changes by {change.replace(' ± ', ' % ± ')}"
+    saved = f"{100 * share:.0f} %" if share >= 0.005 else "none"
+    return f"{text}, run time saved: {saved}{_verdict(one, float(content.attrs['tolerance']))}."
 
 
 def _verdict(one: xr.Dataset, tolerance: float) -> str:
@@ -70,6 +66,7 @@ def _verdict(one: xr.Dataset, tolerance: float) -> str:
         return ""
     if int(one["decision"]) == 1:
         worst = one["response"].to_numpy()[counted & (found == 1)][0]
+        worst = "standard deviation" if worst == "deviation" else worst
         return "; needed" if found[0] == 1 else f"; needed for the {worst}"
     open_ = counted & (found == 2)
     room = tolerance - np.abs(one["change"].to_numpy()[open_])

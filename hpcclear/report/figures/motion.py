@@ -103,6 +103,20 @@ def joints(response: xr.Dataset) -> dict[str, str]:
     return {label: JOINT_NAMES.get(label, label) for label in labels}
 
 
+def pins(response: xr.Dataset) -> list[str]:
+    """Labels of the joints of a response that are no corners of sliders in guides."""
+    return [str(label) for label in response["joint"].to_numpy() if "." not in str(label)]
+
+
+def of_pins(response: xr.Dataset) -> xr.Dataset:
+    """A response without the corners of sliders in guides; raises InputError where no other joint is left."""
+    if not pins(response):
+        raise InputError(
+            "joint", "", "no pin of this mechanism has clearance", "Draw the figure named guide"
+        )
+    return response.sel(joint=pins(response))
+
+
 def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
     """What responses are compared by: variable, joint or "", words."""
     named = enumerate(joints(response).items(), 1)
@@ -149,9 +163,16 @@ def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
 
 
 def clearances(response: xr.Dataset) -> Array:
-    """Radial clearance of each joint, m, shape (joints,); NaN where there is none, or where it was never reached.
+    """Radial clearance of each pin, m, shape (joints,); NaN where there is none, or where it was never reached."""
+    found = reaches(response)
+    found[~np.isin(response["joint"].to_numpy(), pins(response))] = np.nan
+    return found
 
-    Penetration is |e| - c, so the clearance follows from contact.
+
+def reaches(response: xr.Dataset) -> Array:
+    """Eccentricity |e| at which each joint touches, m, shape (joints,); NaN where it never did.
+
+    Penetration is |e| less that, so it follows from contact: the radial clearance of a pin.
     """
     reach = eccentricity(response)
     depth = response["penetration"].to_numpy()
@@ -185,7 +206,7 @@ def objective_by_turn(response: xr.Dataset) -> Array:
     time, angle = response["time"].to_numpy(), turns(response)
     first, last = _passages(response)
     borders = np.arange(first, last + 1)
-    gap = np.abs(eccentricity(response) - clearances(response))
+    gap = np.abs(eccentricity(response) - reaches(response))
     squares = np.zeros(max(len(borders) - 1, 0))
     at = np.interp(borders, angle, time)
     for joint in range(gap.shape[1]):

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import JOINTS
 from hpcclear.report.figures import motion
 
 Drawn = tuple[list[list[int]], Array, Array]
@@ -31,16 +32,26 @@ def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
     rod = np.column_stack([shown["rod_x"].to_numpy(), shown["rod_y"].to_numpy()])
     phi, theta = shown["crank_angle"].to_numpy(), shown["rod_angle"].to_numpy()
     crank, along = (np.column_stack([np.cos(a), np.sin(a)]) for a in (phi, theta))
+    names = [str(label) for label in shown["joint"].to_numpy()]
+    near_pin, far_pin = (
+        e[:, names.index(name)] if name in names else np.zeros_like(rod) for name in JOINTS
+    )
     # crank length * crank = rod - u2 * along + e12
     both = np.column_stack([crank.ravel(), along.ravel()])
-    pin = float(np.linalg.lstsq(both, (rod + e[:, 0]).ravel(), rcond=None)[0][0]) * crank
-    far = rod + e[:, 1]  # from here along the rod to the slider's pin, which stays at one height
+    pin = float(np.linalg.lstsq(both, (rod + near_pin).ravel(), rcond=None)[0][0]) * crank
+    far = (
+        rod + far_pin
+    )  # from here along the rod to the slider's pin, which stays at one height but for clearance
     slides = shown["slider_position"].to_numpy()
     length = float((slides - far[:, 0]) @ along[:, 0] / (along[:, 0] @ along[:, 0]))
-    height = float(np.mean(far[:, 1] + length * along[:, 1]))
-    slider = np.column_stack([slides, np.full(len(pin), height)])
-    points = np.stack([np.zeros_like(pin), pin, pin - e[:, 0], slider - e[:, 1], slider], axis=1)
-    return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, np.zeros_like(phi)])
+    aside, tilt = (
+        shown[name].to_numpy()[:, 0] if name in shown else np.zeros_like(phi)
+        for name in ("guide_offset", "guide_tilt")
+    )
+    height = float(np.mean(far[:, 1] + length * along[:, 1] - aside))
+    slider = np.column_stack([slides, height + aside])
+    points = np.stack([np.zeros_like(pin), pin, pin - near_pin, slider - far_pin, slider], axis=1)
+    return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, tilt])
 
 
 def _linkage(shown: xr.Dataset) -> Drawn:

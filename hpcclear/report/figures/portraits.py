@@ -27,7 +27,7 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
     revolutions : int, optional
         The last ones are drawn; half of all by default.
     """
-    shown = motion.steady(response, revolutions)
+    shown = motion.of_pins(motion.steady(response, revolutions))
     joints = motion.joints(shown)
     figure, axes = style.grid(len(joints), 1, 85.0 * len(joints))
     unit = labels.scale("m", motion.eccentricity(shown))

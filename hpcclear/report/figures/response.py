@@ -46,7 +46,7 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
     names = [name for name in every if name in shown]
     figure, axes = style.grid(len(names), 1, 28.0 * len(names), sharex=True)
     for panel, name in zip(axes[:, 0], names, strict=True):
-        word = name.replace("_", "\n")
+        word = "torque of\nthe drive" if name == "crank_moment" else name.replace("_", "\n")
         unit = labels.of(shown[name])
         if "joint" in shown[name].dims:
             _joints(panel, shown, name, unit)

@@ -161,6 +161,9 @@ def _table(
         row: list[object] = [words]
         for scale, (variable, _) in zip(scales, known, strict=True):
             text = number(float(variable[k]) * scale.factor)
+            if variable.attrs.get("options") and np.isfinite(variable[k]):
+                row.append(labels.value(variable[k]))
+                continue
             row.append(Number(text + _half_width(chosen.isel(design=k), str(variable.name), scale)))
         rows.append([*row, *_goals(chosen.isel(design=k), asked)])
     return Table(header, rows, caption)

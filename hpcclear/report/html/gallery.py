@@ -76,10 +76,12 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
             yield "responses of the designs", functools.partial(_comparison, shown)
     if found:
         name = "original" if "original" in found else next(iter(found))
+        of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
         if len(found) == 1:
-            yield f"{name}: response", lambda: _response_alone(name, found[name])
+            yield "response", lambda: _response_alone(found[name])
         for one in catalogue.RESPONSE:
-            yield from _of_file(one.draw, found[name], f"{name}: {one.caption}.")
+            caption = of + one.caption
+            yield from _of_file(one.draw, found[name], f"{caption[0].upper()}{caption[1:]}.")
 
 
 def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
@@ -87,8 +89,8 @@ def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
     return _shown(designs.comparison_figure(found), caption)
 
 
-def _response_alone(name: str, found: xr.Dataset) -> dict[str, str]:
-    caption = f"{name}: response, two revolutions{_clearances(found)}."
+def _response_alone(found: xr.Dataset) -> dict[str, str]:
+    caption = f"Response over two revolutions{_clearances(found)}."
     return _shown(response.response_figure(found), caption)
 
 

@@ -11,7 +11,7 @@ from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.host import time_limit
 
 LONGEST = 25.0
-"""Seconds that a part may take: an honest one takes less than one, also of millions of samples some."""
+"""Seconds of processor time that a part may take: an honest one takes less than one, also of millions of samples some."""
 
 Made = TypeVar("Made")
 
@@ -32,7 +32,7 @@ def attempt(what: str, make: Callable[[], Made], troubles: list[str]) -> Made | 
     except OSError as error:
         if not isinstance(error, TimeoutError):
             raise
-        reason = f"it takes longer than {LONGEST:g} s"
+        reason = f"it takes longer than {LONGEST:g} s of processor time"
     except Exception as error:  # noqa: BLE001 - whatever strange numbers do, one panel must not cost the page
         reason = f"{type(error).__name__}: {error}"[:200]
     troubles.append(f"{what} was left out: the content cannot be shown ({reason}).")

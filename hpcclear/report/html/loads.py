@@ -1,10 +1,13 @@
 """The page's section on the loads of the bearings: the numbers and remarks that the terminal prints after `simulate`."""
 
+from collections.abc import Sequence
+
 import xarray as xr
 
 from hpcclear.base.outcome import Status
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels
+from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, quantity
 
@@ -37,7 +40,7 @@ def loads(content: Content) -> list[object] | None:
     if valid:
         header = ["response", "largest torque", "mean torque", "objective f", "contact model"]
         rows = [_whole(name, one) for name, one in valid.items()]
-        parts.append(Table(header, rows, "Drive, objective, and validity of the contact model"))
+        parts.append(_table(header, rows, "Drive, objective, and validity of the contact model"))
     for name, one in content.responses.items():
         status = Status(int(one["status"]))
         if not status.valid:
@@ -52,10 +55,12 @@ def _remarks(content: Content) -> list[str]:
         for remark in bearings.remarks(one):
             found.setdefault(remark, []).append(name)
     every = len(content.responses)
-    return [
-        f"{label} ({'all responses' if 1 < len(names) == every else ', '.join(names)}): {text}."
-        for (label, text), names in found.items()
-    ]
+
+    def of(names: list[str]) -> str:
+        where = "all responses" if len(names) == every else ", ".join(map(_title, names))
+        return f" ({where})" if every > 1 else ""
+
+    return [f"{label}{of(names)}: {text}." for (label, text), names in found.items()]
 
 
 def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
@@ -70,12 +75,25 @@ def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
         for one in each
     ]
     header += [title for title, _ in pressed]
-    return Table(header, rows, "Bearings, over the averaged revolutions")
+    return _table(header, rows, "Bearings, over the averaged revolutions")
+
+
+def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: str) -> Table:
+    """A table of responses; a single response is not named."""
+    first = 0 if len({row[0] for row in rows}) > 1 else 1
+    return Table(header[first:], [row[first:] for row in rows], caption)
+
+
+def _title(name: str) -> str:
+    """A response by the name of its design."""
+    return "baseline" if name == "original" else name
 
 
 def _row(name: str, one: bearings.Bearing) -> list[object]:
+    short = JOINT_NAMES.get(one.joint)
+    joint = f"{one.joint} ({short})" if short else one.joint
     return [
-        name, one.joint, quantity(one.peak, "N"), Number(bearings.degrees(one)), quantity(one.mean, "N"),
+        _title(name), joint, quantity(one.peak, "N"), Number(bearings.degrees(one)), quantity(one.mean, "N"),
         Number(bearings.share(one.contact)), quantity(one.gap, "m"),
     ]  # fmt: skip
 
@@ -86,4 +104,10 @@ def _whole(name: str, found: xr.Dataset) -> list[object]:
     f, unit = float(found["objective"]), str(found["objective"].attrs["units"])
     shown = labels.with_half_width(f, float(half_width), unit)
     validity = bearings.validity(found) if bearings.bearings(found) else "no joint with clearance"
-    return [name, quantity(drive.peak, "N m"), quantity(drive.mean, "N m"), Number(shown), validity]
+    return [
+        _title(name),
+        quantity(drive.peak, "N m"),
+        quantity(drive.mean, "N m"),
+        Number(shown),
+        validity,
+    ]

@@ -108,7 +108,7 @@ def reproduce(content: Content) -> list[object]:
             ("versions", "versions"),
             ("processor", "processor"),
             ("hash of the scene", "scene_hash"),
-            ("after", "references"),
+            ("method of", "references"),
         )
         if content.attribute(name)
     ]

@@ -267,7 +267,7 @@
     if (!place || !names.length) return;
     const select = byId("motion-name"), button = byId("motion-play"), gain = byId("motion-gain");
     const at = byId("motion-at"), out = byId("motion-text"), speed = byId("motion-speed");
-    for (const name of names) put(select, "option", name, { value: name });
+    for (const name of names) put(select, "option", name === "original" ? "baseline" : name, { value: name });
     const svg = draw(place, "svg", { role: "img" });
     svg.setAttribute("aria-label", "The mechanism, its clearances drawn larger than they are");
     let shapes = {}, motion = null, frame = 0, playing = false, last = 0, strongest = 1, l = 1;

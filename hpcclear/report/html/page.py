@@ -116,6 +116,7 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
     drawn = functools.partial(gallery.figures, troubles=troubles)
     makers: tuple[tuple[str, str, str, Callable[[Content], object]], ...] = (
         ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
+        ("identify", "Identified machine", "parts.html", sections.identified_machine),
         ("designs", "Optimised designs", "designs.html", designs.designs),
         ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
         ("statistics", "Statistics of the samples", "parts.html", sections.statistics),
@@ -162,7 +163,7 @@ def _section(
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
     if not content.whole or (content.responses and not set(content.files) - {"timing"}):
         return troubles or None
-    for kind in ("accuracy", "wear", "effects", "map", "bifurcation"):
+    for kind in ("accuracy", "wear", "effects", "map", "bifurcation", "identify"):
         if set(content.files) <= {kind, "timing"} and kind in content.files:
             return troubles or None  # a directory of that command lacks nothing
     words = [text for kind, text in _MISSING.items() if content.get(kind) is None]

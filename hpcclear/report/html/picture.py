@@ -206,10 +206,7 @@ def _design(one: xr.Dataset) -> dict[str, Any]:
 
 def _values(one: xr.Dataset) -> list[list[str]]:
     """Design variables with units; those the case does not have are left out."""
-    rows = [
-        (labels.words(v), quantity(float(v), str(v.attrs["units"])))
-        for v in labels.design_variables(one)
-    ]
+    rows = [(labels.words(v), labels.value(v)) for v in labels.design_variables(one)]
     return [[name, str(value)] for name, value in rows if value != "–"]
 
 
@@ -274,7 +271,8 @@ def frames(response: xr.Dataset) -> dict[str, Any]:
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))
     shown = shown.isel(time=slice(None, None, every))
-    e = moving.eccentricities(shown)
+    held = response.sel(joint=motion.pins(response))  # joints that are circles
+    e = moving.eccentricities(shown.sel(joint=motion.pins(shown)))
     bodies, points, angles = moving.bodies(shown)
     pairs = [_pair(points, e[:, j]) for j in range(e.shape[1])]
     still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
@@ -284,11 +282,11 @@ def frames(response: xr.Dataset) -> dict[str, Any]:
         "angles": _digits(angles),
         "still": [bool(one) for one in still],
         "pairs": pairs,
-        "joints": list(motion.joints(shown).values()),
-        "clearance": np.nan_to_num(motion.clearances(response)).tolist(),
+        "joints": list(motion.joints(held).values()),
+        "clearance": np.nan_to_num(motion.clearances(held)).tolist(),
         "turn": _digits(motion.turns(shown)),
         "e": _digits(e.reshape(len(e), -1)),
-        "force": _digits(shown["contact_force"].to_numpy()),
+        "force": _digits(shown["contact_force"].sel(joint=motion.pins(shown)).to_numpy()),
     }
 
 

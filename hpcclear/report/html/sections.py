@@ -5,7 +5,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.report import failures, spread
+from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
@@ -147,10 +147,20 @@ def claims(content: Content) -> list[object] | None:
     return [held, Table(header, rows, "Claims of the paper, tested on this data")]
 
 
+def identified_machine(content: Content) -> list[object] | None:
+    """Unknowns of a machine with their intervals, growth, what to measure, and warnings."""
+    found = content.get("identify")
+    if found is None:
+        return None
+    rows: list[list[object]] = [[line.label, line.text] for line in identified.lines(found)]
+    table = Table(["quantity", "result"], rows, "Unknowns of the machine")
+    return [table, *(f"Warning: {text}." for text in identified.warnings(found))]
+
+
 def statistics(content: Content) -> list[object] | None:
-    """Mean, standard deviation and quantiles of the samples, shares beyond thresholds of the study, and warnings."""
+    """Statistics of the samples, shares beyond thresholds of the study, and warnings; of a study its designs have them."""
     samples = content.get("samples")
-    if samples is None:
+    if samples is None or content.get("verification") is not None:
         return None
     lines = spread.statistics(samples, _thresholds(samples))
     rows = [[line.label, line.text] for line in lines]
@@ -222,5 +232,7 @@ def _listed(numbers: np.ndarray, of: int) -> str:
     """Numbers of samples, the first ones only where they are many, "all" where all are meant."""
     if len(numbers) == of > 1:
         return "all"
+    if len(numbers) > max(LISTED, of // 2):
+        return f"all but {of - len(numbers)}"
     shown = ", ".join(str(n) for n in numbers[:LISTED])
     return shown if len(numbers) <= LISTED else f"{shown} and {len(numbers) - LISTED} more"

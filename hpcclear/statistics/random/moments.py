@@ -225,7 +225,7 @@ class RobustObjective:
         return designs
 
     def _averaged(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Mean and deviation over draws, ``(n, 2)``: the model's own, if it has any."""
+        """Mean and standard deviation over draws, ``(n, 2)``: the model's own, if it has any."""
         found = []
         for places in self._places(designs, draws):
             own = self.model.moments(places)

@@ -3,7 +3,7 @@ intervals.
 
 Points come in replicates, each a design with its scatter, or a few points. A change is a ratio of sums over replicates less 1;
 what each replicate would move it by (its influence) is all that is known about its error. Where a motion is chaotic single
-differences say nothing, and the limits are wide for it.
+differences say nothing, and the intervals are wide for it.
 
 Source: W. G. Cochran, "Sampling Techniques", 3rd ed. (Wiley 1977), sections 6.3 to 6.5: ratio estimates and their errors.
 """

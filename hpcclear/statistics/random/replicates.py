@@ -2,7 +2,7 @@
 
 A replicate is one randomised Sobol sequence, or one draw of plain Monte Carlo: what differs
 between replicates is all that is known about the error, whatever is inside them. So one
-set of formulas serves both, and the limits take Student's t by the number of replicates.
+set of formulas serves both, and the intervals take Student's t by the number of replicates.
 
 Sources: A. B. Owen, "Monte Carlo variance of scrambled net quadrature", SIAM J. Numer. Anal. 34
 (1997), doi:10.1137/S0036142994277468; P. L'Ecuyer and C. Lemieux, "Recent advances in randomized
@@ -43,6 +43,37 @@ class Estimate:
         return int(np.isfinite(self.shifts).sum()) - 1
 
 
+FEW = 100.0
+"""Values that carry a standard deviation, below which its interval is widened: few values do not show their scatter."""
+
+
+@dataclass(frozen=True)
+class Deviation(Estimate):
+    """A standard deviation."""
+
+    carriers: float
+    """How many equal squares its values are worth: the square of the sum of squares over the sum of fourth powers."""
+
+
+def limits(one: Estimate, confidence: float) -> tuple[float, float]:
+    """Confidence interval of an estimate, by Student's t; NaN where it has no error.
+
+    That of a standard deviation is symmetric in its logarithm, and wider where a few values carry it: of 512 lognormal values
+    of shape 1, say 20 carriers, intervals without that held 82 % of the time instead of 95 %.
+    """
+    if one.freedom < 1:
+        return np.nan, np.nan
+    reach = one.error * student(confidence, one.freedom)
+    if not (isinstance(one, Deviation) and one.value > 0.0):
+        return one.value - reach, one.value + reach
+    factor = 1.0 + max(_WIDER * (1.0 / one.carriers - 1.0 / FEW), 0.0)
+    width = float(np.exp(min(factor * reach / one.value, _WIDEST)))
+    return one.value / width, one.value * width
+
+
+_WIDER, _WIDEST = 15.0, 3.0
+
+
 def spread(shifts: Array) -> Array:
     """Standard errors of what replicates shift so, (n, r) to (n,); NaN of fewer than two."""
     known = np.isfinite(shifts)
@@ -57,7 +88,7 @@ def student(confidence: float, freedom: int) -> float:
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
-def moments(values: Array) -> tuple[Estimate, Estimate]:
+def moments(values: Array) -> tuple[Estimate, Deviation]:
     """Mean and standard deviation, free of bias to the order of their errors.
 
     Parameters
@@ -67,14 +98,14 @@ def moments(values: Array) -> tuple[Estimate, Estimate]:
 
     Returns
     -------
-    (Estimate, Estimate)
+    `Estimate`, `Deviation`
         All NaN where fewer than `FEWEST` values or replicates are left.
     """
     known = np.isfinite(values)
     counts = known.sum(axis=1)
-    nothing = Estimate(np.nan, np.full(len(values), np.nan))
     if known.sum() < FEWEST or (counts > 0).sum() < FEWEST:
-        return nothing, nothing
+        none = np.full(len(values), np.nan)
+        return Estimate(np.nan, none), Deviation(np.nan, none, np.nan)
     filled = np.where(known, values, 0.0)
     mean = filled.sum() / counts.sum()
     steps = np.where(known, values - mean, 0.0)
@@ -86,7 +117,9 @@ def moments(values: Array) -> tuple[Estimate, Estimate]:
     deviation = np.sqrt(whole)
     twice = 2.0 * deviation if deviation > 0.0 else 1.0
     second = _shifts((squares - np.where(known, variance, 0.0)).sum(axis=1), counts) / twice
-    return Estimate(float(mean), average), Estimate(float(deviation), second)
+    fourth = float((squares**2).sum())
+    carriers = float(squares.sum()) ** 2 / fourth if fourth > 0.0 else np.inf
+    return Estimate(float(mean), average), Deviation(float(deviation), second, carriers)
 
 
 def _shifts(sums: Array, counts: Array) -> Array:
@@ -147,7 +180,7 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
         As in `moments`.
     limit : float
     confidence : float
-        Level of the limits.
+        Level of the interval.
 
     Returns
     -------
@@ -169,7 +202,7 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
 def _interval_of_share(
     share: float, shifts: Array, counts: Array, confidence: float
 ) -> tuple[float, float]:
-    """Limits of a probability: those of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
+    """Interval of a probability: that of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
     total = int(counts.sum())
     error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
     # as many independent draws, fewer for an error of few degrees of freedom

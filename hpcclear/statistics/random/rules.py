@@ -115,9 +115,9 @@ def _(law: Samples, centres: Array, length: float) -> Array:
 
 @singledispatch
 def pieces(law: Quantiles, count: int, lower: Array, upper: Array) -> Rule:
-    """Rules over the part of the span between limits (n,): ``(n, count)`` nodes and weights.
+    """Rules over the part of the span between bounds (n,): ``(n, count)`` nodes and weights.
 
-    The weights of a row add up to the probability of its part: 0 where the limits leave nothing. The highest of some values
+    The weights of a row add up to the probability of its part: 0 where the bounds leave nothing. The highest of some values
     belongs to the piece that ends with it.
 
     Raises
@@ -243,7 +243,7 @@ def _mass(law: Normal) -> float:
 
 @lru_cache(maxsize=256)
 def _truncated_rule(low: float, high: float, count: int) -> Rule:
-    """Gauss rule of the standard normal cut off at two limits (discretised Stieltjes)."""
+    """Gauss rule of the standard normal truncated at two bounds (discretised Stieltjes)."""
     low, high = max(low, -TAIL - 3), min(high, TAIL + 3)
     nodes, weights = legendre(FINE)
     x = low + (high - low) * nodes
@@ -279,7 +279,7 @@ def _gauss_rule(x: np.ndarray, weights: np.ndarray, count: int) -> Rule:
 
 
 def _normal_between(low: np.ndarray | np.float64, high: np.ndarray | np.float64) -> np.ndarray:
-    """Probability of a standard normal between limits, keeping its digits in the upper tail."""
+    """Probability of a standard normal between bounds, keeping its digits in the upper tail."""
     flip = low > 0
     low, high = np.where(flip, -high, low), np.where(flip, -low, high)
     return ndtr(high) - ndtr(low)
@@ -288,7 +288,7 @@ def _normal_between(low: np.ndarray | np.float64, high: np.ndarray | np.float64)
 def _normal_kernel_integral(
     law: Normal, centres: Array, length: float, lower: float, upper: float
 ) -> Array:
-    """Integral of normal density times kernel between limits: the product is normal again."""
+    """Integral of normal density times kernel between bounds: the product is normal again."""
     mean, deviation = law.middle, law.deviation
     width = sqrt(deviation**2 + length**2)
     narrow = deviation * length / width

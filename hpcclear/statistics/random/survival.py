@@ -52,7 +52,7 @@ def rank_correlation(first: Array, second: Array) -> float:
 
 
 def order_interval(values: Array, level: float, unknown: int = 0) -> tuple[float, float]:
-    """95 % confidence limits of a quantile of independent values, by their order alone; NaN where too few values are known.
+    """95 % confidence intervals of a quantile of independent values, by their order alone; NaN where too few values are known.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def order_interval(values: Array, level: float, unknown: int = 0) -> tuple[float
     level : float
         Probability of staying below, strictly between 0 and 1.
     unknown : int
-        Further values of which nothing is known, such as failed simulations: the limits hold wherever these lie.
+        Further values of which nothing is known, such as failed simulations: the interval holds wherever these lie.
 
     References
     ----------

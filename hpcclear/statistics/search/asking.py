@@ -1,4 +1,4 @@
-"""Searches through ask and tell: what is asked of them, how they are carried out, and the front of what they met.
+"""Searches through `ask` and `tell`: what is required of them, how they are carried out, and the front of what they met.
 
 Whatever a search keeps for itself, the front is made here, alike for all: the archive of the feasible designs that no other
 one dominates, cut to the size requested (`pareto.cut`; `pareto.best_subset` where constraints were broken). A design whose

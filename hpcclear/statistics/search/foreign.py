@@ -1,4 +1,4 @@
-"""Algorithms of pymoo instead of the swarm, through ask and tell: same evaluations, same constraints, same kind of front.
+"""Algorithms of pymoo instead of the swarm, through `ask` and `tell`: same evaluations, same constraints, same kind of front.
 
 Whatever an algorithm keeps of what it met, the front is made as the swarm's: the archive of all feasible designs that no
 other one dominates, cut to size. A design whose objectives are not all finite breaks constraints without limit.

@@ -1,15 +1,15 @@
 """Where to evaluate next, by expected improvement: for objectives that are costly and known with errors.
 
-Where f is rough, no model of f over designs and random inputs together holds, but the roughness averages out in a statistic of f.
+Where f is rough, no model of f over designs and random inputs together holds, but the roughness averages out in a statistic.
 So each objective gets one Kriging model over designs, with the kernel of Matern and a noise variance near that of the known
 errors: a model that is free to fit noise as ripples finds what flatters it. The next designs are those that are expected
-to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs at a
-time each takes those before it for evaluated, at the value that is expected (Kriging believer).
+to win most, by turns in each direction (an objective, or a weighted sum of them) and of the hypervolume. Of several designs
+at a time each takes those before it for evaluated, at the value that is expected (Kriging believer).
 
 Sources: D. R. Jones, M. Schonlau and W. J. Welch, "Efficient global optimization of expensive black-box functions", J. Global
 Optim. 13 (1998), doi:10.1023/A:1008306431147; with errors V. Picheny, T. Wagner and D. Ginsbourger, "A benchmark of
-kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; the sum
-over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
+kriging-based infill criteria for noisy optimization", Struct. Multidisc. Optim. 48 (2013), doi:10.1007/s00158-013-0919-4; the
+sum over strips M. Emmerich, K. Yang, A. Deutz, H. Wang and C. Fonseca, "A multicriteria generalization of Bayesian global
 optimization" (2016), doi:10.1007/978-3-319-29975-4_12; random scalarisations J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10
 (2006), doi:10.1109/TEVC.2005.851274.
 """
@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 
 import moocore
 import numpy as np
+from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.statistics.search.infill import NEAR, eligible
 from hpcclear.statistics.search.pareto import cut
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -189,7 +190,7 @@ def proposals(known: Known, space: Space, count: int, rng: np.random.Generator) 
                 break
             merit = _merit(beliefs, turns[turn % len(turns)], rng)
             point, worth = _best(beliefs, merit, rng)
-            if worth > 0.0 and _apart(point, beliefs):
+            if worth > 0.0:
                 chosen.append(point)
                 beliefs.take(point)
         return np.reshape(chosen, (-1, len(space.bounds)))
@@ -247,7 +248,7 @@ def _merit(
             won = volume(beliefs.believed, mean, deviation)
         else:
             won = _scalarised(beliefs.believed, mean + deviation * noise, weights)
-        return won * beliefs.feasible(points)
+        return won * beliefs.feasible(points) * _apart(points, beliefs)
 
     return function
 
@@ -262,8 +263,8 @@ def gain(least: float, mean: Array, deviation: Array) -> Array:
 
 
 def volume(front: Array, mean: Array, deviation: Array) -> Array:
-    """Expected area that independent normal numbers, (n, 2), add to that of points, (k, 2); scaled to the extent of these, up to
-    1.1 times that."""
+    """Expected area that independent normal numbers, (n, 2), add to that of points, (k, 2), scaled to the extent of these, up
+    to 1.1 times that."""
     points = front[moocore.is_nondominated(front)]
     points = points[np.argsort(points[:, 0])]
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
@@ -335,8 +336,9 @@ def _about(centre: Array, step: float, space: Space, rng: np.random.Generator) -
     return np.clip(centre + moves, low, high)
 
 
-def _apart(point: Array, beliefs: Beliefs) -> bool:
-    """Whether a design differs from all that were evaluated or chosen."""
+def _apart(points: Array, beliefs: Beliefs) -> Booleans:
+    """Whether designs differ from all that were evaluated or chosen, (n,)."""
     width = beliefs.space.bounds[:, 1] - beliefs.space.bounds[:, 0]
     others = np.vstack([beliefs.known.designs, beliefs.pending])
-    return bool((np.abs(others - point) / width).max(axis=1).min() > NEAR)
+    steps = cdist(points / width, others / width, "chebyshev")
+    return np.asarray(steps.min(axis=1) > NEAR)

@@ -90,7 +90,7 @@ class ParticleSwarm:
         return self._points(self._positions)
 
     def tell(self, designs: Array, objectives: Array, constraints: Array) -> None:
-        """Take the objectives of the designs asked for (`hpcclear.statistics.search.asking.Search`) and move on."""
+        """Take the objectives of the designs requested (`hpcclear.statistics.search.asking.Search`) and move on."""
         self._constrained |= bool((np.isfinite(objectives).all(axis=1) & (constraints > 0.0)).any())
         self._remember(objectives, constraints)
         feasible = constraints == 0.0

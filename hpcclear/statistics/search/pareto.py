@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import moocore
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans, Integers
+from hpcclear.base.cached import cached
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,8 @@ def best_subset(values: Array, size: int) -> NDArray[np.intp]:
     return np.sort(_best_of_two(values, size))
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _best_of_two(values, size):  # type: ignore[no-untyped-def]
+@cached
+def _best_of_two(values: Array, size: int) -> Integers:
     """Rows of the largest area below the first row's second objective, from the last row to the first."""
     order = np.argsort(values[:, 0])
     first, second = values[order, 0], values[order, 1]
@@ -171,8 +171,8 @@ def _best_of_two(values, size):  # type: ignore[no-untyped-def]
     return order[kept]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _cut_two(values, size):  # type: ignore[no-untyped-def]
+@cached
+def _cut_two(values: Array, size: int) -> Booleans:
     """Rows to keep of a two-objective front: the least rectangle between neighbours goes first.
 
     Scaling an objective scales all rectangles alike and both ends stay: no reference is needed.
@@ -188,8 +188,8 @@ def _cut_two(values, size):  # type: ignore[no-untyped-def]
     return alive
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _thin(values, capacity):  # type: ignore[no-untyped-def]
+@cached
+def _thin(values: Array, capacity: int) -> tuple[Booleans, Array]:
     """Drop the most crowded rows until `capacity` are left; the best of each objective stays.
 
     Returns which rows are alive, and of these the distance to the nearest neighbour, objectives
@@ -228,15 +228,15 @@ def _thin(values, capacity):  # type: ignore[no-untyped-def]
     return alive, np.sqrt(distance[alive, 0])
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _closer(distance, i, j):  # type: ignore[no-untyped-def]
+@cached
+def _closer(distance: Array, i: int, j: int) -> bool:
     if distance[i, 0] != distance[j, 0]:
-        return distance[i, 0] < distance[j, 0]
-    return distance[i, 1] < distance[j, 1]
+        return bool(distance[i, 0] < distance[j, 0])
+    return bool(distance[i, 1] < distance[j, 1])
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _nearest(square, alive, i, distance, neighbour):  # type: ignore[no-untyped-def]
+@cached
+def _nearest(square: Array, alive: Booleans, i: int, distance: Array, neighbour: Integers) -> None:
     """Write the two nearest living neighbours of row i."""
     distance[i, :] = np.inf
     neighbour[i, :] = -1

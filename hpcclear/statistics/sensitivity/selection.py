@@ -11,7 +11,7 @@ Section 4.2 of the paper, step 4, leaves "greater impact" open. The rule here:
    - influential, if its effect differs significantly from 0 and reaches the stated fraction of the largest;
    - negligible, if its effect plus z standard errors stays below that fraction, or its effect
      differs significantly from 0 and lies below;
-   - undecided otherwise: the standard error is too large to tell, or there is no estimate.
+   - undecided otherwise: the standard error is too large, or there is no estimate.
 
 3. A variable is selected if it is influential at no less than the stated share of the clearances
    that have an estimate of it. So one clearance alone neither brings a variable in nor throws it

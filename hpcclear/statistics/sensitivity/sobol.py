@@ -85,7 +85,7 @@ def analyse_sobol(
     rng : numpy.random.Generator
         Draws the bootstrap.
     confidence : float
-        Of the limits, in (0, 1).
+        Of the intervals, in (0, 1).
     n_resamples : int
         Bootstrap samples, at least 2.
 

@@ -31,7 +31,7 @@ from hpcclear.statistics.surrogate.kernels import (
 PART = 250
 """Points that the first part of many has at least; fewer than twice as many are searched as a whole."""
 FURTHER = 6
-"""Starts more on the first part, between these limits of signal variance, length scales and noise variance."""
+"""Starts more on the first part, between these bounds of signal variance, length scales and noise variance."""
 SPANS = (0.3, 10.0), (0.1, 1.0), (1e-6, 1e-3)
 LONGEST = 1.0
 """Length scales are cut there when the search leaves the first part."""
@@ -78,7 +78,7 @@ def maximise(
     start : array, shape (d + 2,)
         Signal variance, length scales, noise variance from which the search begins.
     bounds : array, shape (d + 2, 2)
-        Their limits.
+        Their bounds.
     restarts : int
         Further starts.
     seed : int

@@ -73,7 +73,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
     Parameters
     ----------
     values : array_like, shape (n,)
-        True values; those that are not finite are failed simulations, dropped and counted.
+        Simulated values; those that are not finite are failed simulations, dropped and counted.
     predictions : array_like, shape (n,)
         Predictions at the same points, in the same unit.
 

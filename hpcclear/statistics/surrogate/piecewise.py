@@ -27,7 +27,7 @@ class Piecewise:
     r2, rmae : (l,) arrays
         Accuracy of each on its own test points (NaN where the test values do not vary).
     accepted : (l,) array of bool
-        Whether it met the targets; a False is the best that could be had within the limits.
+        Whether it met the targets; a False is the best within the allowed number of pieces.
 
     Raises
     ------

@@ -5,10 +5,13 @@ not depend on which other designs are in the batch. Numba has no vectorised expo
 the polynomial one of `hpcclear.base.bits` lets LLVM keep these loops in vector registers.
 """
 
-import numpy as np
-from numba import njit
+from functools import partial
 
+import numpy as np
+
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.bits import falling
+from hpcclear.base.cached import cached
 
 REORDER = {"contract", "reassoc", "nsz", "arcp"}
 """Fast-math flags for sums only: without them LLVM keeps a sum's order and cannot vectorise it."""
@@ -20,21 +23,23 @@ LANES = 8
 """Training points are padded to a multiple of this, so that vectorised loops have no tail."""
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(cached, fastmath={"contract"})
 def gaussian(square: float) -> float:
     """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise."""
-    return falling(0.5 * square, STEEPEST)  # type: ignore[no-any-return]
+    return float(falling(0.5 * square, STEEPEST))
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@partial(cached, fastmath={"contract"})
 def matern(square: float) -> float:
     """Matern 5/2 for the squared distance >= 0, as accurate and as free of branches as `gaussian`."""
     step = np.sqrt(5.0 * square)
-    return (1.0 + step + step * step / 3.0) * falling(step, STEEPEST)  # type: ignore[no-any-return]
+    return float((1.0 + step + step * step / 3.0) * falling(step, STEEPEST))
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _squares_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
+@partial(cached, fastmath={"contract"})
+def _squares_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+) -> None:
     """Fill `row` with squared distances over the inputs `dims`, a place against all training points."""
     count = row.size
     row[:] = 0.0
@@ -46,24 +51,26 @@ def _squares_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-un
             row[i] += step * step
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
+@partial(cached, fastmath={"contract"})
+def _kernel_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+) -> None:
     """The same with the squared exponential of these distances."""
     _squares_row(scaled, lengths, dims, coordinates, row)
     for i in range(row.size):
         row[i] = gaussian(row[i])
 
 
-@njit(cache=True, error_model="numpy", fastmath=REORDER)
-def _dot(a, b):  # type: ignore[no-untyped-def]
+@partial(cached, fastmath=REORDER)
+def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
     return total
 
 
-@njit(cache=True, error_model="numpy")
-def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
+@cached
+def kernel_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
     """Kriging means ``level + sum_i weights_i k(x, x_i)``.
 
     Parameters
@@ -92,8 +99,8 @@ def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untype
     return out
 
 
-@njit(cache=True, error_model="numpy")
-def matern_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
+@cached
+def matern_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
     """`kernel_sum` with the Matern function of order 5/2; takes and returns the same."""
     dims = np.arange(lengths.size)
     row = np.empty(weights.size)
@@ -115,14 +122,14 @@ def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return transposed, filled
 
 
-@njit(cache=True, error_model="numpy")
-def _multiply(a, b, out):  # type: ignore[no-untyped-def]
+@cached
+def _multiply(a: Array, b: Array, out: Array) -> None:
     for i in range(out.size):  # written out: an array expression would allocate
         out[i] = a[i] * b[i]
 
 
-@njit(cache=True, error_model="numpy", fastmath=REORDER)
-def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
+@partial(cached, fastmath=REORDER)
+def _four_dots(table: Array, first: int, row: Array, out: Array, at: int) -> None:
     """``out[at + k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     t0, t1, t2, t3 = table[first], table[first + 1], table[first + 2], table[first + 3]
@@ -134,8 +141,8 @@ def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
     out[at], out[at + 1], out[at + 2], out[at + 3] = a, b, c, d
 
 
-@njit(cache=True, error_model="numpy", fastmath=REORDER)
-def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
+@partial(cached, fastmath=REORDER)
+def _weighted_moments(values: Array, weights: Array) -> tuple[float, float]:
     """Mean, and variance about it: the difference E[f^2] - E[f]^2 would cancel."""
     mean, variance = 0.0, 0.0
     for k in range(values.size):
@@ -145,10 +152,11 @@ def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
     return mean, variance
 
 
-@njit(cache=True, error_model="numpy")
-def tensor_moments(  # type: ignore[no-untyped-def]
-    places, shares, counts, starts, dims, steady, steady_shares, scaled, lengths
-):
+@cached
+def tensor_moments(
+    places: Array, shares: Array, counts: Integers, starts: Integers, dims: Integers, steady: Array, steady_shares: Array,
+    scaled: Array, lengths: Array,
+) -> Array:  # fmt: skip
     """Mean and variance of ``sum_i weights_i k(x, x_i)`` over tensor rules, one rule a design.
 
     The kernel is a product over groups of inputs, so a rule of N1 x N2 x ... nodes needs only

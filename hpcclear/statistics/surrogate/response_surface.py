@@ -155,7 +155,7 @@ def fit_response_surface(
     values : array_like, shape (n,)
         Values of f; those that are not finite are failed simulations, dropped and counted.
     bounds : array_like, shape (d, 2)
-        Limits of the inputs; they fix the scaling.
+        Bounds of the inputs; they fix the scaling.
     order : int
         Total order, at least 0.
     chosen : bool

@@ -166,7 +166,7 @@ class _Grown:
         self._rounding = train.sum() * (ROUNDING * np.abs(values).max()) ** 2
 
     def add(self, term: Term, z: Array) -> None:
-        """Take in a term, unless it is there, there is no room, or the training points do not determine it."""
+        """Take in a term, unless it is there, the limit is reached, or the training points do not determine it."""
         if term in self.terms or len(self.terms) == self._basis.shape[1]:
             return
         column = monomials(z, np.array([term]))[:, 0]

@@ -237,8 +237,8 @@ class ResponseEvidence:
 
 
 def _reach(values: Array) -> float:
-    """Half-width of the limits of a mean over copies and their intervals, (copies, intervals): Student's t of the copies
-    where they disagree, of the intervals where motion is regular and copies are one."""
+    """95 % half-width of a mean over copies and their segments, (copies, segments): Student's t of the copies where they
+    disagree, of the segments where motion is regular and copies agree."""
     reaches = [
         student(LEVEL, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x))
         for x in (values.mean(axis=1), values.mean(axis=0))

@@ -28,7 +28,7 @@ def energies(
     active : ndarray, shape (m, MAX_JOINTS)
         Contact flags of the joints.
     turn_time : ndarray, shape (m,), optional
-        s, since the start of the revolution: tells the crank angle where it is no coordinate.
+        s, since the start of the revolution: gives the crank angle where it is no coordinate.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Bristles of friction as a scene asks for them: their tolerances, and whether there is room for them."""
+"""Bristles of friction as a scene requires them: their tolerances, and whether they fit in the kernel."""
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -6,7 +6,7 @@ from hpcclear.dynamics.laws.numbers import evaluate
 from hpcclear.scene import Scene
 
 SMOOTH = 1e-299
-"""Steepness of a film that limits no step: with bristles, too, implicit steps go by the exponent of smooth motions. That halves
+"""Steepness of a film that bounds no step: with bristles, too, implicit steps go by the exponent of smooth motions. That halves
 them, and leaves f within some 1e-7 and the energy balance within 1e-7 at rtol 1e-6."""
 
 LENGTH = 1e-3
@@ -28,7 +28,7 @@ def tolerances(scene: Scene, period: float) -> tuple[tuple[float, ...], tuple[fl
 
 
 def check_room(scene: Scene, others: int) -> None:
-    """InputError if the kernel has no room for the bristles beside so many coordinates."""
+    """InputError if the kernel cannot hold the bristles beside so many coordinates."""
     count = others + scene.bristles
     if scene.bristles and count > at.MAX_COORDINATES:
         raise InputError(

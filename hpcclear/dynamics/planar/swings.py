@@ -1,4 +1,4 @@
-"""How fast the modes of bars that bend swing, and what tolerances that asks for."""
+"""How fast the modes of bars that bend swing, and what tolerances that requires."""
 
 import numpy as np
 

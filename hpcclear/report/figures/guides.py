@@ -1,0 +1,95 @@
+"""Figure of guides with clearance in a response (kind ``response``): where sliders stand, and which corners touch when."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, motion, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+class Touch(NamedTuple):
+    """The beginning of a contact."""
+
+    time: float
+    """s."""
+    turn: float
+    """Revolutions of the crank since the start."""
+    contact: str
+    """Label along the dimension ``joint``."""
+
+
+def touches(response: xr.Dataset) -> list[Touch]:
+    """Contacts of a response in the order in which they begin.
+
+    Those between two stored instants are missed: store every step, `output.instants_per_revolution` = 0. A law of impacts
+    begins a step at each impact, so that its instant is exact then.
+    """
+    time, turn = response["time"].to_numpy(), motion.turns(response)
+    depth = response["penetration"].to_numpy() > 0.0
+    found = []
+    for column, label in zip(depth.T, response["joint"].to_numpy(), strict=True):
+        for k in np.flatnonzero(column[1:] & ~column[:-1]) + 1:
+            found.append(Touch(float(time[k]), float(turn[k]), str(label)))
+    return sorted(found)
+
+
+@style.drawn
+def guide_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
+    """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last revolutions.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Kind ``response``.
+    revolutions : int
+        How many; fewer if the response has fewer.
+
+    Raises
+    ------
+    InputError
+        If no guide has clearance.
+    """
+    if "guide" not in response.dims:
+        raise InputError(
+            "guide", "", "no guide of this mechanism has clearance",
+            "Give a slide a clearance, length, height and corner_radius",
+        )  # fmt: skip
+    shown = motion.latest(response, revolutions)
+    turn, guides = motion.turns(shown), [str(name) for name in shown["guide"].to_numpy()]
+    figure, axes = style.grid(3, 1, 110.0, sharex=True)
+    for panel, name in zip(axes[:2, 0], ("guide_offset", "guide_tilt"), strict=True):
+        unit = labels.of(shown[name])
+        for row, guide in enumerate(guides):
+            values = shown[name].sel(guide=guide).to_numpy() * unit.factor
+            panel.plot(turn, values, color=style.CYCLE[row % 7], lw=0.7, label=guide)
+        panel.set_ylabel(unit.label(name.replace("guide_", "")))
+    if len(guides) > 1:
+        axes[0, 0].legend(loc="upper right", ncols=len(guides))
+    _corners(axes[2, 0], shown, turn)
+    axes[2, 0].set_xlabel(motion.turns_label(shown))
+    style.settle(axes)
+    figure.align_ylabels()
+    return figure
+
+
+def _corners(panel: "Axes", shown: xr.Dataset, turn: Array) -> None:
+    """A row for each corner, filled while it touches, with a tick where a contact begins."""
+    rows = [str(label) for label in shown["joint"].to_numpy() if "." in str(label)]
+    for row, label in enumerate(rows):
+        depth = shown["penetration"].sel(joint=label).to_numpy()
+        colour = style.CYCLE[row % 7]
+        panel.fill_between(
+            turn, row - 0.3, row + 0.3, where=depth > 0.0, color=colour, alpha=0.5, lw=0.0
+        )
+        begun = [one.turn for one in touches(shown) if one.contact == label]
+        panel.plot(begun, np.full(len(begun), row), "|", color=colour, ms=5.0)
+    panel.set_yticks(range(len(rows)), [label.replace("_", " ") for label in rows])
+    panel.set_ylim(len(rows) - 0.5, -0.5)
+    panel.set_title("corners in contact")

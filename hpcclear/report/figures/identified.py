@@ -1,0 +1,123 @@
+"""Figures of identified unknowns (kind ``identify``): posterior, fit of the features, growth."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BINS = 60
+DAY = 86400.0
+
+
+def _check(content: xr.Dataset) -> None:
+    """Raise InputError where nothing was measured."""
+    if "interval" not in content:
+        reason = "no signal was measured"
+        raise InputError("identify", 0, reason, "Give hpcclear identify a --signal")
+
+
+@style.drawn
+def posterior_figure(content: xr.Dataset) -> "Figure":
+    """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``.
+
+    Raises
+    ------
+    InputError
+        No signal was measured.
+    """
+    _check(content)
+    count = content.sizes["unknown"]
+    figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
+    for u, panel in enumerate(axes[:, 0]):
+        low, high = (float(content[f"prior_{end}"][u]) for end in ("lower", "upper"))
+        scale = labels.scale(str(content["unit"].to_numpy()[u]), [low, high])
+        edges = np.linspace(low, high, BINS + 1)
+        for k, record in enumerate(content["record"].to_numpy()):
+            colour = style.CYCLE[k % len(style.CYCLE)]
+            values = content["posterior"][k, :, u].to_numpy()
+            density = np.histogram(values, edges)[0] / (len(values) * np.diff(edges) * scale.factor)
+            panel.stairs(
+                density, edges * scale.factor, color=colour, label=labels.literal(str(record))
+            )
+            ends = content["interval"][k, u].to_numpy() * scale.factor
+            level = -0.04 * (k + 1) * max(density.max(), 1e-300)
+            panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
+        panel.set_xlabel(scale.label(str(content["unknown"].to_numpy()[u])))
+        panel.set_ylabel(f"density (1/{scale.unit})")
+        panel.legend(loc="upper right")
+    style.settle(axes)
+    return figure
+
+
+@style.drawn
+def features_figure(content: xr.Dataset) -> "Figure":
+    """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
+
+    Raises
+    ------
+    InputError
+        No signal was measured.
+    """
+    _check(content)
+    last = content.isel(record=-1)
+    score = ((last["measured"] - last["predicted"]) / last["predicted_deviation"]).to_numpy()
+    figure, axes = style.grid(1, 1, 60.0)
+    panel = axes[0, 0]
+    panel.axhspan(
+        -2.0, 2.0, color=style.PALETTE["sky"], alpha=0.3, lw=0, label="two standard deviations"
+    )
+    panel.plot(np.arange(len(score)), score, "o", color=style.PALETTE["blue"])
+    worst = int(last["worst_feature"])
+    panel.plot(
+        [worst],
+        [score[worst]],
+        "s",
+        color=style.PALETTE["vermilion"],
+        label=str(last["feature"].to_numpy()[worst]),
+    )
+    panel.set_xlabel("number of the feature (–)")
+    panel.set_ylabel("standard score (–)")
+    panel.legend(loc="best")
+    style.settle(axes)
+    return figure
+
+
+@style.drawn
+def growth_figure(content: xr.Dataset) -> "Figure":
+    """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
+
+    Raises
+    ------
+    InputError
+        There is one record only.
+    """
+    _check(content)
+    if "rate" not in content:
+        raise InputError("identify", 1, "one record has no growth", "Give a --signal for each date")
+    count, days = content.sizes["unknown"], content["elapsed"].to_numpy() / DAY
+    figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
+    for u, panel in enumerate(axes[:, 0]):
+        unit = str(content["unit"].to_numpy()[u])
+        low, middle, high = (content["interval"][:, u, k].to_numpy() for k in range(3))
+        scale = labels.scale(unit, high)
+        panel.errorbar(
+            days, scale.factor * middle, scale.factor * np.array([middle - low, high - middle]), fmt="o",
+            color=style.PALETTE["blue"], capsize=2.0, label="median, 95 % interval",
+        )  # fmt: skip
+        rate = float(content["rate"][1, u]) * DAY
+        line = np.mean(middle) + rate * (days - np.mean(days))
+        panel.plot(days, scale.factor * line, color=style.PALETTE["grey"], label="median rate")
+        if "limit" in content.attrs:
+            limit = scale.factor * float(content.attrs["limit"])
+            panel.axhline(limit, color=style.PALETTE["orange"], ls="--", label="limit")
+        panel.set_xlabel("time since the first record (days)")
+        panel.set_ylabel(scale.label(str(content["unknown"].to_numpy()[u])))
+        panel.legend(loc="best")
+    style.settle(axes)
+    return figure

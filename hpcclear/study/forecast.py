@@ -1,0 +1,139 @@
+"""What a study simulates as a rule, and what a simulation of it costs, from a pilot: a few designs all over the box with their
+scatter. Cost and scatter differ from design to design, and the design in the scene may differ from all that are found.
+
+`hpcclear.study.extent.samples_of` has the most that there can be. Verified designs take as many simulations as their errors in
+the pilot require; fronts are shorter and searches end earlier than they may.
+"""
+
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Records
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import alone
+from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.scene import Scene
+from hpcclear.scene.cases import Case
+from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.scene.stages import REPLICATES
+from hpcclear.statistics.random.replicates import spread, student
+from hpcclear.study import extent, goals, truth, verdicts
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.run import StudyRun
+from hpcclear.study.simulations import Simulations
+
+DESIGNS, LENGTH, PART = 4, 8, 2
+"""Designs of a case, points of each of their replicates, and how many of these show how fast errors fall."""
+
+FALL = 0.5, 1.5
+"""Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f."""
+
+USUAL = {"verification": 0.8, "infill": 0.8}
+"""Of the most designs that a stage may have."""
+
+CONTESTED = 1.2
+"""Times the simulations that an accuracy takes: what designs get beyond it while they may be the best."""
+
+LONGEST = 10.0
+"""Seconds that a pilot may take."""
+
+Evaluate = Callable[[Points], Records]
+
+
+class _Here(Simulations):
+    """Simulations by a function, without files; what they took is measured."""
+
+    def __init__(self, scene: Scene, evaluate: Evaluate) -> None:
+        super().__init__(scene, alone(), cast(Checkpoint, None))
+        self._evaluate = evaluate
+        self.count, self.seconds = 0, 0.0
+
+    def _records(self, points: Points, stage: str) -> Records:
+        """Outcome records of designs, in their order."""
+        if not self.count:
+            self._evaluate(points.take(np.arange(1)))  # compiles
+        start = time.perf_counter()
+        found = self._evaluate(points)
+        self.seconds += time.perf_counter() - start
+        self.count += len(points)
+        return found
+
+
+def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, float]:
+    """Simulations that a study takes as a rule, and what one of them costs on one core.
+
+    Where the pilot takes longer than `LONGEST`, makes no mechanisms, or needs worn clearances that are not known yet, these are
+    `hpcclear.study.extent.samples_of` and `seconds`.
+
+    Parameters
+    ----------
+    scene : Scene
+        With cases.
+    evaluate : function
+        Points to records of the study's objective.
+    seconds : float
+        Of a simulation, as far as is known without a pilot.
+    """
+    study, samples = scene.required_study, extent.samples_of(scene)
+    pilot = len(study.cases) * DESIGNS * LENGTH * REPLICATES
+    here = _Here(scene, evaluate)
+    run = cast(StudyRun, SimpleNamespace(scene=scene, study=study, simulations=here))
+    if study.worn or pilot * seconds > LONGEST:
+        return sum(samples.values()), seconds
+    try:
+        each = np.mean([_of_case(run, case) for case in study.cases])
+    except InputError:
+        return sum(samples.values()), seconds
+    samples["verification"] = int(samples["verification"] * each / truth.expected(study))
+    for name, share in USUAL.items():
+        samples[name] = int(share * samples[name])
+    return sum(samples.values()), here.seconds / here.count
+
+
+def _of_case(run: StudyRun, case: Case) -> float:
+    """Simulations of a verified design, on average over the pilot's."""
+    names, study = run.study.design_variables(case.name), run.study
+    region = box(run.scene, names)
+    unit = unit_lhs(DESIGNS, len(names), generator(study.seed, "pilot", case.name))
+    rows = to_physical(run.scene, names, region.lower + unit * (region.upper - region.lower))
+    choices = [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+    made = truth.doubled(run, choices, "pilot", "pilot", LENGTH, LENGTH * REPLICATES)
+    settings = study.verification
+    if settings.draws is not None:
+        return float(settings.draws)
+    early, late = (
+        np.array([_errors(run, one, its[..., :n]) for one, its in zip(choices, made, strict=True)])
+        for n in (PART, LENGTH)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steep = np.log(early / late) / np.log(LENGTH / PART)
+        fall = np.clip(np.nanmean(np.where(np.isfinite(steep), steep, np.nan), axis=0), *FALL)
+        needed = LENGTH * REPLICATES * late ** (1.0 / np.nan_to_num(fall, nan=FALL[0]))
+    most = np.nan_to_num(needed, nan=0.0).max(axis=1)
+    longer = np.sqrt(2.0) * (CONTESTED if settings.contest > 1 else 1.0)  # lengths double
+    least = truth.first_length(settings) * REPLICATES
+    return float(np.clip(longer * most, least, settings.most_samples).mean())
+
+
+def _errors(run: StudyRun, choice: Choice, values: Array) -> Array:
+    """Half-widths of all that a design is verified in, over the accuracy requested, (k,), from values (responses,
+    replicates, n)."""
+    settings, case = run.study.verification, run.study.case(choice.case)
+    mean, deviation, _, *others = truth.estimates_of(run, choice, values)
+    wanted = run.study.wanted
+    rows = [(mean, wanted.mean, mean.value), (deviation, wanted.deviation, deviation.value)]
+    for goal, one in zip((*case.goals, *case.kept), others, strict=True):
+        decided = goal in case.kept and verdicts.rare(goal, settings)
+        if not goal.exact and not decided:
+            share, relative = goals.wanted(goal, wanted)
+            rows.append((one, share, one.value if relative else 1.0))
+    width = student(settings.confidence, REPLICATES - 1)
+    errors = np.array([spread(one.shifts[None])[0] for one, *_ in rows])
+    sizes = np.array([share * abs(scale) for _, share, scale in rows])
+    return np.asarray(width * errors / np.where(sizes > 0.0, sizes, np.nan))

@@ -1,0 +1,459 @@
+"""Unknown clearances from measured signals: features, posterior, calibration, model check, the command and its page."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from commands import overrides, run
+from doc_pages import ROOT
+
+import hpcclear
+from hpcclear import report
+from hpcclear.base.errors import InputError
+from hpcclear.cli import cli
+from hpcclear.identify import training
+from hpcclear.identify.advice import advice, noise_of
+from hpcclear.identify.answer import Wanted
+from hpcclear.identify.answer import identified as identified_dataset
+from hpcclear.identify.features import Layout, known_scatter
+from hpcclear.identify.history import DAY, history, seconds_of
+from hpcclear.identify.inputs import Inputs, Unknown, design
+from hpcclear.identify.judgement import features_of, judged, prepare
+from hpcclear.identify.made import write_made
+from hpcclear.identify.measured import Measured, loaded, read_measured
+from hpcclear.identify.posterior import sequential
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
+from hpcclear.identify.training import Ensemble, prepared_scene
+from hpcclear.report.html.page import write_report
+from hpcclear.report.identified import interval, lines, warnings
+from hpcclear.results import dataset
+
+SCENE = ROOT / "jobs" / "identify.toml"
+UNKNOWN = "joints.crank_rod.clearance=10um:150um"
+SHORT = ["numerics.transient_revolutions=3", "numerics.averaged_revolutions=10"]
+SPEED = 50.0  # Hz
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return hpcclear.load_scene(SCENE, SHORT)
+
+
+# -- signals ----------------------------------------------------------------------------------------
+
+
+def table(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    rows = zip(*columns.values(), strict=True)
+    text = "\n".join(",".join(f"{value:.12g}" for value in row) for row in rows)
+    path.write_text(f"{','.join(columns)}\n{text}\n")
+    return path
+
+
+def wave(turns: np.ndarray) -> np.ndarray:
+    angle = 2.0 * np.pi * turns
+    return 3.0 + 2.0 * np.cos(angle - 0.4) + 0.5 * np.sin(7 * angle)
+
+
+def test_harmonics_of_whole_revolutions_have_their_amplitudes_and_phases():
+    turns = np.linspace(0.3, 6.1, 4000)
+    found = harmonics(turns, wave(turns))
+    assert found.shape == (5, ORDERS + 1)
+    np.testing.assert_allclose(found[:, 0], 3.0, atol=1e-4)
+    np.testing.assert_allclose(found[:, 1], 2.0 * np.exp(-0.4j), atol=1e-4)
+    np.testing.assert_allclose(found[:, 7], -0.5j, atol=1e-4)
+    np.testing.assert_allclose(found[:, 9], 0.0, atol=1e-4)
+
+
+def test_events_are_counted():
+    turns = np.arange(0.0, 5.0, 1e-3) + 5e-4
+    events = np.zeros(len(turns))
+    events[::100] = 1.0  # ten a revolution
+    found = harmonics(turns, events, count=True)
+    np.testing.assert_allclose(found[:, 0].real, 10.0, rtol=0.11)
+
+
+def test_a_table_is_read_by_angle_or_by_time_whose_frequency_is_found(tmp_path):
+    time = np.arange(0.0, 0.5, 2e-4)
+    true = 1.012 * SPEED  # the machine runs faster than its scene
+    values = wave(true * time)
+    degrees = np.mod(360.0 * true * time, 360.0)
+    by_angle = table(tmp_path / "a.csv", {"crank_angle [deg]": degrees, "torque [N m]": values})
+    by_time = table(tmp_path / "t.csv", {"time [s]": time, "torque [N m]": values})
+    synchronised = read_measured(by_angle, "crank_moment", "N m", SPEED)
+    free = read_measured(by_time, "crank_moment", "N m", SPEED)
+    assert (synchronised.synchronised, free.synchronised) == (True, False)
+    assert free.frequency == pytest.approx(true, rel=1e-4)
+    assert synchronised.highest == free.highest == 39  # below 0.4 of the sampling rate
+    for one in (synchronised, free):
+        assert abs(one.spectrum.mean[1]) == pytest.approx(2.0, rel=2e-3)
+        assert abs(one.spectrum.mean[7]) == pytest.approx(0.5, rel=2e-2)
+    assert np.angle(synchronised.spectrum.mean[1]) == pytest.approx(-0.4, abs=1e-3)
+
+
+def test_bad_tables_and_words_are_refused(tmp_path, scene):
+    time = np.arange(0.0, 0.05, 1e-3)
+    short = table(tmp_path / "s.csv", {"time [s]": time, "a [N m]": time, "b [N m]": time})
+    with pytest.raises(InputError, match="no column 'crank_moment'"):
+        read_measured(short, "crank_moment", "N m", SPEED)
+    with pytest.raises(InputError, match="2 whole revolutions"):
+        read_measured(short, "a", "N m", SPEED)
+    with pytest.raises(InputError, match=r"kg|unit"):
+        read_measured(short, "a", "m/s^2", SPEED)
+    blind = table(tmp_path / "b.csv", {"n": time, "crank_moment [N m]": time})
+    with pytest.raises(InputError, match="neither time nor crank angle"):
+        read_measured(blind, "crank_moment", "N m", SPEED)
+    for words, reason in (
+        ("joints.crank_rod.clearance", "is not PATH=LO:HI"),
+        ("joints.crank_rod.clearance=2um:1um", "do not rise"),
+        ("joints.crank_rod.clearance=1um:5kg", "kg"),
+        ("joints.crank_rod.clearanc=1um:5um", "clearanc"),
+        ("joints.crank_rod.clearance=1um:30mm", "as large as the bearing"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            Inputs.of(scene, [words])
+    with pytest.raises(InputError, match="two drive the same entry"):
+        Inputs.of(scene, [UNKNOWN, UNKNOWN])
+    with pytest.raises(InputError, match="no harmonic"):
+        Layout.of(Measured("a", Spectrum(np.zeros(9), np.zeros(9), 5), True, SPEED, 9), Sensor((0.0, 40.0)))  # fmt: skip
+
+
+def without_clearance(name: str, *joints: str, **tables: dict[str, str]):
+    """A shipped scene whose joints are ideal, over one revolution."""
+    scene = hpcclear.load_scene(ROOT / "jobs" / name).with_({"study": None})
+    changes = {joint: tables.get(joint.rpartition(".")[2], {"kind": "ideal"}) for joint in joints}
+    return scene.with_({**changes, "effects": {}, "numerics.averaged_revolutions": 1})
+
+
+def test_the_frame_force_is_the_reaction_of_all_masses():
+    rigid = without_clearance("slider_crank.toml", "joints.crank_rod", "joints.rod_slider")
+    response = hpcclear.simulate(rigid)
+    reaction = {"x": response["bearing_x"], "y": response["bearing_y"] + response["guide_force"]}
+    for axis in "xy":
+        size = float(np.abs(reaction[axis]).max())
+        found = series_of(rigid, response, f"frame_force_{axis}")
+        np.testing.assert_allclose(found, -reaction[axis], atol=1e-3 * size)
+
+
+def test_a_point_of_a_linkage_has_an_acceleration():
+    pins = {
+        "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+        "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "rocker.b"},
+    }
+    joints = ("mechanism.joints.o2", "mechanism.joints.o3")
+    rigid = without_clearance("linkages/crank_rocker.toml", *joints, **pins)
+    response = hpcclear.simulate(rigid)
+    found = series_of(rigid, response, "acceleration_x crank.b")
+    expected = -((2.0 * np.pi * 15.0) ** 2) * response["point_x"].sel(point="crank.b")
+    np.testing.assert_allclose(found, expected, atol=1e-3 * float(np.abs(expected).max()))
+
+
+def test_a_sensor_has_a_band_and_a_resonance():
+    sensor = Sensor((100.0, 1000.0), resonance=2000.0, quality=10.0)
+    response = sensor.response(np.array([0.0, 1000.0, 2000.0]))
+    np.testing.assert_allclose(np.abs(response), [1.0, 1.3303, 10.0], rtol=1e-4)
+    measured = Measured("slider_acceleration", Spectrum(np.zeros(65), np.zeros(65), 5), True, SPEED, 64)  # fmt: skip
+    assert Layout.of(measured, sensor).orders == tuple(range(2, 21))
+
+
+def test_a_measured_pressure_becomes_the_load_of_the_slider(tmp_path, scene):
+    degrees = np.arange(0.0, 360.0 * 6.0, 0.5)
+    pressure = 2.0 + np.cos(np.radians(degrees))
+    place = table(tmp_path / "p.csv", {"crank_angle [deg]": degrees, "p [bar]": pressure})
+    curve = np.array(loaded(scene, place, "p=10 cm2").effects.slider_load)
+    np.testing.assert_allclose(curve[:, 1], -1e-3 * 1e5 * (2.0 + np.cos(curve[:, 0])), atol=0.5)
+    with pytest.raises(InputError, match="COLUMN=AREA"):
+        loaded(scene, place, "p")
+
+
+# -- posterior --------------------------------------------------------------------------------------
+
+
+def test_the_sampler_finds_a_normal_posterior():
+    middle, factor = np.array([0.4, 0.6]), np.array([[0.05, 0.0], [0.03, 0.02]])
+
+    def likelihood(places):
+        return -0.5 * (np.linalg.solve(factor, (places - middle).T) ** 2).sum(axis=0)
+
+    found = sequential(likelihood, 2, 4000, np.random.default_rng(1))
+    np.testing.assert_allclose(found.mean(axis=0), middle, atol=0.004)
+    np.testing.assert_allclose(np.cov(found.T), factor @ factor.T, rtol=0.15, atol=1e-5)
+
+
+def spectra_of(places: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Packed spectra (n, 1, PARTS, orders) of a machine by formula: its chaos differs from one to the next."""
+    clearance, mass = places[:, :1], places[:, 1:2]
+    order = np.arange(ORDERS + 1.0)
+    mean = (1.0 + 0.2 * mass) * np.exp(-order / 6.0) * (1.0 + 0.6 * np.sin(clearance * (1.0 + order / 8.0)))  # fmt: skip
+    mean = mean * np.exp(0.3j * clearance * order)
+    chaos = 0.01 * (rng.standard_normal(mean.shape) + 1j * rng.standard_normal(mean.shape))
+    variance = np.full(mean.shape, 20.0 * 2e-4)
+    return Spectrum(mean + chaos, variance, 20).packed()[:, None]
+
+
+@pytest.fixture(scope="module")
+def made(scene):
+    """An ensemble by formula, and its preparation for a sensor with noise."""
+    whole = Inputs.of(scene, [UNKNOWN])
+    inputs = Inputs(whole.unknowns, whole.nuisances[:1])
+    places = design(1, inputs, 128)
+    spectra = spectra_of(places, np.random.default_rng(2))
+    ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
+    typical = Spectrum(ensemble.spectrum("crank_moment").mean[0], np.full(ORDERS + 1, 0.05), 20)
+    measured = Measured("crank_moment", typical, True, SPEED, ORDERS)
+    layout = Layout.of(measured, Sensor())
+    variance = features_of([measured], [layout])[1]
+    return ensemble, layout, prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 64)
+
+
+def machine(ensemble, layout, place, rng, change=0.0):
+    """Features of a new machine at a place, with noise; `change`: of its third harmonic."""
+    seen = Spectrum.unpacked(spectra_of(place[None], rng)[0, 0], 20)
+    noise = rng.standard_normal((2, ORDERS + 1)) * np.sqrt(0.5 * 0.05 / 20)
+    mean = seen.mean + noise[0] + 1j * noise[1]
+    mean[3] += change
+    measured = Measured("crank_moment", Spectrum(mean, np.full(ORDERS + 1, 0.05), 20), True, SPEED, ORDERS)  # fmt: skip
+    return features_of([measured], [layout])[0]
+
+
+def test_intervals_hold_and_are_narrow_where_the_model_is_right(made):
+    ensemble, layout, prepared = made
+    rng = np.random.default_rng(5)
+    places = rng.random((60, 2))
+    verdicts = [judged(prepared, machine(ensemble, layout, place, rng), 1, 400) for place in places]
+    truth = ensemble.inputs.values(places)[:, 0]
+    ends = np.array([one.interval[:, 0] for one in verdicts])
+    inside = (ends[:, 0] <= truth) & (truth <= ends[:, 2])
+    assert inside.mean() >= 0.9
+    assert np.median(ends[:, 2] - ends[:, 0]) < 0.25 * 140e-6
+    assert np.median(np.abs(ends[:, 1] - truth) / truth) < 0.1
+    assert np.mean([one.explained for one in verdicts]) >= 0.95
+
+
+def test_a_signal_that_no_member_has_is_refused_by_its_feature(made):
+    ensemble, layout, prepared = made
+    features = machine(ensemble, layout, np.array([0.5, 0.5]), np.random.default_rng(6), 0.8)
+    verdict = judged(prepared, features, 1, 400)
+    assert not verdict.explained
+    assert "harmonic 3 " in prepared.labels[verdict.worst]
+
+
+def test_two_clearances_that_only_their_sum_decides_are_not_identified_separately(scene):
+    pin = scene.resolved()["joints"]["crank_rod"]
+    both = scene.with_({"joints.rod_slider": pin})
+    other = UNKNOWN.replace("crank_rod", "rod_slider")
+    whole = Inputs.of(both, [UNKNOWN, other])
+    inputs = Inputs(whole.unknowns)
+    places = design(1, inputs, 128)
+    total = np.column_stack([places[:, :2].mean(axis=1), np.full(len(places), 0.5)])
+    spectra = spectra_of(total, np.random.default_rng(2))
+    ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
+    measured = Measured("crank_moment", ensemble.spectrum("crank_moment"), True, SPEED, ORDERS)
+    layout = Layout.of(measured, Sensor())
+    truth = np.array([0.5, 0.5])
+    values = machine(ensemble, layout, truth, np.random.default_rng(7))
+    variance = np.full(len(values), 0.5 * 0.05 / 20)
+    prepared = prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 32)
+    found = prepared, [judged(prepared, values, 1, 400)]
+    wanted = Wanted((UNKNOWN, other), (Path("a.csv"),))
+    gains = advice(ensemble, ["crank_moment"], Sensor(), SPEED, 0.1, 1)
+    content = identified_dataset(ensemble, found, np.zeros(1), gains, wanted, 1, {})
+    assert float(content["correlation"][0]) < -0.9
+    assert float(content["expected_correlation"][0, 0]) < -0.7  # the bounds cut errors off
+    assert "correlation of errors -0." in lines(content)[-1].text
+    assert any("not identified separately" in text for text in warnings(content))
+    widths = np.ptp(content["interval"][0].values, axis=1)
+    assert (widths > 3e-5).all()  # each is open, though their mean is known
+    each = content["posterior"][0, :, :2]
+    assert float(each.mean("input").std()) < 0.3 * float(each.std("particle").min())
+
+
+def test_noise_without_a_signal_leaves_the_unknown_open(made):
+    ensemble, layout, _ = made
+    size = len(layout.labels)
+    loud = prepare(ensemble, [layout], Sensor(), SPEED, np.full(size, 1e4), 1, 32)
+    low, _, high = judged(loud, np.zeros(size), 1, 400).interval[:, 0]
+    assert high - low > 0.8 * 140e-6
+
+
+def test_advice_ranks_more_revolutions_and_less_noise(made):
+    ensemble, _, _ = made
+    told = [advice(ensemble, ["crank_moment"], Sensor(), SPEED, share, 1) for share in (0.1, 3.0)]
+    widths = [one.half_width[0, :, 0] for one in told]
+    assert widths[1][-1] < widths[1][0]
+    assert (widths[1] > widths[0]).all()
+    quiet = noise_of(ensemble.spectrum("crank_moment"), 0.1, 512.0)
+    assert quiet[0] == pytest.approx(0.25 * quiet[1])
+
+
+def test_amplitudes_and_scatter_have_no_bias_from_noise():
+    """Without a crank angle harmonics have amplitudes only; what noise adds to them and to the scatter is taken off."""
+    rng = np.random.default_rng(4)
+    noise = rng.standard_normal((400, 30, ORDERS + 1, 2)) @ np.array([1.0, 1.0j]) * 0.5**0.5
+    true = np.full(ORDERS + 1, 0.4)
+    found = []
+    for own in noise:
+        measured = Measured("crank_moment", Spectrum.of(true + own), False, SPEED, ORDERS)
+        layout = Layout.of(measured, Sensor(), noise=1.0)
+        found.append(features_of([measured], [layout])[0])
+    means = dict(zip(layout.labels, np.mean(found, axis=0), strict=True))
+    assert means["amplitude of harmonic 5 of crank_moment"] == pytest.approx(0.4, abs=0.03)
+    assert means["harmonics 41 to 51 of crank_moment"] == pytest.approx(0.4 * 11**0.5, rel=0.03)
+    scatter = [value for name, value in means.items() if name.startswith("scatter")]
+    assert max(scatter) < 0.6  # of 1.0 a harmonic before the noise is taken off
+    assert layout.values(Spectrum(true, np.ones(ORDERS + 1), 30))[0][-1] == pytest.approx(5**0.5)  # fmt: skip
+
+
+def test_few_revolutions_enlarge_their_scatter():
+    few, many = (Spectrum(np.zeros(65), np.ones(65), count) for count in (4, 100))
+    np.testing.assert_allclose(known_scatter(few).variance, 3.0)
+    np.testing.assert_allclose(known_scatter(many).variance, 99.0 / 97.0)
+
+
+# -- several dates ----------------------------------------------------------------------------------
+
+
+def test_growth_has_a_rate_and_a_time_to_the_limit_with_intervals():
+    rng = np.random.default_rng(3)
+    times = seconds_of(("2026-01-01", "2026-01-11", "2026-01-31"), 3)
+    np.testing.assert_allclose(times, [0.0, 10 * DAY, 30 * DAY])
+    truth = 50e-6 + 1e-6 * times / DAY
+    particles = truth[:, None, None] + 2e-6 * rng.standard_normal((3, 4000, 1))
+    rate, left = history(times, particles, 100e-6, rng)
+    assert rate[1, 0] * DAY == pytest.approx(1e-6, rel=0.02)
+    expected = 1.96 * 2e-6 / np.sqrt(np.sum((times / DAY - 40.0 / 3.0) ** 2))
+    assert (rate[2, 0] - rate[0, 0]) * DAY / 2 == pytest.approx(expected, rel=0.1)
+    assert left[0, 0] < 20 * DAY < left[2, 0]
+    assert left[1, 0] == pytest.approx(20 * DAY, rel=0.05)
+    shrinking = history(times, particles[::-1], 100e-6, rng)
+    assert np.isinf(shrinking.time[1, 0])
+    assert history(times[:1], particles[:1], None, rng) is None
+
+
+@pytest.mark.parametrize(
+    ("dates", "reason"),
+    [(("2026-01-01",), "2 signals"), (("2026-01-01", "May"), "date"), (("2026-01-02", "2026-01-01"), "rise")],
+)  # fmt: skip
+def test_dates_that_are_none_are_refused(dates, reason):
+    with pytest.raises(InputError, match=reason):
+        seconds_of(dates, 2)
+
+
+# -- the command ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory, scene):
+    """Made tables of two dates."""
+    folder = tmp_path_factory.mktemp("measured")
+    for clearance in (42, 60):
+        real = scene.with_({"joints.crank_rod.clearance": 1e-6 * clearance})
+        write_made(prepared_scene(real), folder / f"{clearance}.csv", ["crank_moment"], noise=0.1, revolutions=12)  # fmt: skip
+    return [folder / "42.csv", folder / "60.csv"]
+
+
+@pytest.fixture(scope="module")
+def identified(measured, tmp_path_factory):
+    """The file, and what the command printed."""
+    place = tmp_path_factory.mktemp("identified") / "identify.nc"
+    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "-o", str(place), "--members", "32"]
+    words += [word for change in SHORT for word in ("--set", change)]
+    words += ["--advise", "--limit", "100um", "--progress", "quiet"]
+    for table, date in zip(measured, ("2026-01-01", "2026-03-01"), strict=True):
+        words += ["--signal", str(table), "--date", date]
+    done = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert done.exception is None, done.output
+    return place, done.output, done.return_value
+
+
+def test_the_command_prints_intervals_growth_and_advice(identified):
+    place, printed, code = identified
+    content = dataset.read(place, "identify")
+    assert code == (0 if content["explained"].all() else 4)
+    for words in ("crank_rod", "95 %", "per day", "time to", "by crank_moment", "by frame_force_x"):  # fmt: skip
+        assert words in " ".join(printed.split()), printed
+    ends = content["interval"].values[:, 0]
+    assert (ends[:, 0] < [42e-6, 60e-6]).all()
+    assert (ends[:, 2] > [42e-6, 60e-6]).all()
+    assert content["interval"].attrs["units"] == "m"
+
+
+def test_the_page_and_the_figures_show_it(identified, tmp_path):
+    place, _, _ = identified
+    page = write_report(place, output=tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Unknowns of the machine" in page
+    assert "was left out" not in page
+    content = dataset.read(place)
+    for draw in (report.posterior_figure, report.features_figure, report.growth_figure):
+        assert draw(content).axes
+    assert len(hpcclear.to_table(content)) == 1
+    with pytest.raises(InputError, match="no signal"):
+        report.posterior_figure(content.drop_vars("interval"))
+
+
+def test_an_answer_is_never_more_certain_than_it_is(identified):
+    content = dataset.read(identified[0]).isel(record=[0])
+
+    def said(low, middle, high, explained=1):
+        own = content.copy(deep=True)
+        own["interval"][0, 0] = [low, middle, high]
+        own["explained"][0] = explained
+        return own
+
+    assert interval(said(4.1e-5, 4.2e-5, 4.3e-5), 0, 0).startswith("42")
+    assert "not determined" in interval(said(1.5e-5, 7e-5, 1.45e-4), 0, 0)
+    assert interval(said(1.0e-5, 1.2e-5, 2e-5), 0, 0).startswith("at most")
+    assert interval(said(1.3e-4, 1.4e-4, 1.5e-4), 0, 0).startswith("at least")
+    refused = said(4.1e-5, 4.2e-5, 4.3e-5, 0)
+    assert "does not explain" in interval(refused, 0, 0)
+    assert re.search(r"does not explain .* the \w+", warnings(refused)[0])
+    assert any(line.label == "calibration" for line in lines(refused))
+
+
+def test_it_resumes_and_ends_with_the_same_bytes(measured, tmp_path, monkeypatch, scene):
+    monkeypatch.setattr(training, "CHUNK", 16)
+    words = (scene, UNKNOWN, measured[0])
+    place = tmp_path / "a.nc"
+    real, calls = training.responses_of, []
+
+    def breaking(*arguments):
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(training, "responses_of", breaking)
+    with pytest.raises(KeyboardInterrupt):
+        hpcclear.identify(*words, members=32, output=place, progress="quiet")
+    first = hpcclear.identify(*words, members=32, output=place, progress="quiet")
+    assert len(calls) == 3  # the finished half was not simulated again
+    again = hpcclear.identify(*words, members=32, output=place, progress="quiet")
+    xr.testing.assert_identical(first, again)
+    with pytest.raises(InputError, match="another run"):
+        hpcclear.identify(*words, members=64, output=place)
+
+
+@pytest.mark.mpi
+@pytest.mark.full
+def test_ranks_and_a_kill_change_no_byte(measured, tmp_path):
+    """`pytest -m full tests/test_identify.py`."""
+    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "--signal", str(measured[0]), "--members", "64"]  # fmt: skip
+    words += overrides(*SHORT)
+    files = []
+    for ranks in (0, 2):
+        out = tmp_path / str(ranks) / "identify.nc"
+        out.parent.mkdir()
+        code, printed = run([*words, "-o", str(out)], ranks)
+        assert code in (0, 4), printed
+        files.append(out.read_bytes())
+    assert files[0] == files[1]
+
+
+def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, scene):
+    with pytest.raises(InputError, match="nothing to identify"):
+        hpcclear.identify(scene, UNKNOWN)
+    with pytest.raises(InputError, match="no such signal"):
+        hpcclear.identify(scene, UNKNOWN, measured[0], of="crank_momen")
+    assert Unknown.of(scene, UNKNOWN).unit == "m"

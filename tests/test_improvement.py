@@ -1,0 +1,215 @@
+"""Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import moocore
+import numpy as np
+import pytest
+from commands import warm
+from patience import crowded
+
+from hpcclear.base.errors import InputError
+from hpcclear.ranks.boundary import alone
+from hpcclear.results import dataset
+from hpcclear.scene import load_scene
+from hpcclear.statistics.search import improvement
+from hpcclear.statistics.search.improvement import Known, Space
+from hpcclear.study import extent, refinement, run_study
+
+PROGRAMS = Path(__file__).parent / "mpi_programs"
+sys.path.insert(0, str(PROGRAMS))
+
+import formula  # noqa: E402
+
+BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
+
+
+def test_gain_is_the_mean_of_what_draws_win():
+    rng = np.random.default_rng(1)
+    mean, deviation = rng.normal(size=6), np.array([0.0, 0.1, 0.5, 1.0, 2.0, 0.0])
+    draws = mean + deviation * rng.standard_normal((400_000, 6))
+    won = np.maximum(0.3 - draws, 0.0).mean(axis=0)
+    np.testing.assert_allclose(improvement.gain(0.3, mean, deviation), won, atol=5e-3)
+
+
+def test_volume_is_the_mean_of_the_area_that_draws_add():
+    rng = np.random.default_rng(2)
+    front = np.array([[0.0, 1.0], [0.3, 0.4], [1.0, 0.0], [0.8, 0.8]])
+    mean = np.array([[0.2, 0.3], [0.9, 0.9], [-0.2, 0.5]])
+    deviation = np.array([[0.1, 0.2], [0.3, 0.3], [0.0, 0.1]])
+    found = improvement.volume(front, mean, deviation)
+    reference = np.full(2, 1.1)
+    before = moocore.hypervolume(front, reference)
+    for k in range(3):
+        draws = mean[k] + deviation[k] * rng.standard_normal((3000, 2))
+        areas = [moocore.hypervolume(np.vstack([front, one]), reference) - before for one in draws]
+        assert found[k] == pytest.approx(np.mean(areas), abs=4 * np.std(areas) / 3000**0.5 + 1e-9)
+
+
+def bowl(x):
+    """Least at (0.3, 0.5), 0; the other objective is the first variable."""
+    return (x[:, 0] - 0.3) ** 2 + 0.1 * (x[:, 1] - 0.5) ** 2
+
+
+def searched(space, rounds, rng, error=0.01, excess=None, count=4):
+    designs = space.snap(BOUNDS[:, 0] + rng.random((10, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0]))
+
+    def values(x):
+        return np.column_stack([bowl(x) + error * rng.standard_normal(len(x)), x[:, 0]])
+
+    table = values(designs)
+    for _ in range(rounds):
+        errors = np.tile([error, 0.0], (len(designs), 1))
+        known = Known(designs, table, errors, None if excess is None else excess(designs))
+        more = improvement.proposals(known, space, count, rng)
+        designs, table = np.vstack([designs, more]), np.vstack([table, values(more)])
+    errors = np.tile([error, 0.0], (len(designs), 1))
+    return Known(designs, table, errors, None if excess is None else excess(designs))
+
+
+def space_of(snap=lambda x: x):
+    return Space(BOUNDS, np.eye(2), (None, lambda x: x[:, 0]), snap)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_least_of_a_noisy_function_is_found_below_its_noise(seed):
+    """34 values with errors of 0.01: a believed end is within 0.004 of the least, and the other end is exact."""
+    rng = np.random.default_rng(seed)
+    known = searched(space_of(), 6, rng)
+    assert ((known.designs >= BOUNDS[:, 0]) & (known.designs <= BOUNDS[:, 1])).all()
+    ends = improvement.finalists(known, space_of(), 8, rng)
+    assert len(ends) <= 8
+    assert bowl(ends).min() < 0.004
+    assert ends[:, 0].min() < 1e-3
+
+
+def test_constraints_are_kept():
+    rng = np.random.default_rng(5)
+    known = searched(space_of(), 5, rng, excess=lambda x: 0.6 - x[:, 0])
+    ends = improvement.finalists(known, space_of(), 8, rng)
+    assert (ends[:, 0] > 0.55).all()
+    assert ends[:, 0].min() < 0.66
+
+
+def test_only_designs_of_a_catalogue_are_asked_for():
+    def snap(x):
+        return np.column_stack([np.round(x[:, 0] * 10.0) / 10.0, x[:, 1]])
+
+    known = searched(space_of(snap), 4, np.random.default_rng(6))
+    np.testing.assert_allclose(known.designs[:, 0] * 10.0, np.round(known.designs[:, 0] * 10.0))
+
+
+def test_three_objectives_have_proposals_too_and_the_same_seed_the_same_bits():
+    rng = np.random.default_rng(7)
+    designs = BOUNDS[:, 0] + rng.random((20, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = np.column_stack([bowl(designs), designs[:, 0], -designs[:, 1]])
+    known = Known(designs, values, np.full((20, 3), 1e-3))
+    space = Space(BOUNDS, np.eye(3), (None, None, None))
+    found = [improvement.proposals(known, space, 6, np.random.default_rng(8)) for _ in range(2)]
+    assert found[0].shape == (6, 2)
+    np.testing.assert_array_equal(*found)
+
+
+def test_too_few_designs_for_a_model_are_refused():
+    known = Known(np.full((3, 2), 0.5), np.ones((3, 2)), np.ones((3, 2)))
+    with pytest.raises(InputError, match="too few valid samples"):
+        improvement.proposals(known, Space(BOUNDS, np.eye(2), (None, None)), 4, np.random.default_rng(1))  # fmt: skip
+
+
+# -- a study ----------------------------------------------------------------------------------------
+
+STUDY = """
+[study]
+seed = 3
+samples = 20
+test_samples = 8
+[study.variables]
+m2 = { range = [0.105, 0.42] }
+m3 = { range = [0.07, 0.28] }
+C = { range = ["0.3 mm", "1 mm"] }
+[study.random]
+C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
+[study.cases.robust]
+random = ["C"]
+objectives = [{ statistic = "quantile", level = 0.9 }, { formula = "0 - m2 - m3" }]
+[study.sensitivity]
+groups = []
+[study.surrogate]
+of = "statistics"
+r2 = 0.5
+restarts = 0
+[study.swarm]
+particles = 10
+iterations = 5
+runs = 1
+archive = 8
+[study.verification]
+designs = 4
+infill_rounds = 1
+infill_designs = 6
+infill_samples = 64
+most_samples = 512
+response_windows = 2
+response_copies = 2
+"""
+
+
+def study():
+    return load_scene(tomllib.loads(formula.PHYSICS + STUDY))
+
+
+def contents(place: Path) -> dict[str, bytes]:
+    paths = [path for path in sorted(place.rglob("*.nc")) if path.name != "timing.nc"]
+    return {str(path.relative_to(place)): path.read_bytes() for path in paths}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    place = tmp_path_factory.mktemp("improved") / "whole"
+    with pytest.MonkeyPatch.context() as patch:
+        formula.replace_dynamics(patch.setattr)
+        run_study(study(), place, alone(), progress_style="quiet")
+    return place
+
+
+def test_statistics_are_searched_by_name_or_where_f_is_rough():
+    asked = study().required_study
+    assert refinement.by_statistics(asked, 1.0)
+    for of, r2, expected in (("f", 0.1, False), (None, 0.5, True), (None, 0.95, False), (None, np.nan, True)):  # fmt: skip
+        scene = study().with_({"study.surrogate.of": of})
+        assert refinement.by_statistics(scene.required_study, r2) is expected
+
+
+def test_a_search_by_statistics_ends_at_the_front(done):
+    """f rises with both masses: the front ends at their bounds; the swarm's own designs are not verified."""
+    found = dataset.read(done / "verification.nc", "verification")
+    alpha, beta = (found.sel(design=f"robust {end}") for end in ("alpha", "beta"))
+    region = refinement.box(study(), ("m2", "m3"))
+    np.testing.assert_allclose([float(beta[n]) for n in ("m2", "m3")], region.upper, rtol=1e-3)
+    assert float(alpha["first_true"]) == float(found["first_true"].min())
+    assert not any("averaged" in name for name in found["design"].to_numpy())
+    counted = extent.samples_of(study())
+    samples = dataset.read(done / "samples.nc", "samples")
+    assert samples.sizes["sample"] < sum(counted.values())
+
+
+def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
+    formula.replace_dynamics(monkeypatch.setattr)
+    assert formula.run_in_pieces(study(), str(tmp_path / "out"), alone()) > 4
+    assert contents(tmp_path / "out") == contents(done)
+
+
+@pytest.mark.mpi
+def test_a_search_by_statistics_has_the_same_bytes_on_two_ranks(done, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(study().text)
+    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
+    made = subprocess.run(
+        [str(Path(sys.executable).parent / "mpiexec"), "-n", "2", *program],
+        capture_output=True, text=True, timeout=crowded(120), check=False,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert contents(tmp_path / "out") == contents(done)
