@@ -150,7 +150,7 @@ def _refuse(
 def snapped(
     study: Study, names: Sequence[str], coordinates: Array, *, model: bool = False
 ) -> Array:
-    """The nearest designs that exist, in sampling coordinates, (n, d), a column a name.
+    """The nearest designs that exist, in sampling coordinates, SI, (n, d), a column a name.
 
     With `model`, variables about whose designs something is random keep their numbers: a surrogate needs them between
     designs, too.
@@ -165,7 +165,7 @@ def snapped(
 
 
 def nearest_of(options: Sequence[float], values: Array) -> Array:
-    """The nearest of some rising numbers, (n,)."""
+    """The nearest of some rising numbers, SI, (n,)."""
     table = np.asarray(options)
     middles = (table[1:] + table[:-1]) / 2.0
     return np.asarray(table[np.searchsorted(middles, values)])
