@@ -158,7 +158,7 @@ def sample_points(
     StorageError
         The disk refuses.
     """
-    from hpcclear.scene.choices import expanded
+    from hpcclear.scene.points import expanded
 
     sent = expanded(
         scene.study, points

@@ -8,8 +8,8 @@ import numpy as np
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
-from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import Box, box, to_coordinates
+from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
