@@ -59,9 +59,17 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "usual",
+        "draws",
+        pytest.param("accurate", marks=pytest.mark.full),
+        pytest.param("percentile", marks=pytest.mark.full),
+    ],
+)
 def test_a_study_takes_what_its_forecast_says(kind, tmp_path, monkeypatch):
-    """Within a factor of 1.5."""
+    """Within a factor of 1.5; all of them: ``python -m pytest tests/test_forecast.py -m ""``."""
     formula.replace_dynamics(monkeypatch.setattr)
     scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY), KINDS[kind])
     said, seconds = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)

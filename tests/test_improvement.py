@@ -202,8 +202,10 @@ def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, t
     assert contents(tmp_path / "out") == contents(done)
 
 
+@pytest.mark.full
 @pytest.mark.mpi
 def test_a_search_by_statistics_has_the_same_bytes_on_two_ranks(done, tmp_path):
+    """``python -m pytest tests/test_improvement.py -m full``"""
     scene = tmp_path / "scene.toml"
     scene.write_text(study().text)
     program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])

@@ -1,5 +1,6 @@
 """Rare failures: indices from few values, probabilities by importance sampling, and designs at the edge of what is allowed."""
 
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -7,7 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from commands import warm
 from margins import fewest
+from patience import crowded
 from scipy import stats
 
 from hpcclear.base.errors import InputError
@@ -20,7 +23,8 @@ from hpcclear.statistics.random import tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare
 from hpcclear.study import rare, run_study
 
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
+PROGRAMS = Path(__file__).parent / "mpi_programs"
+sys.path.insert(0, str(PROGRAMS))
 
 import formula
 
@@ -247,3 +251,27 @@ def test_a_study_of_rare_failures_stopped_after_every_stage_ends_with_the_same_b
     for path in sorted((tmp_path / "whole").glob("*.nc")):
         if path.name != "timing.nc":
             assert path.read_bytes() == (tmp_path / "pieces" / path.name).read_bytes(), path.name
+
+
+@pytest.mark.full
+@pytest.mark.mpi
+@pytest.mark.parametrize("way", ["two ranks", "in pieces"])
+def test_rare_failures_have_the_same_bytes_on_any_way(way, tmp_path, monkeypatch):
+    """``python -m pytest tests/test_rare.py -m full -k same_bytes``"""
+    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY))
+    formula.replace_dynamics(monkeypatch.setattr)
+    run_study(scene, tmp_path / "whole", alone(), progress_style="quiet")
+    if way == "in pieces":
+        formula.run_in_pieces(scene, str(tmp_path / "out"), alone())
+    else:
+        (tmp_path / "scene.toml").write_text(scene.text)
+        program = [
+            str(PROGRAMS / "formula.py"),
+            str(tmp_path / "scene.toml"),
+            str(tmp_path / "out"),
+        ]
+        words = [str(Path(sys.executable).parent / "mpiexec"), "-n", "2", *warm().words(program)]
+        made = subprocess.run(words, capture_output=True, text=True, timeout=crowded(300), check=False)  # fmt: skip
+        assert made.returncode == 0, made.stderr
+    for name in ("verification.nc", "samples.nc", "contributions.nc"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

@@ -52,7 +52,8 @@ class Study(Moving, Table):
     accuracy: MomentAccuracy | None = None
     """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: a number for
     both, or a table. Each design is simulated until it meets them. They include the error of the integration tolerance,
-    measured by pairs of samples at a tighter tolerance. Left out: `mean = 0.002`, `deviation = 0.005`, sampling error only."""
+    measured by pairs of samples at a tighter tolerance. Left out: `mean = 0.002`, `deviation = 0.005` of the sampling error
+    alone; the intervals then contain the error of the tolerance too, from a few pairs."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None
