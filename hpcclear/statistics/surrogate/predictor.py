@@ -101,7 +101,7 @@ def kernel_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level
 
 @cached
 def matern_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
-    """`kernel_sum` with the Matern function of order 5/2; takes and returns the same."""
+    """`kernel_sum` with the Matern function of order 5/2: places (n, d), scaled (d, p), lengths (d,), weights (p,) to (n,)."""
     dims = np.arange(lengths.size)
     row = np.empty(weights.size)
     out = np.empty(unit.shape[0])
