@@ -9,8 +9,8 @@ import tomllib
 
 import numpy as np
 import pytest
-from patience import crowded
 from commands import warm
+from patience import crowded
 
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
