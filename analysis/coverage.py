@@ -70,7 +70,7 @@ def truths(scene: Scene, designs: list[Choice], count: int) -> np.ndarray:
     made = truth.doubled(run, designs, "truth", "truth", count // REPLICATES, count)
     return np.array(
         [
-            [[one.value, one.error] for one in truth.estimates_of(run, choice, values[0])[:3]]
+            [[one.value, one.error] for one in truth.estimates_of(run, choice, values)[:3]]
             for choice, values in zip(designs, made, strict=True)
         ]
     )

@@ -19,7 +19,7 @@ class Here(Simulations):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, alone(), None)  # type: ignore[arg-type]
 
-    def records(self, points: Points, stage: str) -> np.ndarray:
+    def _records(self, points: Points, stage: str) -> np.ndarray:
         """Outcome records of designs, in their order."""
         return asked(evaluate_records(self.scene, points), self.scene.objective)
 

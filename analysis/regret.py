@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from directly import run_of
 
+from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
@@ -244,7 +245,7 @@ def measured(place: Path, label: str, scene: Scene, rounds: int, judged: int) ->
         text = f"{(values[row] - values[least]) / scale:.2f} % ± {error / scale:.2f} %"
         text += " (breaks a constraint)" if broken[row] else ""
         changed = scene.with_({"study.surrogate.of": of})
-        said, _ = forecast.expected(changed, partial(evaluate_records, changed), 1e-3)
+        said, _ = forecast.expected(changed, partial(evaluated, changed), 1e-3)
         text += f"; forecast {said / count:.2f} of its simulations"
         print(f"{label:24} {of:12} {float(models.r2[-1]):8.2f} {count:12} {text}", flush=True)
 
@@ -266,6 +267,11 @@ def carried_out(scene: Scene, place: Path) -> tuple[Path, int]:
     if not kept.exists():
         kept.write_text(json.dumps(counted))
     return directory, sum(json.loads(kept.read_text()).values())
+
+
+def evaluated(scene: Scene, points: Points) -> np.ndarray:
+    """Records of a study's objective."""
+    return asked(evaluate_records(scene, points), scene.objective)
 
 
 def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict[str, np.ndarray]:

@@ -177,7 +177,7 @@ REFUSED = {
     "tight fit": ({"fit": {**OF_FIT, "fits": ["40 H7/p6", "40 H7/f7"]}, "C12": C12},
                   {"C12": {"distribution": "fit"}}, "without clearance"),
     "fits twice": ({"fit": {"fits": FITS[:1] * 2, "path": "joints.crank_rod.fit"}}, {}, "twice"),
-    "baseline": ({"fit": {"fits": FITS[1:], "path": "joints.crank_rod.fit"}}, {}, "none of its rows"),
+    "baseline": ({"fit": {"fits": FITS[1:], "path": "joints.crank_rod.fit"}}, {}, "not among its rows"),
     "unknown input": ({"m3": M3, "t": {"range": [1e-3, 2e-3], "path": "random.q.half_width"}}, {}, "not a random input"),
     "no such entry": ({"m3": M3, "t": {"range": [1e-3, 2e-3], "path": "random.m3.width"}},
                       {"m3": {"distribution": "uniform", "half_width": 0.01}}, "no entry of a random input"),

@@ -3,7 +3,6 @@
 import sys
 import time
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -264,9 +263,13 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         return rows
     whole = 0
     if scene.study.cases:
+        from hpcclear.base.objectives import asked
         from hpcclear.study.forecast import expected
 
-        whole, each = expected(scene, partial(evaluate_records, scene), each)
+        def evaluated(points: Points) -> np.ndarray:
+            return asked(evaluate_records(scene, points), scene.objective)
+
+        whole, each = expected(scene, evaluated, each)
     rows.append(("hpcclear sample", _all(scene.study.samples, each)))
     if whole:
         rows.append(("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear plan"))

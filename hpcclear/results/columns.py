@@ -258,7 +258,7 @@ WORST: Columns = {
     "worst": number(("design",), "objective",
         "largest objective found within the bounds of the random inputs", required=True),
     "worst_corner": number(("design",), "objective", "the largest at a corner of these bounds", required=True),
-    "at": number(("design", "input"), "", "value of the random input at the largest, in the unit beside it", required=True),
+    "searched_at": number(("design", "input"), "", "value of the random input there, in the unit beside it", required=True),
     "tried": count(("design",), "simulations of the search", required=True),
     "without_bounds": flag(("input",), "whether the input has no bounds and is taken within three standard deviations"),
     "input_unit": text(("input",), "unit of the random input"),

@@ -14,7 +14,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import asked
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
@@ -60,7 +59,7 @@ class _Here(Simulations):
         if not self.count:
             self._evaluate(points.take(np.arange(1)))  # compiles
         start = time.perf_counter()
-        found = asked(self._evaluate(points), self.scene.objective)
+        found = self._evaluate(points)
         self.seconds += time.perf_counter() - start
         self.count += len(points)
         return found
@@ -77,7 +76,7 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
     scene : Scene
         With cases.
     evaluate : function
-        Points to records.
+        Points to records of the study's objective.
     seconds : float
         Of a simulation, as far as is known without a pilot.
     """
@@ -108,9 +107,8 @@ def _of_case(run: StudyRun, case: Case) -> float:
     settings = study.verification
     if settings.draws is not None:
         return float(settings.draws)
-    values = [f for f, _ in made]
     early, late = (
-        np.array([_errors(run, one, f[:, :n]) for one, f in zip(choices, values, strict=True)])
+        np.array([_errors(run, one, its[..., :n]) for one, its in zip(choices, made, strict=True)])
         for n in (PART, LENGTH)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -123,15 +121,16 @@ def _of_case(run: StudyRun, case: Case) -> float:
     return float(np.clip(longer * most, least, settings.most_samples).mean())
 
 
-def _errors(run: StudyRun, choice: Choice, f: Array) -> Array:
-    """Half-widths of all that a design is verified in, over the accuracy requested, from f (replicates, n); (k,)."""
+def _errors(run: StudyRun, choice: Choice, values: Array) -> Array:
+    """Half-widths of all that a design is verified in, over the accuracy requested, (k,), from values (responses,
+    replicates, n)."""
     settings, case = run.study.verification, run.study.case(choice.case)
-    mean, deviation, _, *others = truth.estimates_of(run, choice, f)
+    mean, deviation, _, *others = truth.estimates_of(run, choice, values)
     wanted = run.study.wanted
     rows = [(mean, wanted.mean, mean.value), (deviation, wanted.deviation, deviation.value)]
     for goal, one in zip((*case.goals, *case.kept), others, strict=True):
         decided = goal in case.kept and verdicts.rare(goal, settings)
-        if goal.statistic in ("quantile", "exceedance") and not decided:
+        if not goal.exact and not decided:
             share, relative = goals.wanted(goal, wanted)
             rows.append((one, share, one.value if relative else 1.0))
     width = student(settings.confidence, REPLICATES - 1)
