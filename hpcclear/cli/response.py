@@ -46,7 +46,7 @@ def _impact_table(rows: list[list[str]]) -> Table:
     made = Table(title=noise.TITLE, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     for header in noise.HEADER:
         made.add_column(
-            header, justify="left" if header == "joint" else "right", no_wrap=header != "joint"
+            header, justify="left" if header == "joint" else "right", no_wrap=True, overflow="fold"
         )
     for row in rows:
         made.add_row(*map(fitting, row))

@@ -68,7 +68,6 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
 
     Parameters
     ----------
-    run : StudyRun
     known : mapping of case to arrays
         Sampling coordinates (n, d), what the case makes small (n, objectives), what steers to its constraints (n,).
 

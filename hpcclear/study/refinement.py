@@ -109,7 +109,6 @@ def search(
 
     Parameters
     ----------
-    run : StudyRun
     start : sequence of Choice
         Designs of the swarm, of all cases.
     statistics : bool
