@@ -77,7 +77,7 @@ def by_revolution(
 def measured(
     periods: Array, integrals: Array, cycle: float, joints: int, *, rigid: bool
 ) -> dict[str, Array]:
-    """What `by_revolution` gives as the file has it: of each revolution (r, ...), of all of them (...), and half-widths.
+    """What `by_revolution` gives as the file has it: of each revolution (r, joints), of all of them (joints,), and half-widths.
 
     Arguments as of `by_revolution`.
     """
