@@ -77,7 +77,10 @@ def by_revolution(
 def measured(
     periods: Array, integrals: Array, cycle: float, joints: int, *, rigid: bool
 ) -> dict[str, Array]:
-    """`by_revolution` as the file has it, (revolutions, joints): of each revolution, of all, and half-widths of the latter."""
+    """What `by_revolution` gives as the file has it: of each revolution (r, joints), of all of them (joints,), and half-widths.
+
+    Arguments as of `by_revolution`.
+    """
     each = by_revolution(periods, integrals, cycle, joints, rigid=rigid)
     together = by_revolution(
         periods.mean(keepdims=True),
