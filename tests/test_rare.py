@@ -26,7 +26,7 @@ from hpcclear.study import rare, run_study
 PROGRAMS = Path(__file__).parent / "mpi_programs"
 sys.path.insert(0, str(PROGRAMS))
 
-import formula
+import formula  # noqa: E402
 
 # -- indices ----------------------------------------------------------------------------------------
 
