@@ -69,7 +69,12 @@ def mechanisms() -> dict[str, dict[str, Any]]:
         "d": uniform("effects.contact.damping", 0.1),
     })  # fmt: skip
     drag = {"mechanism.loads.drag": {"kind": "torque", "body": "rocker", "torque": -0.3}}
+    few = ["joints.crank_rod.clearance=10um:150um"]
+    wild = {"drive.speed": 1500 * np.pi / 30, "effects.contact.restitution": 0.9}
+    wild |= {friction: 0.01, "study.random.friction.half_width": 0.004}
+    wild |= {"study.random.restitution.half_width": 0.03}
     return {
+        "chaotic": {"scene": slider.with_(wild), "unknowns": few, "two": {}, "lacks": []},
         "slider-crank": {
             "scene": slider,
             "unknowns": ["joints.crank_rod.clearance=10um:150um", "joints.rod_slider.clearance=10um:150um"],
@@ -222,8 +227,8 @@ def summary(folder: Path) -> None:
 
 
 def raw(folder: Path, members: int) -> None:
-    """Least squares on the raw signal, and features, of a machine of 42 um with more friction and a heavier piston."""
-    scene, _ = model_of("slider-crank", 1)
+    """Least squares on the raw signal, and features, of a chaotic machine of 42 um with more friction and a heavier piston."""
+    scene, _ = model_of("chaotic", 1)
     plain = prepared_scene(scene)
     grid = np.arange(20e-6, 80e-6, 2.5e-6)
     place = folder / "raw.npz"
@@ -237,10 +242,10 @@ def raw(folder: Path, members: int) -> None:
         np.savez(place, **{n: np.array([c[n] for c in curves]) for n in curves[0]})
     stored = np.load(place)
     change = {"joints.crank_rod.clearance": 42e-6, "numerics.rtol": 1e-8}
-    change |= {"mechanism.slider.mass": 0.14 * 1.005, "effects.friction.coefficient": 0.05 * 1.3}
+    change |= {"mechanism.slider.mass": 0.14 * 1.005, "effects.friction.coefficient": 0.01 * 1.3}
     real = plain.with_(change)
     response = simulate(real, checked=False)
-    ensemble = ensemble_of(folder, "slider-crank", 1, members)
+    ensemble = ensemble_of(folder, "chaotic", 1, members)
     frequency = frequency_of(plain)
     for noise in NOISE:
         for name in ("slider_acceleration", "crank_moment"):

@@ -10,6 +10,7 @@ group of modules each of which reaches the others by imports.
 
 import argparse
 import ast
+import graphlib
 import io
 import statistics
 import subprocess
@@ -74,6 +75,23 @@ def top(name: str) -> str:
     return name.split(".")[1] if "." in name else PACKAGE
 
 
+def floors_of(edges: set[tuple[str, str]], package: str) -> tuple[int, int]:
+    """Rooms of a package (its files and folders), and floors: the longest chain of rooms each of which uses the next."""
+    inside = [
+        tuple(name.split(".")[2] for name in edge)
+        for edge in edges
+        if all(name.startswith(f"{package}.") for name in edge)
+    ]
+    below: dict[str, set[str]] = {room: set() for edge in inside for room in edge}
+    for a, b in inside:
+        if a != b:
+            below[a].add(b)
+    height: dict[str, int] = {}
+    for room in graphlib.TopologicalSorter(below).static_order():
+        height[room] = 1 + max((height[one] for one in below[room]), default=0)
+    return len(height), max(height.values())
+
+
 def functions(root: Path) -> list[tuple[int, int, str]]:
     """Lines, arguments and place of every function."""
     found = []
@@ -110,6 +128,11 @@ def measure(root: Path) -> list[tuple[str, str]]:
         ("entries at the top", f"{len(rooms)} folders, {len(loose)} loose modules"),
         ("import arrows between them", f"{len(arrows)}"),
         ("import circles of modules", f"{len(circles)}"),
+        ("rooms and floors of dynamics", "{} on {}".format(*floors_of(edges, "hpcclear.dynamics"))),
+        (
+            "files that ask is_planar",
+            f"{sum('is_planar' in p.read_text() for p in known.values())}",
+        ),
         ("modules", f"{len(known)}, {sum(sizes.values())} lines"),
         (
             "module, median and largest",

@@ -2,8 +2,8 @@
 # Both commands on other machines: in bare roots made by debootstrap, from a clone of what is committed here.
 #   bash tests/elsewhere.sh [--with TEXT] SETTING...    TEXT: options of tests/run.sh, such as --quick
 #   bash tests/elsewhere.sh --table                     results so far, into CONTRIBUTING.md
-# Settings: debian12 debian13 lowest latest bits256 bits512 no-fma load8 user umlaut home-read-only. All but debian12 and
-# lowest (Python 3.11) are on Debian 13. Several at once are joined: debian12+lowest+umlaut.
+# Settings: debian12 debian13 python314 lowest latest bits256 bits512 no-fma load8 user umlaut home-read-only. All but debian12,
+# lowest (Python 3.11) and python314 (Debian 14, testing) are on Debian 13. Several at once are joined: debian12+lowest+umlaut.
 # Roots are kept in ELSEWHERE (/var/tmp/hpcclear-elsewhere), results in results/elsewhere. The system underneath is this
 # machine's; so are PIP_* and *SSL*, *CERT* variables and certificates.
 set -euo pipefail
@@ -38,12 +38,15 @@ table() {
 
 # A root with Python and what a user of it would have: root_of RELEASE
 root_of() {
-    local root=$place/$1
+    local root=$place/$1 python=python3 script=/usr/share/debootstrap/scripts/$1
+    [ "$1" != forky ] || python=python3.14
+    [ -e "$script" ] || script=${script%/*}/sid # a release that is newer than debootstrap
     if [ ! -f "$root/.whole" ]; then
         rm -rf --one-file-system "$root"
         mkdir -p "$place"
-        debootstrap --variant=minbase --include=python3,python3-venv,git,ca-certificates,util-linux \
-            "$1" "$root" "$mirror" >"$place/$1.log" 2>&1 || refuse "debootstrap $1 failed: $place/$1.log"
+        debootstrap --variant=minbase --include="$python,$python-venv,git,ca-certificates,util-linux" \
+            "$1" "$root" "$mirror" "$script" >"$place/$1.log" 2>&1 || refuse "debootstrap $1 failed: $place/$1.log"
+        [ "$python" = python3 ] || ln -sf "/usr/bin/$python" "$root/usr/local/bin/python3"
         touch "$root/.whole"
     fi
     # The network as this machine sees it, also after that has changed.
@@ -76,6 +79,7 @@ run_setting() {
         debian13) ;;
         latest) option=--latest ;;
         debian12) release=bookworm ;;
+        python314) release=forky ;;
         lowest) release=bookworm option=--lowest ;;
         bits256) settings=("NUMBA_CPU_NAME=generic" "NUMBA_CPU_FEATURES=$(features 'avx512')") ;;
         bits512)
@@ -162,7 +166,7 @@ while [ $# -gt 0 ]; do
     *)
         for part in ${1//+/ }; do
             case $part in
-            debian12 | debian13 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only) ;;
+            debian12 | debian13 | python314 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only) ;;
             *) refuse "there is no setting $part" ;;
             esac
         done

@@ -1,4 +1,4 @@
-"""Studies of the new kinds of variables: allocation against closed forms, fits by enumeration, load cases, worst cases,
+"""Studies of these variables: allocation against closed forms, fits by enumeration, load cases, worst cases,
 constraints on other responses, and the same bytes on any number of ranks."""
 
 import itertools
@@ -9,8 +9,8 @@ import tomllib
 
 import numpy as np
 import pytest
-from patience import crowded
 from commands import warm
+from patience import crowded
 
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
@@ -32,7 +32,7 @@ MIDDLES = {
 SMALL = {
     "seed": 3, "samples": 30, "test_samples": 12, "sensitivity": {"groups": []},
     "surrogate": {"restarts": 0, "cuts": 0, "r2": 0.9},
-    "swarm": {"particles": 30, "iterations": 40, "runs": 1, "archive": 12},
+    "swarm": {"particles": 24, "iterations": 30, "runs": 1, "archive": 12},
     "verification": {"infill_rounds": 1, "infill_designs": 6, "designs": 2, "most_samples": 4096,
                      "response_windows": 2, "response_copies": 2},
 }  # fmt: skip
@@ -132,7 +132,11 @@ def all_kinds():
             {"statistic": "quantile", "most": "0.62 mm"},
         ],
     }
-    return scene_with(variables, random, case, physics, worst_case=True)
+    swarm = {"particles": 16, "iterations": 15, "runs": 1, "archive": 12}
+    few = {**SMALL["verification"], "infill_designs": 3, "designs": 1, "most_samples": 1024}
+    return scene_with(
+        variables, random, case, physics, worst_case=True, swarm=swarm, verification=few
+    )
 
 
 @pytest.fixture(scope="module")
@@ -195,9 +199,12 @@ def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
         _, clearance = scene.study.law(scene.study.random_input("C12"), {"fit": fit}).span
         inertia = list(RODS.values())[int(one["rod"])][0]
         corner = f_of(0.97 * float(one["m2"]), float(one["m3"]), clearance, inertia)
-        assert float(own["worst"]) == pytest.approx(corner, rel=1e-9)
+        # of a fit all but the last 1e-16 of the machines are within reach
+        assert float(own["worst"]) == pytest.approx(corner, rel=1e-4)
         assert float(own["worst"]) >= float(one["percentile"])
-        assert own["at"].to_numpy() == pytest.approx([clearance, 0.97 * float(one["m2"])], rel=1e-9)
+        assert own["searched_at"].to_numpy() == pytest.approx(
+            [clearance, 0.97 * float(one["m2"])], rel=1e-3
+        )
     assert np.isnan(worst["worst"].sel(design="a best alpha").item())
     files = {"verification": found, "worst": worst}
     text = next(line.text for line in answer(files, "x") if line.label == "worst case")

@@ -320,7 +320,7 @@ def test_more_is_looked_for_near_each_end(seed):
     designs = BOUNDS[:, 0] + rng.random((40, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
     models = [TwoScales(designs, column, BOUNDS, rng) for column in rippled(designs).T]
     ends = [int(model.predict(designs).argmin()) for model in models]
-    found = infill._about(models, designs, ends, BOUNDS, rng)
+    found = infill._about(models, designs, ends, BOUNDS, rng, np.asarray)
     assert found.shape == (2 * len(infill.NEARBY), 2)
     assert ((found >= BOUNDS[:, 0]) & (found <= BOUNDS[:, 1])).all()
     reach = 1.001 * infill.LOCAL * (BOUNDS[:, 1] - BOUNDS[:, 0])

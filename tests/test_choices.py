@@ -8,11 +8,10 @@ import pytest
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import load_scene
-from hpcclear.scene.choices import expanded, nearest_of, snapped
 from hpcclear.scene.domain import box
 from hpcclear.scene.goals import Goal
 from hpcclear.scene.iso286 import fit_of
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Points, expanded, nearest_of, snapped
 from hpcclear.scene.sampling import latin_hypercube, monte_carlo
 
 JOB = tomllib.loads(
@@ -177,7 +176,7 @@ REFUSED = {
     "tight fit": ({"fit": {**OF_FIT, "fits": ["40 H7/p6", "40 H7/f7"]}, "C12": C12},
                   {"C12": {"distribution": "fit"}}, "without clearance"),
     "fits twice": ({"fit": {"fits": FITS[:1] * 2, "path": "joints.crank_rod.fit"}}, {}, "twice"),
-    "baseline": ({"fit": {"fits": FITS[1:], "path": "joints.crank_rod.fit"}}, {}, "none of its rows"),
+    "baseline": ({"fit": {"fits": FITS[1:], "path": "joints.crank_rod.fit"}}, {}, "not among its rows"),
     "unknown input": ({"m3": M3, "t": {"range": [1e-3, 2e-3], "path": "random.q.half_width"}}, {}, "not a random input"),
     "no such entry": ({"m3": M3, "t": {"range": [1e-3, 2e-3], "path": "random.m3.width"}},
                       {"m3": {"distribution": "uniform", "half_width": 0.01}}, "no entry of a random input"),

@@ -31,7 +31,8 @@ def test_a_table_is_its_rows_and_stores_its_integral():
     )
     behind = np.array([5e-6, 6e-6, 7e-6])
     steps = np.diff(numbers.evaluate(shape.elastic, {"depth": behind, **units}))
-    assert steps[0] == pytest.approx(steps[1], rel=1e-12) and steps[0] > 0.0
+    assert steps[0] == pytest.approx(steps[1], rel=1e-12)
+    assert steps[0] > 0.0
     nodes, weights = np.polynomial.legendre.leggauss(4)
     for low, high in ((1e-6, 2e-6), (2e-6, 4e-6), (4e-6, 9e-6)):
         inside = low + (high - low) * (1 + nodes) / 2

@@ -39,7 +39,7 @@ def test_wanted_keys_get_a_sentence(key, words):
 @pytest.mark.parametrize(
     ("row", "words"),
     [
-        ({"kind": "torsion-spring", "body": "crank"}, "k r^2"),
+        ({"kind": "rotary spring", "body": "crank"}, "torsion-spring"),
         ({"kind": "gas force", "place": "crank.a"}, "bore = "),
         ({"kind": "damper"}, "stiffness = 0"),
     ],

@@ -52,6 +52,7 @@ FILES = (
     "docs/how-to/identify.md",
     "docs/how-to/linkage.md",
     "docs/how-to/mechanism.md",
+    "docs/how-to/noise.md",
     "docs/how-to/objective.md",
     "docs/how-to/oil-film.md",
     "docs/how-to/resume.md",

@@ -129,6 +129,8 @@ def _value(field: dict[str, Any], names: dict[str, str]) -> str:
             kept = [choice for choice in field[key] if not {"null", "like"} & _shape(choice)]
             words = [_value(choice, names) for choice in kept]
             return " or ".join(dict.fromkeys(words))
+    if isinstance(field.get("type"), list):
+        return " or ".join(_value({**field, "type": one}, names) for one in field["type"])
     if field.get("type") == "array":
         inside = field.get("items") or field.get("prefixItems", [{}])[0]
         return f"list of {_value(inside, names)}"

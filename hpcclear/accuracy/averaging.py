@@ -102,8 +102,6 @@ def gaps_of_revolutions(lanes: Lanes, par: Array, start: Start, revolutions: int
     lanes : Lanes
         Empty, of a problem that averages one revolution without a transient.
     par : ndarray, shape (samples, PARAMETERS)
-    start : Start
-    revolutions : int
     """
     count = len(par)
     gaps = np.full((revolutions, count, MAX_JOINTS), np.nan)

@@ -82,7 +82,6 @@ class Equations:
 
     Parameters
     ----------
-    problem : Problem
     par : ndarray, shape (PARAMETERS,)
     start : Start
         Of this design alone, as `hpcclear.dynamics.start` makes it.

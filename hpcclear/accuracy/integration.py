@@ -78,8 +78,6 @@ def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> 
 
     Parameters
     ----------
-    scene : Scene
-    profile : Profile
     notify : callable
         Gets the name of each method as its turn comes.
 

@@ -55,12 +55,8 @@ class Panels:
 
     Parameters
     ----------
-    scene : Scene
-    ranks : Ranks
-    profile : Profile
     notify : callable
         Gets what is going on, a line at a time.
-    store : Store
     show : callable
         Gets the dataset of all that is there whenever there is more of it.
     """

@@ -70,10 +70,8 @@ def measure(
     ----------
     scene : Scene
         With a study that has the case.
-    case : str
     model : Leaf
         In the inputs of the study's optimisation.
-    profile : Profile
     values : ndarray, shape (n,)
     each : float
         Of `simulate`.

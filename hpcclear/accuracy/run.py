@@ -33,8 +33,6 @@ def measure(
     ----------
     scene : Scene
         With a clearance joint at least.
-    ranks : Ranks
-    profile : Profile
     notify : callable
         Gets what is going on, a line at a time.
     store : Store, optional

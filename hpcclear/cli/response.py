@@ -24,10 +24,9 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     status = Status(int(response["status"]))
     loads = bearings.bearings(response)
     if status.valid and loads:
-        impacts = noise.joints(response)
-        if impacts:
-            out.print(_impact_table(impacts))
         out.print(_bearing_table(loads, gaps=response.attrs.get("references") == TITLE))
+        if impacts := noise.joints(response):
+            out.print(_impact_table(impacts))
     out.print(table("Response", [*_status_rows(response), *_rows(response, seconds)]))
     for label, text in bearings.remarks(response):
         out.print(remark(label, text))
@@ -46,7 +45,9 @@ def _impact_table(rows: list[list[str]]) -> Table:
     """What a revolution has of impacts, a row for each joint."""
     made = Table(title=noise.TITLE, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     for header in noise.HEADER:
-        made.add_column(header, justify="left" if header == "joint" else "right", overflow="fold")
+        made.add_column(
+            header, justify="left" if header == "joint" else "right", no_wrap=True, overflow="fold"
+        )
     for row in rows:
         made.add_row(*map(fitting, row))
     return made

@@ -102,7 +102,6 @@ class Evaluator:
 
     Parameters
     ----------
-    scene : Scene
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
     lanes : int, optional

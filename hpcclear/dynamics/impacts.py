@@ -77,7 +77,7 @@ def by_revolution(
 def measured(
     periods: Array, integrals: Array, cycle: float, joints: int, *, rigid: bool
 ) -> dict[str, Array]:
-    """What `by_revolution` gives as the file has it: of each revolution, of all of them, and half-widths of the latter."""
+    """`by_revolution` as the file has it, (revolutions, joints): of each revolution, of all, and half-widths of the latter."""
     each = by_revolution(periods, integrals, cycle, joints, rigid=rigid)
     together = by_revolution(
         periods.mean(keepdims=True),

@@ -47,7 +47,6 @@ class Lanes:
 
     Parameters
     ----------
-    problem : Problem
     width : int
         Lanes; 1 for a single response.
     record : numpy.ndarray, optional

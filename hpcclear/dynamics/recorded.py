@@ -72,7 +72,6 @@ class Recording:
 
     Parameters
     ----------
-    scene : Scene
     copy : int
         Perturb the start in the direction of this number (`hpcclear.dynamics.steady.copies`); 0 does not.
     perturbations, objective

@@ -94,14 +94,10 @@ def run_bifurcation(
 
     Parameters
     ----------
-    scene : Scene
     axis : str
         ``PATH=LO:HI:N``.
     output : Path
         NetCDF file of kind ``bifurcation``.
-    ranks : Ranks
-    observation : Observation
-    options : Options
 
     Raises
     ------

@@ -32,7 +32,6 @@ def compile_share(payload: Mapping[str, Any], ranks: Ranks) -> None:
     ----------
     payload : mapping
         Of `hpcclear.ensemble.simulate.payload_of`.
-    ranks : Ranks
     """
     mine: tuple[Callable[[Mapping[str, Any]], None], ...] = (_ensemble, _response, _statistics)
     if ranks.size > 1 and ranks.is_root:
@@ -75,8 +74,6 @@ def compile_ahead(scene: Scene, ranks: Ranks, points: Points, style: Style) -> N
 
     Parameters
     ----------
-    scene : Scene
-    ranks : Ranks
     points : Points
         Perhaps none; their columns are what counts.
     style : str

@@ -55,12 +55,8 @@ def run_effects(
 
     Parameters
     ----------
-    scene : Scene
     output : Path
         NetCDF file of kind ``effects``.
-    ranks : Ranks
-    options : Options
-    wanted : Wanted
 
     Raises
     ------

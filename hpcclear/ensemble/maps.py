@@ -127,13 +127,10 @@ def run_map(
 
     Parameters
     ----------
-    scene : Scene
     axes : tuple of str
         ``PATH=LO:HI:N``, one or two.
     output : Path
         NetCDF file of kind ``samples``, a sample a cell; `grid` gives it back as a grid.
-    ranks : Ranks
-    options : Options
 
     Raises
     ------

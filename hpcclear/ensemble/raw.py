@@ -26,11 +26,8 @@ class RawFiles:
 
     Parameters
     ----------
-    folder : Path
-    points : MonteCarloPoints
     attributes : mapping
         Global attributes of the files.
-    objective : Objective
     joints : sequence of str
         Labels of the joints of the records.
     """
@@ -84,8 +81,6 @@ def raw_files(
     ----------
     raw : mapping or None
         ``folder``, ``attributes`` and ``joints``; see `RawFiles`.
-    scene : Scene
-    points : MonteCarloPoints
     """
     if raw is None:
         return None

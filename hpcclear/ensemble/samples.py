@@ -57,15 +57,12 @@ def run_sample(
 
     Parameters
     ----------
-    scene : Scene
     output : Path
         NetCDF file; NAME.timing.nc goes beside it, finished samples into a hidden directory until it is written.
-    ranks : Ranks
     table : Path, optional
         CSV of designs.
     part : Part, optional
         Only these samples, into a file of their own beside `output`.
-    options : Options
 
     Returns
     -------

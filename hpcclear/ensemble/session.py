@@ -207,11 +207,8 @@ class Session:
 
     Parameters
     ----------
-    place : Place
     key : mapping of str to str
         What makes the run what it is (`hpcclear.ensemble.identity`).
-    ranks : Ranks
-    options : Options
     notify : callable
         Gets what was found on disk and could not be used, a sentence at a time.
 

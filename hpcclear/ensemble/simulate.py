@@ -131,14 +131,11 @@ def sample_points(
 
     Parameters
     ----------
-    scene : Scene
     points : Points
         Designs, SI.
-    ranks : Ranks
     checkpoint : Checkpoint, optional
         Knows the samples finished earlier, and gets each new one; its names are those of `points`.
         When this raises, everything finished is on disk, unless the disk refused it twice.
-    progress : Progress, optional
     stage : str
         Name for reports and timing.
     first : int
@@ -158,7 +155,7 @@ def sample_points(
     StorageError
         The disk refuses.
     """
-    from hpcclear.scene.choices import expanded
+    from hpcclear.scene.points import expanded
 
     sent = expanded(
         scene.study, points

@@ -33,7 +33,6 @@ def responses_of(
     evaluate : callable
         A function of a module, of a variant and its response: values of `shape`.
     shape : tuple of int
-    ranks : Ranks
     stage : str
         Name for reports and timing.
     copies : int

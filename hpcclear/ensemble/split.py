@@ -102,12 +102,10 @@ def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finis
 
     Parameters
     ----------
-    scene : Scene
     points : Points
         The whole design.
     output : Path
         The name that was given with each part.
-    ranks : Ranks
 
     Raises
     ------

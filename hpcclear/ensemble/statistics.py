@@ -71,13 +71,11 @@ def run_statistics(
         With a study that samples by Monte Carlo.
     output : Path
         NetCDF file of kind ``statistics``; NAME.timing.nc goes beside it, what is unfinished into a hidden directory.
-    ranks : Ranks
     samples : int, optional
         Number of samples, the study's by default.
     raw : Path, optional
         Directory for the samples themselves, a file of kind ``samples`` for every 4096, and samples.nc, which shows all as one
         (of up to `collection.LISTED` files).
-    options : Options
 
     Returns
     -------
@@ -152,8 +150,6 @@ class _Streaming:
 
     Parameters
     ----------
-    scene : Scene
-    points : MonteCarloPoints
     session : Session
         Entered.
     raw : Path or None

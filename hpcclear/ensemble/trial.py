@@ -114,10 +114,6 @@ class Wanted(NamedTuple):
 class Trial:
     """A scene, the effects that it might do without, and how variants of it are simulated.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Attributes
     ----------
     switches : tuple of Switch

@@ -274,8 +274,6 @@ def run_wear(
         With ``[wear]`` and a worn joint.
     output : Path
         NetCDF file of kind ``wear``.
-    ranks : Ranks
-    options : Options
     timing : Path, optional
         Where the times go, beside the output by default.
 

@@ -55,7 +55,7 @@ def write_made(
     clockwise = response["crank_angle"][-1] < response["crank_angle"][0]
     columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
-        values = make_interp_spline(turns, series_of(scene, response, name), k=3)(places)
+        values = make_interp_spline(turns, series_of(response, name), k=3)(places)
         columns.append(values + noise * values.std() * rng.standard_normal(len(values)))
         unit = unit_of(response, name)
         headings.append(name if unit == "1" else f"{name} [{unit}]")

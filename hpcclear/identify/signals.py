@@ -1,6 +1,6 @@
 """Signals by name, as harmonics of the crank: of a simulated response and of a table that was measured.
 
-A signal is a series of the response (``crank_moment``, ``slider_acceleration``), or derived here: ``frame_force_x``,
+A signal is a series of the response (``crank_moment``, ``slider_acceleration``, ``frame_force_x``), or derived here:
 ``acceleration_x BODY.POINT``, ``impacts JOINT``. Each revolution is resampled over the crank angle, so that order k is k cycles
 per revolution whatever the speed does.
 """
@@ -15,7 +15,6 @@ from scipy.interpolate import make_interp_spline
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.report.figures import motion
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -26,7 +25,7 @@ ORDERS = 64
 INSTANTS = 1024
 """Instants of a revolution: simulated contact forces have content beyond the highest harmonic, which must not alias into it."""
 
-FORCES, POINTS, IMPACTS = "frame_force_", "acceleration_", "impacts "
+POINTS, IMPACTS = "acceleration_", "impacts "
 PARTS = 3
 """Numbers kept of a harmonic: real and imaginary part of its mean over revolutions, variance between revolutions."""
 
@@ -99,10 +98,12 @@ def names_of(response: xr.Dataset) -> list[str]:
         "slider_acceleration",
         "followed_acceleration_x",
         "followed_acceleration_y",
+        "frame_force_x",
+        "frame_force_y",
     )
     speeds = response["crank_speed"].to_numpy() if "crank_speed" in known else np.zeros(1)
     free = ["crank_speed"] if np.ptp(speeds) > 1e-9 * abs(float(speeds[0])) else []
-    return [*(one for one in usual if one in known), *free, f"{FORCES}x", f"{FORCES}y"]
+    return [*(one for one in usual if one in known), *free]
 
 
 def check_name(response: xr.Dataset, name: str) -> None:
@@ -110,7 +111,7 @@ def check_name(response: xr.Dataset, name: str) -> None:
     known = set(motion.series(response))
     points = [str(one) for one in response["point"].to_numpy()] if "point" in response else []
     joints = [str(one) for one in response["joint"].to_numpy()]
-    derived = [f"{FORCES}{axis}" for axis in "xy"] + [f"{IMPACTS}{one}" for one in joints]
+    derived = [f"{IMPACTS}{one}" for one in joints]
     derived += [f"{POINTS}{axis} {point}" for axis in "xy" for point in points]
     if name not in known and name not in derived:
         remedy = nearest(name, [*sorted(known), *derived])
@@ -119,15 +120,13 @@ def check_name(response: xr.Dataset, name: str) -> None:
 
 def unit_of(response: xr.Dataset, name: str) -> str:
     """Return the SI unit of a signal."""
-    if name.startswith(FORCES):
-        return "N"
     if name.startswith(IMPACTS):
         return "1"
     known = motion.series(response)
     return str(known[name].attrs["units"]) if name in known else "m/s^2"
 
 
-def series_of(scene: Scene, response: xr.Dataset, name: str) -> Array:
+def series_of(response: xr.Dataset, name: str) -> Array:
     """Return a signal of a response (t,), SI."""
     known = motion.series(response)
     if name in known:
@@ -136,8 +135,6 @@ def series_of(scene: Scene, response: xr.Dataset, name: str) -> Array:
     if name.startswith(IMPACTS):
         touching = response["penetration"].sel(joint=name.removeprefix(IMPACTS)).to_numpy() > 0.0
         return np.concatenate([[0.0], np.diff(touching.astype(float)) > 0.0])
-    if name.startswith(FORCES):
-        return -_derived(time, _moment(scene, response, name[-1]))
     axis, _, point = name.removeprefix(POINTS).partition(" ")
     return _derived(time, response[f"point_{axis}"].sel(point=point).to_numpy())
 
@@ -146,22 +143,6 @@ def _derived(time: Array, values: Array) -> Array:
     """Second derivative (t,) with respect to time."""
     found: Array = make_interp_spline(time, values, k=5).derivative(2)(time)
     return found
-
-
-def _moment(scene: Scene, response: xr.Dataset, axis: str) -> Array:
-    """Sum of masses times positions along an axis (t,), kg m: the force on the frame is minus its second derivative."""
-    bodies = linkage_of(scene).mechanism.bodies
-    if "body" in response:
-        masses = np.array([body.mass for body in bodies])
-        return np.asarray(response[f"body_{axis}"].to_numpy() @ masses)
-    mass = {body.name: body.mass for body in bodies}
-    arm = next(body.center[0] for body in bodies if body.name == "crank")
-    turn = np.cos if axis == "x" else np.sin
-    total = mass["crank"] * arm * turn(response["crank_angle"].to_numpy())
-    total = total + mass["rod"] * response[f"rod_{axis}"].to_numpy()
-    if axis == "x":
-        total = total + mass["slider"] * response["slider_position"].to_numpy()
-    return np.asarray(total)
 
 
 def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
@@ -210,7 +191,7 @@ def spectra(scene: Scene, response: xr.Dataset, names: Sequence[str]) -> Array:
     kept = turns >= begin - 2.0 / INSTANTS
     found = []
     for name in names:
-        values = series_of(scene, response, name)[kept]
+        values = series_of(response, name)[kept]
         each = harmonics(turns[kept], values, name.startswith(IMPACTS))
         found.append(Spectrum.of(each).packed())
     return np.array(found)

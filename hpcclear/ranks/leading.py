@@ -74,8 +74,6 @@ class Lead:
     ----------
     ranks : Process
         This one.
-    book : HandOut
-    points : Points
     members : iterable of int
         The ranks that are served.
     """

@@ -40,7 +40,6 @@ class RankFailed(Exception):
 
     Parameters
     ----------
-    report : str
     code : int, optional
         Exit code that follows of it.
     """

@@ -156,7 +156,6 @@ class Ranks:
 
         Parameters
         ----------
-        task : Task
         points : ndarray, shape (n, d), or Points
             The design, or an object that makes the rows requested.
         completed : structured ndarray, optional

@@ -77,7 +77,6 @@ class Watch:
 
     Parameters
     ----------
-    mail : Pulses
     seconds : float
         Silence after which a rank is given up; 0 for never.
     on_loss : callable

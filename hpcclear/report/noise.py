@@ -6,7 +6,7 @@ import xarray as xr
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 
-HEADER = ("joint", "impacts", "energy lost", "without contact", "RMS force")
+HEADER = ("joint", "impacts", "energy lost", "in flight", "RMS force")
 """Columns of the rows of `joints`."""
 
 TITLE = "Impacts, mean of a revolution"

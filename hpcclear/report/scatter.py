@@ -77,7 +77,9 @@ def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     if not np.isfinite(value):
         return
     unit = str(own["worst"].attrs["units"])
-    there = zip(*(own[key].to_numpy() for key in ("input", "at", "input_unit")), strict=True)
+    there = zip(
+        *(own[key].to_numpy() for key in ("input", "searched_at", "input_unit")), strict=True
+    )
     listed = ", ".join(f"{n} = {quantity(float(x), str(u))}" for n, x, u in there if np.isfinite(x))
     text = f"f reaches at least {quantity(value, unit)} within the bounds of the random inputs, at {listed} "
     text += f"({int(own['tried'])} simulations"

@@ -58,7 +58,6 @@ def beyond(units: Mapping[str, str], words: str) -> Beyond:
     ----------
     units : mapping of str to str
         SI unit of each result, by its name.
-    words : str
 
     Raises
     ------
@@ -95,7 +94,6 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
     ----------
     samples : xarray.Dataset
         Kind ``samples``. Failed ones are left out of moments; the intervals of quantiles and shares hold whatever these were.
-    thresholds : sequence of Beyond
 
     Returns
     -------

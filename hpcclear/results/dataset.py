@@ -340,7 +340,6 @@ def read(
 
     Parameters
     ----------
-    path : path
     kind : str, optional
         The kind it must be of; None: any.
     scene_hash : str, optional

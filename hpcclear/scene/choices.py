@@ -5,21 +5,16 @@ designs are simulated (`expanded`).
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
-from hpcclear.base.arrays import Array
 from hpcclear.base.errors import nearest
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.iso286 import fit_of
 from hpcclear.scene.paths import quantities
-
-if TYPE_CHECKING:
-    from hpcclear.scene.points import Points
-    from hpcclear.scene.study import Study
 
 MOST = 1000
 """Values of a variable at most."""
@@ -127,55 +122,3 @@ def grid(lower: float, upper: float, step: float) -> tuple[float, ...]:
             f"gives {count} values where from 2 to {MOST} are expected", "Correct it", "step"
         )
     return tuple(lower + step * k for k in range(count))
-
-
-def snapped(
-    study: "Study", names: Sequence[str], coordinates: Array, *, model: bool = False
-) -> Array:
-    """The nearest designs that exist, in sampling coordinates, (n, d), a column a name.
-
-    With `model`, variables about whose designs something is random keep their numbers: a surrogate needs them between
-    designs, too.
-    """
-    found = np.array(coordinates, dtype=np.float64)
-    about = {row.name for row in study.random if not row.absolute} if model else set[str]()
-    for column, name in enumerate(names):
-        options = study.variable(name).options
-        if options is not None and name not in about:
-            found[:, column] = nearest_of(options, found[:, column])
-    return found
-
-
-def nearest_of(options: Sequence[float], values: Array) -> Array:
-    """The nearest of some rising numbers, (n,)."""
-    table = np.asarray(options)
-    middles = (table[1:] + table[:-1]) / 2.0
-    return np.asarray(table[np.searchsorted(middles, values)])
-
-
-def expanded(study: "Study | None", points: "Points") -> "Points":
-    """Designs with what rows of catalogues stand for in columns of their own, named by their paths."""
-    from hpcclear.scene.points import Points
-
-    if study is None:
-        return points
-    chosen = [
-        (k, study.variable(name))
-        for k, name in enumerate(points.names)
-        if name in study.names and study.variable(name).rows
-    ]
-    if not chosen:
-        return points
-    names, paths, columns = list(points.names), list(points.paths), list(points.values.T)
-    driven = {path for own in points.paths for path in own}
-    for k, variable in chosen:
-        numbers = points.values[:, k].astype(int)
-        for path in variable.entry_paths:
-            if path in driven:  # a random clearance of the fit
-                continue
-            table = np.array([row.entries[path] for row in variable.rows], dtype=float)
-            names.append(path)
-            paths.append((path,))
-            columns.append(table[numbers])
-    values = np.column_stack(columns) if len(points) else np.empty((0, len(names)))
-    return Points(tuple(names), values, tuple(paths), points.labels, points.sampling)

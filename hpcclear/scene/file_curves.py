@@ -109,7 +109,6 @@ def pairs_of(
 
     Parameters
     ----------
-    curve : FileCurve
     folder : Path
         What its file is relative to.
     unit : str

@@ -45,7 +45,8 @@ class Numerics(Table):
     objective: Annotated[str, ObjectiveName(OBJECTIVES)] | None = None
     """What a sample is judged by in a scene without a study; default "mean-gap". A study has an entry of its own."""
     objective_joints: tuple[str, ...] = ()
-    """Joints with clearance whose gaps or contact forces make up the objective; default all."""
+    """Joints with clearance, or single contacts such as "guide.front_left", whose gaps or contact forces make up the objective;
+    default all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
     """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status
     STEP_CAP."""

@@ -1,6 +1,6 @@
 """Designs to simulate: an array with a name and scene entries for each column."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.scene.choices import expanded
 from hpcclear.scene.domain import entries
 from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
+from hpcclear.scene.study import Study
 
 
 @dataclass(frozen=True)
@@ -145,3 +145,53 @@ def _refuse(
         row = int(np.argmax(bad))
         key = f"{label(row)}, {name}"
         raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
+
+
+def snapped(
+    study: Study, names: Sequence[str], coordinates: Array, *, model: bool = False
+) -> Array:
+    """The nearest designs that exist, in sampling coordinates, SI, (n, d), a column a name.
+
+    With `model`, variables about whose designs something is random keep their numbers: a surrogate needs them between
+    designs, too.
+    """
+    found = np.array(coordinates, dtype=np.float64)
+    about = {row.name for row in study.random if not row.absolute} if model else set[str]()
+    for column, name in enumerate(names):
+        options = study.variable(name).options
+        if options is not None and name not in about:
+            found[:, column] = nearest_of(options, found[:, column])
+    return found
+
+
+def nearest_of(options: Sequence[float], values: Array) -> Array:
+    """The nearest of some rising numbers, SI, (n,)."""
+    table = np.asarray(options)
+    middles = (table[1:] + table[:-1]) / 2.0
+    return np.asarray(table[np.searchsorted(middles, values)])
+
+
+def expanded(study: Study | None, points: Points) -> Points:
+    """Designs with what rows of catalogues stand for in columns of their own, named by their paths."""
+    if study is None:
+        return points
+    chosen = [
+        (k, study.variable(name))
+        for k, name in enumerate(points.names)
+        if name in study.names and study.variable(name).rows
+    ]
+    if not chosen:
+        return points
+    names, paths, columns = list(points.names), list(points.paths), list(points.values.T)
+    driven = {path for own in points.paths for path in own}
+    for k, variable in chosen:
+        numbers = points.values[:, k].astype(int)
+        for path in variable.entry_paths:
+            if path in driven:  # a random clearance of the fit
+                continue
+            table = np.array([row.entries[path] for row in variable.rows], dtype=float)
+            names.append(path)
+            paths.append((path,))
+            columns.append(table[numbers])
+    values = np.column_stack(columns) if len(points) else np.empty((0, len(names)))
+    return Points(tuple(names), values, tuple(paths), points.labels, points.sampling)

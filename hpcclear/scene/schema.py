@@ -16,7 +16,17 @@ from hpcclear.scene.scene import Scene
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}
 _BOUNDS = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
 _LIST = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": LONGEST_CURVE}
-_CONVERTED = {"range", "ratio", "mean", "half_width", "deviation", "scale", "location", "values"}
+_CONVERTED = {
+    "range",
+    "ratio",
+    "mean",
+    "half_width",
+    "deviation",
+    "scale",
+    "location",
+    "values",
+    "step",
+}
 
 
 def _tables(kind: type[Table] = Table) -> Iterator[type[Table]]:
@@ -86,6 +96,22 @@ def _as_written(definitions: dict[str, Any]) -> None:
         rows[name]["additionalProperties"] = {"anyOf": [one, alike]}
 
 
+def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
+    """Rows of catalogues with paths beside their names, costs as lists and by IT grades."""
+    row = definitions["Row"]
+    row["properties"]["name"] = {"type": "string", "description": "what the row is called"}
+    row["required"], row["additionalProperties"] = ["name"], True  # entries by their paths
+    cost = definitions["Cost"]["properties"]
+    for key in ("at", "scale"):
+        cost[key] = {**_NUMBER, "description": cost[key]["description"]}
+    entry = definitions["Variable"]["properties"]["cost"]
+    number = {"type": "number"}
+    each = {"type": "array", "items": number}
+    entry["anyOf"] = [
+        {"$ref": "#/$defs/Cost"}, each, {"type": "object", "additionalProperties": number}
+    ]  # fmt: skip
+
+
 def _with_files(schema: Any) -> Any:
     """A schema with references to `FileCurve` wherever a curve may come from a file."""
     if schema == OF_FILE:
@@ -115,6 +141,7 @@ def scene_schema() -> dict[str, Any]:
             entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
+    _rows_of_catalogues(definitions)
     entries = definitions["Tolerance"]["properties"]
     entries["range"] = {**_BOUNDS, "description": entries["range"]["description"]}
     for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
@@ -135,11 +162,11 @@ def scene_schema() -> dict[str, Any]:
         entries = definitions[name]["properties"]
         for key in {"limit", "most"} & entries.keys():
             entries[key] = {**_NUMBER, "description": entries[key]["description"]}
-    one_word = {"enum": ["mean", "deviation", "quantile"]}  # an exceedance needs a limit
+    one_word = {"enum": ["mean", "deviation", "quantile", "cost"]}  # an exceedance needs a limit
     goals = {
         "type": "array",
         "items": {"anyOf": [one_word, {"$ref": "#/$defs/Goal"}]},
-        "minItems": 2,
+        "minItems": 1,
         "maxItems": len(ENDS),
     }
     entries = definitions["Case"]["properties"]

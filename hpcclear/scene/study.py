@@ -179,7 +179,8 @@ class Study(Moving, Table):
             raise invalid(
                 "the distribution is wider than its domain, "
                 f"{row.name} from {lower:g} to {upper:g}",
-                f"Narrow it, or widen study.variables.{row.name}.range",
+                f"Narrow it, or widen study.variables.{row.name}.range"
+                + (f", so that it contains {low:.4g} to {high:.4g}" if row.absolute else ""),
                 key=f"random.{row.name}",
             )
 

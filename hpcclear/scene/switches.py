@@ -217,11 +217,6 @@ def _drives(scene: Scene) -> Iterator[Switch]:
 class Off:
     """A scene with some of its effects off, and where the numbers of the whole one stand in it.
 
-    Parameters
-    ----------
-    scene : Scene
-    off : sequence of Switch
-
     Attributes
     ----------
     scene : Scene

@@ -4,7 +4,7 @@ import re
 
 HERE = {
     ("torsionspring", "torsionalspring", "rotaryspring", "rotationalspring"):
-        'There is no torsion spring: a long spring (load of kind "spring") at a lever arm r has the stiffness k r^2.',
+        'A torsion spring is a load of kind "torsion-spring", with a body, stiffness and angle.',
     ("offset", "eccentricslider"):
         'Write offset in [mechanism] of a slider-crank; in a linkage the guide has line = "ground.NAME".',
     ("diametral", "diametric", "bearingdiameter", "journaldiameter", "borediameter", "pindiameter"):

@@ -34,9 +34,8 @@ from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import unfinished
 from hpcclear.scene import Scene
-from hpcclear.scene.choices import expanded
 from hpcclear.scene.describing import unused
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Points, expanded
 from hpcclear.study import launched, lives, optimisation
 from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun

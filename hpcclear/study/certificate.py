@@ -24,7 +24,6 @@ def certify(run: StudyRun, extent: Extent) -> None:
 
     Parameters
     ----------
-    run : StudyRun
     extent : Extent
         As `hpcclear.study.extent.certificate_extent`.
 

@@ -68,8 +68,6 @@ def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
 
     Parameters
     ----------
-    run : StudyRun
-    choices : sequence of Choice
     found : dict of arrays, shape (n,)
         Of `simulate`.
     """

@@ -35,8 +35,6 @@ def of_designs(
 
     Parameters
     ----------
-    run : StudyRun
-    choices : sequence of Choice
     made : sequence of arrays, shape (2, replicates, values)
         Of `hpcclear.study.truth.doubled`.
     drawn : callable

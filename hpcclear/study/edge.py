@@ -16,8 +16,8 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.cases import Case
-from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search.infill import TwoScales
@@ -68,7 +68,6 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
 
     Parameters
     ----------
-    run : StudyRun
     known : mapping of case to arrays
         Sampling coordinates (n, d), what the case makes small (n, objectives), what steers to its constraints (n,).
 

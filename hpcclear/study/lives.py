@@ -63,10 +63,8 @@ def of_designs(run: StudyRun, scene: Scene, designs: Sequence[Choice]) -> Result
 
     Parameters
     ----------
-    run : StudyRun
     scene : Scene
         As it was written: clearances that wear are not known yet.
-    designs : sequence of Choice
 
     Returns
     -------

@@ -15,9 +15,9 @@ from hpcclear.base.objectives import ENDS
 from hpcclear.plugins import SEARCHES
 from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
-from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.goals import Goal
+from hpcclear.scene.points import snapped
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
 from hpcclear.scene.study import Study

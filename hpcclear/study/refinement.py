@@ -17,8 +17,8 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
-from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box, to_coordinates, to_physical
+from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
@@ -109,7 +109,6 @@ def search(
 
     Parameters
     ----------
-    run : StudyRun
     start : sequence of Choice
         Designs of the swarm, of all cases.
     statistics : bool

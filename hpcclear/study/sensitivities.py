@@ -8,8 +8,8 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
-from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import box
+from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
 from hpcclear.statistics import sensitivity
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy

@@ -27,7 +27,6 @@ class Simulations:
     ----------
     scene : Scene
         With a study.
-    ranks : Ranks
     checkpoint : Checkpoint
         Its names are the study variables.
     style : str
@@ -55,7 +54,6 @@ class Simulations:
 
         Parameters
         ----------
-        names : sequence of str, length d
         coordinates : array, shape (n, d)
             In sampling coordinates: an inertia may be a ratio (`hpcclear.scene.domain`).
 

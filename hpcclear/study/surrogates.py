@@ -8,8 +8,8 @@ import numpy as np
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
-from hpcclear.scene.choices import snapped
 from hpcclear.scene.domain import Box, box, to_coordinates
+from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
@@ -166,7 +166,7 @@ def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:
 
 
 def checked_r2(study: Study, result: Mapping[str, np.ndarray]) -> float:
-    """R2 on fresh points of the model that is searched, in a result of `fit_all` (arrays of any shape, by name)."""
+    """R2 (a scalar) on fresh points of the model that is searched, in a result of `fit_all`."""
     return float(result[f"model{len(study.models) - 1}_check"][_CHECKS.index("r2")])
 
 

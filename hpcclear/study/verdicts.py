@@ -183,7 +183,6 @@ def words(case: Case, unit: str, values: Sequence[Array], standings: Array, pric
 
     Parameters
     ----------
-    case : Case
     unit : str
         Of f.
     values : sequence of arrays, shape (objectives,)

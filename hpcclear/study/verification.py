@@ -213,8 +213,6 @@ def write(
 
     Parameters
     ----------
-    run : StudyRun
-    table : Table
     true : dict of arrays, shape (n, ...)
         Of `hpcclear.study.tolerance.verified`, over the same designs.
     model : Piecewise

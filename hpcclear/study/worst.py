@@ -60,12 +60,12 @@ def of_designs(run: StudyRun, choices: Sequence[Choice]) -> Result:
     Returns
     -------
     dict of arrays over the designs
-        ``worst`` and ``worst_corner``: the largest f, and that at a corner; ``at`` (n, inputs): where, as the values of the
-        random inputs, SI, NaN for those of other cases; ``tried``: simulations; all of designs that are not looked at NaN or 0.
+        ``worst`` and ``worst_corner``: the largest f, and that at a corner; ``searched_at`` (n, inputs): where, as the values
+        of the random inputs, SI, NaN for those of other cases; ``tried``: simulations. NaN or 0 of designs that are not shown.
     """
     names = inputs_of(run)
     result: Result = {name: np.full(len(choices), np.nan) for name in ("worst", "worst_corner")}
-    result["at"] = np.full((len(choices), len(names)), np.nan)
+    result["searched_at"] = np.full((len(choices), len(names)), np.nan)
     result["tried"] = np.zeros(len(choices), np.int64)
     for case in run.study.cases:
         rows = [k for k, one in enumerate(choices) if one.case == case.name and _named(one.name)]
@@ -103,7 +103,7 @@ def _of_case(
         if np.isfinite(result["worst"][row]):
             u = _normals(run, choices[k], met[k][_order(f[k])[:1]])
             own, there = rare.rows_of(run, choices[k], u)
-            result["at"][row, columns] = [there[0, own.index(name)] for name in random]
+            result["searched_at"][row, columns] = [there[0, own.index(name)] for name in random]
 
 
 def _corners(dimensions: int, rng: np.random.Generator) -> Array:

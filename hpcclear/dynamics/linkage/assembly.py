@@ -79,7 +79,6 @@ def assemble_samples(
         What the samples have in common.
     sample : Mechanism
         With numbers of samples (m,), or single ones.
-    count : int
     """
     loops = Loops(structure, closed=True)
     loops.mechanism = sample = straight(sample)

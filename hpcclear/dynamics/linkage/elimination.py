@@ -38,7 +38,6 @@ class Elimination:
 
     Parameters
     ----------
-    writer : Writer
     matrix : dict
         Entries (i, j), both halves; zero where there is none.
     block : list of int

@@ -103,8 +103,6 @@ def generate(
     ----------
     mechanism : Mechanism
         A number that is zero in it is zero in every sample.
-    on : On
-    rows : Rows
     cartesian : bool
         Every body by itself, ideal joints and prescribed angles as constraints with feedback (paper eq. 11).
     hoist : bool

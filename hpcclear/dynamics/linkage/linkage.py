@@ -27,8 +27,6 @@ class Linkage:
 
     Parameters
     ----------
-    mechanism : Mechanism
-    gravity : bool
     friction : bool
         In the joints with clearance: of contact or of a film.
     cartesian : bool

@@ -315,7 +315,6 @@ def clear(loops: Loops, start: Array, seconds: Array, turns: int) -> Booleans:
     start : ndarray, shape (n, m)
     seconds : ndarray, shape (m,)
         A revolution.
-    turns : int
     """
     steps = 72 * turns
     h = seconds / steps

@@ -33,7 +33,6 @@ class Poses:
 
     Parameters
     ----------
-    forest : Forest
     rows : mapping of str to int
         Rows of parameters that have one; `rows` of this object has those besides.
     free : int

@@ -20,7 +20,6 @@ def energies(
 
     Parameters
     ----------
-    scene : Scene
     par : ndarray, shape (PARAMETERS,) or (m, PARAMETERS)
         Kernel parameters, of one sample or a row for each state.
     q, v : ndarray, shape (n, m)
@@ -83,7 +82,6 @@ def errors(scene: Scene, par: Array, before: Array, outcome: Outcome, n: int) ->
 
     Parameters
     ----------
-    scene : Scene
     par : ndarray, shape (m, PARAMETERS)
     before : ndarray, shape (m,)
         Energy at the start, J.

@@ -36,7 +36,6 @@ def followed(
 
     Parameters
     ----------
-    scene : Scene
     phase : ndarray, shape (t,)
         Progress of the drive since the start, 2 pi a turn of its body, rad.
     points : dict
@@ -92,8 +91,6 @@ def rigid_acceleration(
 
     Parameters
     ----------
-    mechanism : Mechanism
-    place : str
     rows : ndarray, shape (3, t)
         Accelerations of the body's mass centre and of its angle.
     angle, spin : ndarray, shape (t,)

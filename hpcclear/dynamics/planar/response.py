@@ -91,8 +91,6 @@ def moved(
 
     Parameters
     ----------
-    scene : Scene
-    mechanism : Mechanism
     places : dict
         As `bodies_and_points` has them.
     phase, acceleration : ndarray, shape (t,)

@@ -187,8 +187,6 @@ def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) ->
     ----------
     loops : Loops or None
         Of `loops_of`; they take the samples' numbers.
-    samples : Made
-    gravity : float
     rounds : int
         Revolutions that one without clearance is walked through.
     """

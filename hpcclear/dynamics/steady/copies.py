@@ -41,7 +41,6 @@ def perturbed(start: Start, scale: Array, numbers: range, size: float = PERTURBA
     start : Start, one row
     scale : ndarray, shape (2 n,)
         Of `scales`.
-    numbers : range
     size : float
         Root mean square of a perturbation over scale.
     """

@@ -70,10 +70,8 @@ class SteadyEvaluator:
 
     Parameters
     ----------
-    scene : Scene
     columns : Points
         Points (perhaps none) whose names and paths all submitted values share.
-    lanes : int, optional
     procedure : function of a Sample, optional
         What is done to each design; by default `steady_mean` to the scene's ``numerics.target_error`` with
         ``numerics.target_revolutions``.
@@ -196,9 +194,7 @@ def record_of(
 
     Parameters
     ----------
-    sample : int
     par : ndarray, shape (1, PARAMETERS)
-    mean : Mean
     responses : sequence of str
         Further responses, as of `responses_reported`.
     worn : bool

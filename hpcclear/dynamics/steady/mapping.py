@@ -50,7 +50,6 @@ def mapped(sample: Sample, sure: float = SURE) -> Generator[Segment, Outcome, Me
 
     Parameters
     ----------
-    sample : Sample
     sure : float
         As `SURE`.
 

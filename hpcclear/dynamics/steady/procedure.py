@@ -17,8 +17,6 @@ def steady_mean(sample: Sample, target: float, budget: int) -> Generator[Segment
 
     Parameters
     ----------
-    sample : Sample
-    target : float
     budget : int
         Revolutions of all copies together, at most (a segment that is under way is finished).
 

@@ -107,12 +107,9 @@ def first_passed(
 
     Parameters
     ----------
-    found : Life
-    joints : Joints
     limits : mapping
         "clearance" (of the largest around any joint, m), "peak_contact_force" (N), "objective" (SI); each life has that of
         a bearing worn through besides, `THROUGH`.
-    relief : Relief
     since : int
         Number of the first jump that is looked at.
     """

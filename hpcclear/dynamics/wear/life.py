@@ -107,7 +107,6 @@ def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
     Parameters
     ----------
     joints : Joints, arrays (joints,)
-    plan : Plan
     relief : Relief
         What profiles are made of; by default surfaces wear evenly.
     """

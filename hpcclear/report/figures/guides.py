@@ -92,4 +92,4 @@ def _corners(panel: "Axes", shown: xr.Dataset, turn: Array) -> None:
         panel.plot(begun, np.full(len(begun), row), "|", color=colour, ms=5.0)
     panel.set_yticks(range(len(rows)), [label.replace("_", " ") for label in rows])
     panel.set_ylim(len(rows) - 0.5, -0.5)
-    panel.set_ylabel("corner in contact (–)")
+    panel.set_title("corners in contact")

@@ -218,6 +218,9 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
             f"{placed} {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
         )
     for joint in mechanism.joints:
+        if joint.name in scene.guides():
+            sizes = [q(getattr(joint, name), "m") for name in ("length", "height", "clearance")]
+            lines.append(f"{joint.name}: slider {' x '.join(sizes[:2])}, {sizes[2]} on either side")
         if joint.kind == "clearance":
             lines.append(
                 f"{joint.name}: radial clearance {q(joint.clearance, 'm')}, bearing R {q(joint.bearing_radius, 'm')}"

@@ -213,7 +213,6 @@ def save(figure: "Figure", path: str | Path) -> Path:
 
     Parameters
     ----------
-    figure : matplotlib Figure
     path : path
         Ends in ``.png``, ``.svg`` or ``.pdf``.
 

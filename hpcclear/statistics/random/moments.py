@@ -88,10 +88,8 @@ class RobustObjective:
 
     Parameters
     ----------
-    model : Kriging or Piecewise
     design_names : sequence of str
         Names of the design variables, in the order of their columns.
-    random_inputs : sequence of RandomVariable
     fixed : mapping of str to float, optional
         Values of inputs that are neither.
     derived : sequence of Derived, optional

@@ -178,7 +178,6 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
     ----------
     values : array, shape (r, s)
         As in `moments`.
-    limit : float
     confidence : float
         Level of the interval.
 

@@ -28,7 +28,6 @@ def index(values: Array, limit: float) -> Array:
     ----------
     values : array, shape (k, n)
         n values of each of k random numbers.
-    limit : float
 
     Returns
     -------

@@ -99,8 +99,6 @@ def minimise(search: Search, function: Function, task: Task, size: int, name: st
     ----------
     search : Search
         Made for the task.
-    function : callable
-    task : Task
     size : int
         Points of the front at most.
     name : str

@@ -48,7 +48,6 @@ class TwoScales:
     values : array, shape (n,)
         NaN where an evaluation failed.
     bounds : array, shape (d, 2)
-    rng : Generator
 
     Raises
     ------
@@ -91,7 +90,6 @@ def proposals(
     values : array, shape (n, m)
         Their objectives, all minimised; NaN where they failed.
     bounds : array, shape (d, 2)
-    count : int
     rng : Generator
         Advanced.
     excess : array, shape (n,), optional

@@ -52,7 +52,6 @@ class ParticleSwarm:
         Number of `tell` calls; sets the slope of the inertia weight (k_max of eq. 23).
     rng : numpy.random.Generator
         Owned by the swarm from here on.
-    settings : SwarmSettings, optional
     start : array_like, shape (k, d), optional
         Known designs that replace the first k random particles.
     """

@@ -6,7 +6,7 @@ import moocore
 import numpy as np
 from numpy.typing import NDArray
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.cached import cached
 
 
@@ -147,7 +147,7 @@ def best_subset(values: Array, size: int) -> NDArray[np.intp]:
 
 
 @cached
-def _best_of_two(values, size):  # type: ignore[no-untyped-def]
+def _best_of_two(values: Array, size: int) -> Integers:
     """Rows of the largest area below the first row's second objective, from the last row to the first."""
     order = np.argsort(values[:, 0])
     first, second = values[order, 0], values[order, 1]
@@ -172,7 +172,7 @@ def _best_of_two(values, size):  # type: ignore[no-untyped-def]
 
 
 @cached
-def _cut_two(values, size):  # type: ignore[no-untyped-def]
+def _cut_two(values: Array, size: int) -> Booleans:
     """Rows to keep of a two-objective front: the least rectangle between neighbours goes first.
 
     Scaling an objective scales all rectangles alike and both ends stay: no reference is needed.
@@ -189,7 +189,7 @@ def _cut_two(values, size):  # type: ignore[no-untyped-def]
 
 
 @cached
-def _thin(values, capacity):  # type: ignore[no-untyped-def]
+def _thin(values: Array, capacity: int) -> tuple[Booleans, Array]:
     """Drop the most crowded rows until `capacity` are left; the best of each objective stays.
 
     Returns which rows are alive, and of these the distance to the nearest neighbour, objectives
@@ -229,14 +229,14 @@ def _thin(values, capacity):  # type: ignore[no-untyped-def]
 
 
 @cached
-def _closer(distance, i, j):  # type: ignore[no-untyped-def]
+def _closer(distance: Array, i: int, j: int) -> bool:
     if distance[i, 0] != distance[j, 0]:
-        return distance[i, 0] < distance[j, 0]
-    return distance[i, 1] < distance[j, 1]
+        return bool(distance[i, 0] < distance[j, 0])
+    return bool(distance[i, 1] < distance[j, 1])
 
 
 @cached
-def _nearest(square, alive, i, distance, neighbour):  # type: ignore[no-untyped-def]
+def _nearest(square: Array, alive: Booleans, i: int, distance: Array, neighbour: Integers) -> None:
     """Write the two nearest living neighbours of row i."""
     distance[i, :] = np.inf
     neighbour[i, :] = -1

@@ -61,7 +61,6 @@ def convergence_intervals(
 
     Parameters
     ----------
-    history : SensitivityHistory
     confidence : float
         Two-sided, of each comparison, in (0, 1).
     tolerance : float
@@ -115,7 +114,6 @@ def best_estimates(
 
     Parameters
     ----------
-    history : SensitivityHistory
     intervals : ConvergenceIntervals
         From the same history.
 

@@ -98,8 +98,6 @@ def design_intervals(
     bounds : array_like, shape (d, 2)
         The global interval of every variable, in its own unit.
     clearances : array_like, shape (c,)
-    rng : numpy.random.Generator
-    settings : IntervalSettings
     sample : callable
         ``sample(n, bounds, rng)`` -> points of shape (n, d).
 
@@ -141,7 +139,6 @@ def analyse_intervals(design: IntervalDesign, values: ArrayLike) -> SensitivityH
 
     Parameters
     ----------
-    design : IntervalDesign
     values : array_like, shape (n,)
         f at `design.points`; those that are not finite are failed simulations, counted in `failed`.
         A surface left with too few points is NaN in the history.

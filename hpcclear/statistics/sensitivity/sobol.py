@@ -81,7 +81,6 @@ def analyse_sobol(
     ----------
     values : array_like, shape (n_rows * (n_inputs + 2),)
         Those that are not finite are failed simulations; their rows are dropped and counted.
-    n_inputs : int
     rng : numpy.random.Generator
         Draws the bootstrap.
     confidence : float

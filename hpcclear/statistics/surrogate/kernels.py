@@ -41,7 +41,6 @@ def with_slopes(exponents: Array, level: float, kernel: Kernel) -> tuple[Array, 
         Minus half the squared distances, plus `level` for the squared exponential; overwritten.
     level : float
         Logarithm of the variance.
-    kernel : str
 
     Returns
     -------

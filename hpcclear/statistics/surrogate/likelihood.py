@@ -83,7 +83,6 @@ def maximise(
         Further starts.
     seed : int
         Of these.
-    kernel : str
     """
     centred, limits = unit - 0.5, np.log(bounds)
     draws = np.random.RandomState(seed)
@@ -150,7 +149,6 @@ def negative_likelihood(
     centred : array, shape (n, d)
         Points.
     values : array, shape (n,)
-    kernel : str
 
     Returns
     -------

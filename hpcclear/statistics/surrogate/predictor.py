@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.bits import falling
 from hpcclear.base.cached import cached
 
@@ -25,18 +26,20 @@ LANES = 8
 @partial(cached, fastmath={"contract"})
 def gaussian(square: float) -> float:
     """exp(-square / 2) for square >= 0, to a few ulp; branch-free, so that loops over it vectorise."""
-    return falling(0.5 * square, STEEPEST)  # type: ignore[no-any-return]
+    return float(falling(0.5 * square, STEEPEST))
 
 
 @partial(cached, fastmath={"contract"})
 def matern(square: float) -> float:
     """Matern 5/2 for the squared distance >= 0, as accurate and as free of branches as `gaussian`."""
     step = np.sqrt(5.0 * square)
-    return (1.0 + step + step * step / 3.0) * falling(step, STEEPEST)  # type: ignore[no-any-return]
+    return float((1.0 + step + step * step / 3.0) * falling(step, STEEPEST))
 
 
 @partial(cached, fastmath={"contract"})
-def _squares_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
+def _squares_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+) -> None:
     """Fill `row` with squared distances over the inputs `dims`, a place against all training points."""
     count = row.size
     row[:] = 0.0
@@ -49,7 +52,9 @@ def _squares_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-un
 
 
 @partial(cached, fastmath={"contract"})
-def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-untyped-def]
+def _kernel_row(
+    scaled: Array, lengths: Array, dims: Integers, coordinates: Array, row: Array
+) -> None:
     """The same with the squared exponential of these distances."""
     _squares_row(scaled, lengths, dims, coordinates, row)
     for i in range(row.size):
@@ -57,7 +62,7 @@ def _kernel_row(scaled, lengths, dims, coordinates, row):  # type: ignore[no-unt
 
 
 @partial(cached, fastmath=REORDER)
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
@@ -65,7 +70,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @cached
-def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
+def kernel_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
     """Kriging means ``level + sum_i weights_i k(x, x_i)``.
 
     Parameters
@@ -95,8 +100,8 @@ def kernel_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untype
 
 
 @cached
-def matern_sum(unit, scaled, lengths, weights, level):  # type: ignore[no-untyped-def]
-    """`kernel_sum` with the Matern function of order 5/2; takes and returns the same."""
+def matern_sum(unit: Array, scaled: Array, lengths: Array, weights: Array, level: float) -> Array:
+    """`kernel_sum` with the Matern function of order 5/2: places (n, d), scaled (d, p), lengths (d,), weights (p,) to (n,)."""
     dims = np.arange(lengths.size)
     row = np.empty(weights.size)
     out = np.empty(unit.shape[0])
@@ -118,13 +123,13 @@ def pad(points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 @cached
-def _multiply(a, b, out):  # type: ignore[no-untyped-def]
+def _multiply(a: Array, b: Array, out: Array) -> None:
     for i in range(out.size):  # written out: an array expression would allocate
         out[i] = a[i] * b[i]
 
 
 @partial(cached, fastmath=REORDER)
-def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
+def _four_dots(table: Array, first: int, row: Array, out: Array, at: int) -> None:
     """``out[at + k] = table[first + k] @ row`` for k < 4; four sums share each load of `row`."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     t0, t1, t2, t3 = table[first], table[first + 1], table[first + 2], table[first + 3]
@@ -137,7 +142,7 @@ def _four_dots(table, first, row, out, at):  # type: ignore[no-untyped-def]
 
 
 @partial(cached, fastmath=REORDER)
-def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
+def _weighted_moments(values: Array, weights: Array) -> tuple[float, float]:
     """Mean, and variance about it: the difference E[f^2] - E[f]^2 would cancel."""
     mean, variance = 0.0, 0.0
     for k in range(values.size):
@@ -148,9 +153,10 @@ def _weighted_moments(values, weights):  # type: ignore[no-untyped-def]
 
 
 @cached
-def tensor_moments(  # type: ignore[no-untyped-def]
-    places, shares, counts, starts, dims, steady, steady_shares, scaled, lengths
-):
+def tensor_moments(
+    places: Array, shares: Array, counts: Integers, starts: Integers, dims: Integers, steady: Array, steady_shares: Array,
+    scaled: Array, lengths: Array,
+) -> Array:  # fmt: skip
     """Mean and variance of ``sum_i weights_i k(x, x_i)`` over tensor rules, one rule a design.
 
     The kernel is a product over groups of inputs, so a rule of N1 x N2 x ... nodes needs only

@@ -68,7 +68,6 @@ def fit_subintervals(
         The true function, ``(n, d)`` points to ``(n,)`` values, NaN where it failed.
     bounds : (d, 2) array
         The domain.
-    settings : SubintervalSettings
     rng : numpy Generator
         Every box draws from a stream of its own, spawned from this one.
     names : sequence of str, optional

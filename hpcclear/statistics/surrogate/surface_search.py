@@ -113,8 +113,6 @@ def search(
     Parameters
     ----------
     bounds : array_like, shape (d, 2)
-    rng : numpy.random.Generator
-    settings : SearchSettings
     sample : callable
         ``sample(n, bounds, rng)`` -> points of shape (n, d).
 

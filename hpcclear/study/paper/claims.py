@@ -45,7 +45,6 @@ class SensitivityEvidence:
 
     Parameters
     ----------
-    run : StudyRun
     result : dict
         Of `hpcclear.study.sensitivities.analyse`.
     """

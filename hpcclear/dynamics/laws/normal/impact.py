@@ -32,7 +32,7 @@ def swing(force, force_at, depth_at, exponent):
 
 LAW = ContactLaw(
     words="one's own stiffness, exponent and greatest damping with the depth where it is reached",
-    source="MSC Adams/Solver, function IMPACT",
+    source="MSC Adams/Solver, function IMPACT; damping from 0 on, as Hunt and Crossley 1975, doi:10.1115/1.3423596",
     formula="F_0 (d/d_0)^n + c STEP(d, 0, 0, d_c, 1) d'",
     valid="what the numbers were fitted to",
     parameters=(
