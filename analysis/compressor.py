@@ -27,7 +27,7 @@ REPLICAS = 8
 
 
 def rows(scene):
-    """Of each clearance: name, mm; energy lost in impacts a revolution, J, and half-width; force on the frame, N, likewise; level
+    """Of each clearance: name, mm; energy lost in impacts a revolution, J, and half-width; force on the frame, N, too; level
     at 1 kHz, dB; impacts a revolution; wear of the bushes in 1000 h, mm^3, likewise;
     flags."""
     seconds = 2 * np.pi / scene.number("drive.speed")
