@@ -27,9 +27,8 @@ REPLICAS = 8
 
 
 def rows(scene):
-    """Of each clearance: name, mm; energy lost in impacts a revolution, J, and half-width; force on the frame, N, likewise.
-
-    Then the level at 1 kHz, dB; impacts a revolution; wear of the bushes in 1000 h, mm^3, likewise;
+    """Of each clearance: name, mm; energy lost in impacts a revolution, J, and half-width; force on the frame, N, too; level
+    at 1 kHz, dB; impacts a revolution; wear of the bushes in 1000 h, mm^3, likewise;
     flags."""
     seconds = 2 * np.pi / scene.number("drive.speed")
     for clearance in (None, *WORN):

@@ -94,7 +94,8 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
         {"design": ["case alpha"], "input": ["C", "m2", "m3", "u2", "other"]},
     )  # fmt: skip
     best = xr.Dataset(coords={"design": "case alpha"})
-    shares, tolerances = scatter.lines({"contributions": content}, best)
+    shares, tolerances, first = scatter.lines({"contributions": content}, best)
+    assert first.label == "tighten first"
     listed = "C 55% ± 2.0%, m2+m3 (correlated) 30% ± 3.9%, u2 below 0.8%. The cubic fit does not explain 15%"
     assert listed in shares.text
     assert "C 25% ± 2.0%, m2 10% ± 2.0%, m3 2% ± 1.0%, u2 below 0.2%" in tolerances.text
