@@ -11,6 +11,7 @@ PROGRAM = """
 import gc, os, signal, sys, warnings
 
 import numba
+import scipy.interpolate, scipy.special, sklearn  # which add warning filters of their own
 import numpy as np
 from numba import config
 

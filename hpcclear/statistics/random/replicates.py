@@ -16,7 +16,7 @@ expected number of positive counts estimated from survey data", Survey Methodolo
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import betaincinv, stdtrit
+import scipy  # its part `special` is loaded at first use: a fifth of a start
 
 from hpcclear.base.arrays import Array, Booleans
 
@@ -85,7 +85,7 @@ def spread(shifts: Array) -> Array:
 
 def student(confidence: float, freedom: int) -> float:
     """Two-sided quantile of Student's t."""
-    return float(stdtrit(freedom, 0.5 + confidence / 2.0))
+    return float(scipy.special.stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
 def moments(values: Array) -> tuple[Estimate, Deviation]:
@@ -206,12 +206,17 @@ def _interval_of_share(
     error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
     # as many independent draws, fewer for an error of few degrees of freedom
     worth = (
-        stdtrit(total - 1, 0.5 + confidence / 2) / student(confidence, int((counts > 0).sum()) - 1)
+        scipy.special.stdtrit(total - 1, 0.5 + confidence / 2)
+        / student(confidence, int((counts > 0).sum()) - 1)
     ) ** 2
     draws = share * (1.0 - share) / error**2 * worth if 0.0 < share < 1.0 else float(total)
     hits, tail = share * draws, (1.0 - confidence) / 2.0
-    lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if share > 0.0 else 0.0
-    upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if share < 1.0 else 1.0
+    lower = float(scipy.special.betaincinv(hits, draws - hits + 1.0, tail)) if share > 0.0 else 0.0
+    upper = (
+        float(scipy.special.betaincinv(hits + 1.0, draws - hits, 1.0 - tail))
+        if share < 1.0
+        else 1.0
+    )
     return lower, upper
 
 

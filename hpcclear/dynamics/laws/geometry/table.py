@@ -7,7 +7,7 @@ numbers are written into the function, so that lanes evaluate it without a branc
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy  # `interpolate` is loaded at first use
 
 from hpcclear.dynamics.laws.declared import Geometry, Parameter
 from hpcclear.dynamics.laws.formula import function_of
@@ -22,7 +22,7 @@ def of_rows(rows: Rows) -> Geometry:
     """The geometry of rows (depth in m, force in N), both rising from 0."""
     rows = rows if rows[0][0] == 0.0 else ((0.0, 0.0), *rows)
     depths, forces = np.array(rows).T
-    curve = PchipInterpolator(depths, forces)
+    curve = scipy.interpolate.PchipInterpolator(depths, forces)
     slopes = curve.derivative()(depths)
     last = float(depths[-1])
     return Geometry(
