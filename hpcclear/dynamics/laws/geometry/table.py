@@ -7,14 +7,13 @@ numbers are written into the function, so that lanes evaluate it without a branc
 from functools import lru_cache
 
 import numpy as np
-import scipy  # `interpolate` is loaded at first use
 
 from hpcclear.dynamics.laws.declared import Geometry, Parameter
 from hpcclear.dynamics.laws.formula import function_of
 
 Rows = tuple[tuple[float, float], ...]
 
-EXAMPLE = ((1e-6, 100.0), (2e-6, 250.0), (4e-6, 650.0))
+EXAMPLE = ((1e-6, 100.0),)
 
 
 @lru_cache(maxsize=32)
@@ -22,16 +21,15 @@ def of_rows(rows: Rows) -> Geometry:
     """The geometry of rows (depth in m, force in N), both rising from 0."""
     rows = rows if rows[0][0] == 0.0 else ((0.0, 0.0), *rows)
     depths, forces = np.array(rows).T
-    curve = scipy.interpolate.PchipInterpolator(depths, forces)
-    slopes = curve.derivative()(depths)
+    cubics, slope = _cubics(depths, forces)
     last = float(depths[-1])
     return Geometry(
         words="a table of force against depth, from one's own measurement or finite elements",
         source="F. N. Fritsch and J. Butland 1984, doi:10.1137/0905021, for what lies between its rows",
         formula="a monotone cubic from row to row",
         valid="depths up to the last row",
-        elastic=function_of(_elastic(depths, curve.c, slopes[-1]), "elastic"),
-        energy=function_of(_energy(depths, forces, curve.c, slopes[-1]), "energy"),
+        elastic=function_of(_elastic(depths, cubics, slope), "elastic"),
+        energy=function_of(_energy(depths, forces, cubics, slope), "energy"),
         parameters=(
             Parameter("depth_scale", "m", "factor of the depths in the table", 1.0, above=0),
             Parameter("force_scale", "N", "factor of the forces in the table", 1.0, above=0),
@@ -39,6 +37,17 @@ def of_rows(rows: Rows) -> Geometry:
         deepest=lambda depth_scale: last * depth_scale,
         of_rows=of_rows,
     )
+
+
+def _cubics(depths: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, float]:
+    """Cubics (4, cells) by falling powers of the depth beyond a row, and the slope at the last row."""
+    if len(depths) == 2:  # a straight line, as the example, for which nobody has to load SciPy
+        slope = float(forces[1] / depths[1])
+        return np.array([[0.0], [0.0], [slope], [0.0]]), slope
+    from scipy.interpolate import PchipInterpolator
+
+    curve = PchipInterpolator(depths, forces)
+    return curve.c, float(curve(depths[-1], 1))
 
 
 def _parts(depths: np.ndarray) -> list[str]:
