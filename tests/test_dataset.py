@@ -97,6 +97,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "verification": "mean_true deviation_true",
         "chaos": "chaos_share chaotic",
         "contributions": "contribution halved unexplained",
+        "worst": "worst worst_corner searched_at tried",
         "claims": "text verdict figure",
         "readings": "objective_smallest mean deviation",
         "statistics": "objective_mean objective_deviation mean_gap_histogram samples_by_status",
@@ -116,6 +117,7 @@ def test_the_table_holds_the_names_of_the_contract():
         "verification": "design",
         "chaos": "design",
         "contributions": "design input",
+        "worst": "design input",
         "claims": "claim",
         "readings": "reading design",
         "statistics": "joint bin edge",
@@ -142,6 +144,8 @@ def test_units_are_read_by_pint_and_every_variable_is_described(kind):
             place = name.removeprefix("searched_").partition("_")[0]
             if place in ORDINALS and kind == "verification":
                 assert f"{place}_unit" in example(kind)
+            elif name == "searched_at":
+                assert "input_unit" in example(kind)
             elif not (place in ORDINALS and name.startswith("searched_")):
                 registry.parse_units(variable.attrs["units"])
         else:

@@ -165,7 +165,7 @@ def _example(paths: list[str], part: dict[str, Any]) -> Iterator[str]:
     for source, scene in _scenes():
         for path in paths if paths[0] else ():
             for where, table in _tables(scene, path.split("."), []):
-                known = set(table) <= set(part["properties"])
+                known = set(table) <= set(part["properties"]) or part.get("additionalProperties")
                 of_kind = table.get("kind", kind.get("default")) == kind.get("const")
                 if not (known and of_kind):
                     continue

@@ -85,6 +85,7 @@ FURTHER: dict[str, dict[str, object]] = {
     "recommended": _meanings("not_recommended", "recommended"),
     "chosen": _meanings("not_chosen", "chosen"),
     "together": _meanings("independent", "correlated"),
+    "without_bounds": _meanings("bounded", "within_three_standard_deviations"),
     "explained": _meanings("not_explained", "explained"),
     "dominated": _meanings("not_significantly", "dominated"),
 }

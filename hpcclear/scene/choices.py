@@ -34,6 +34,7 @@ class Row(Table):
 
     name: str
     cost: Annotated[float, Quantity("")] | None = None
+    """Of this row, in any unit that all costs of the study share."""
     entries: dict[str, float | str]
     """By paths: numbers of the scene, SI, and entries of random inputs."""
 

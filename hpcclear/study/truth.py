@@ -297,7 +297,7 @@ def estimates_of(run: StudyRun, choice: Choice, values: Array) -> list[Estimate 
 
 
 def nothing(run: StudyRun) -> Array:
-    """No simulations yet: f, whether beyond Hertz's range, further responses, (2 + responses, replicates, 0)."""
+    """No simulations yet: f, whether beyond Hertz's range, further responses, shape (k, replicates, 0)."""
     return np.empty((2 + len(run.study.further), REPLICATES, 0))
 
 
