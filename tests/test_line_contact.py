@@ -202,8 +202,7 @@ def test_a_line_in_the_mechanism(tmp_path):
         return np.array([value], float)
 
     law = scene.effects.contact.declared
-    key = "joints.crank_rod"
-    given = joint_numbers(get, scene.clearance_joint("crank_rod"), key, key)
+    given = joint_numbers(scene, get, "crank_rod")
     found = {k: float(v[0]) for k, v in numbers.sample_numbers(law, {**given, "damping": np.array([0.5])}).items()}  # fmt: skip
 
     def force(d, v, v0, k):
