@@ -108,7 +108,12 @@ WORN = {"joints.crank_rod.wear": {"length": 0.02, "journal": {"coefficient": 1e-
 
 
 def test_what_is_asked_for_is_in_the_file():
-    everything = {"numerics.energy": True, "numerics.impacts": True, **WORN, "wear": {"profile": "angular"}}
+    everything = {
+        "numerics.energy": True,
+        "numerics.impacts": True,
+        **WORN,
+        "wear": {"profile": "angular"},
+    }
     records = evaluate_records(asking(everything), NOTHING, lanes=1)
     content = dataset.samples_dataset((), np.empty((1, 0)), {}, records)
     # no point is followed, and f has no rate of its own

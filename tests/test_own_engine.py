@@ -250,7 +250,9 @@ def test_every_command_that_simulates_warns_of_a_slip(tmp_path):
 
 def test_figures_say_at_which_plays_responses_were_simulated():
     response = hpcclear.simulate(engine(study=False))
-    assert gallery._plays(response) == ", at radial clearances of 30 µm in O12 and 15 µm in O23"
+    assert (
+        gallery._clearances(response) == ", at radial clearances of 30 µm in O12 and 15 µm in O23"
+    )
 
 
 def test_the_figure_of_samples_marks_none_as_failed_where_the_scatter_is_not_known(tmp_path):

@@ -7,7 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
-from hpcclear.scene.named import SHORT_NAMES
+from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
 
 
@@ -38,7 +38,7 @@ def with_shares(content: Mapping[str, Any]) -> Mapping[str, Any]:
             if not isinstance(share, str) or not share.rstrip().endswith("%"):
                 continue
             where = f"study.random.{name}.{key}"
-            path = next(iter(_paths(content, name, row)), "")
+            path = next(iter(paths_of(name, row)), "")
             if path not in quantities() or not quantities()[path].unit:
                 continue  # a percentage is a number of its own there
             if isinstance(_at(content, f"study.variables.{name}"), Mapping) and "mean" not in row:
@@ -85,7 +85,7 @@ def entry_replaced(content: Mapping[str, Any], path: str, value: Any) -> dict[st
     made = replace(made, owner, {**kept, leaf: value})
     if leaf == "fit":
         for name, row, _ in _rows_of_fits(made):
-            if f"{owner}.clearance" in _paths(content, name, row) and "fit" in row:
+            if f"{owner}.clearance" in paths_of(name, row) and "fit" in row:
                 made = replace(made, f"study.random.{name}.fit", None)
     return made
 
@@ -96,11 +96,6 @@ def _at(content: Any, path: str) -> Any:
     return content
 
 
-def _paths(content: Mapping[str, Any], name: str, row: Mapping[str, Any]) -> list[str]:
-    given = row.get("paths", row.get("path", SHORT_NAMES.get(name, ())))
-    return [given] if isinstance(given, str) else list(given)
-
-
 def _rows_of_fits(
     content: Mapping[str, Any],
 ) -> Iterator[tuple[str, Mapping[str, Any], list[Mapping[str, Any]]]]:
@@ -108,6 +103,6 @@ def _rows_of_fits(
     rows = _at(content, "study.random")
     for name, row in rows.items() if isinstance(rows, Mapping) else ():
         if isinstance(row, Mapping) and row.get("distribution") == "fit":
-            owners = [path.rpartition(".")[0] for path in _paths(content, name, row)]
+            owners = [path.rpartition(".")[0] for path in paths_of(name, row)]
             joints = [one for one in (_at(content, o) for o in owners) if isinstance(one, Mapping)]
             yield name, row, [one for one in joints if one.get("kind") != "ideal"]

@@ -149,3 +149,15 @@ class NamedInput(Table):
     def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
         """The row with the entries whose unit follows from its paths in SI."""
         raise NotImplementedError
+
+
+def paths_of(name: str, row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Paths of a row of a file, or those of a short name."""
+    return texts_in(row.get("paths", row.get("path", SHORT_NAMES.get(name))))
+
+
+def texts_in(value: Any) -> tuple[str, ...]:
+    """One text or several, of an entry that is not validated yet."""
+    several = (value,) if isinstance(value, str) else value
+    known = isinstance(several, (list, tuple)) and all(isinstance(one, str) for one in several)
+    return tuple(several) if known else ()

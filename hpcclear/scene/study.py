@@ -14,7 +14,7 @@ from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.fields import Count, NamedRows, Table, invalid, nearest
 from hpcclear.scene.formula import names_in
 from hpcclear.scene.moving import Moving
-from hpcclear.scene.named import SHORT_NAMES
+from hpcclear.scene.named import paths_of, texts_in
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import (
     CertificateOfEffects,
@@ -479,15 +479,14 @@ def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
     """A variable that drives a random input with an entry that has the same unit."""
     if not isinstance(row, Mapping) or "like" in row:
         return row
-    given = row.get("follows", row.get("paths", row.get("path", ())))
-    first = given if isinstance(given, str) else next(iter(given or ()), "")
-    _, _, rest = str(first).partition("random.")
-    own = random.get(rest.partition(".")[0])
-    if not rest or not isinstance(own, Mapping) or "fits" in row:
+    first = next(iter(texts_in(row.get("follows", row.get("paths", row.get("path"))))), "")
+    _, _, rest = first.partition("random.")
+    name = rest.partition(".")[0]
+    own = random.get(name)
+    if not name or not isinstance(own, Mapping) or "fits" in row:
         return row
-    paths = own.get("paths", own.get("path", SHORT_NAMES.get(rest.partition(".")[0], ())))
-    like = paths if isinstance(paths, str) else next(iter(paths), None)
-    return row if own.get("relative") or like is None else {**row, "like": like}
+    paths = paths_of(name, own)
+    return row if own.get("relative") or not paths else {**row, "like": paths[0]}
 
 
 def _only_clearance(variables: Mapping[str, Any]) -> str | None:
@@ -495,14 +494,7 @@ def _only_clearance(variables: Mapping[str, Any]) -> str | None:
     found = []
     for name, row in variables.items():
         own = row if isinstance(row, Mapping) else {}
-        paths = own.get("paths", own.get("path", SHORT_NAMES.get(name, ())))
-        paths = (paths,) if isinstance(paths, str) else paths
-        clear = (
-            "range" in own
-            and isinstance(paths, (list, tuple))
-            and {str(path).endswith(".clearance") for path in paths}
-        )
-        if clear == {True}:
+        if "range" in own and {p.endswith(".clearance") for p in paths_of(name, own)} == {True}:
             found.append(name)
     return found[0] if len(found) == 1 else None
 

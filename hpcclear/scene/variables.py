@@ -12,7 +12,7 @@ from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Row
 from hpcclear.scene.costs import Cost
 from hpcclear.scene.fields import Quantity, invalid
-from hpcclear.scene.named import NamedInput, Range, list_of, number_of, range_of
+from hpcclear.scene.named import NamedInput, Range, list_of, number_of, range_of, texts_in
 from hpcclear.scene.paths import described, quantities
 
 LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
@@ -49,13 +49,15 @@ class Variable(NamedInput):
     @classmethod
     def _without_numbers(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
         if "catalogue" in data and "path" not in data:
-            return {**data, "paths": tuple(data.get("paths", ()))}
+            return {**data, "paths": texts_in(data.get("paths"))}
         given = data.get("paths", data.get("path", ()))
         given = (given,) if isinstance(given, str) else given
         if not isinstance(given, (list, tuple)) or any(not isinstance(p, str) for p in given):
             return data
         if data.get("follows") and not given:  # read before
-            return {**data, "paths": ()}
+            given = texts_in(data["follows"])
+            if not given:
+                raise invalid("holds no paths", "Write them as path or paths", key="follows")
         of_rows = [
             p for p in given if p.startswith(OF_RANDOM) or ("fits" in data and p.endswith(".fit"))
         ]
