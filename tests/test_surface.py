@@ -24,7 +24,8 @@ def test_nothing_public_has_changed_since_the_last_release():
 
 SOURCES = {
     "a renamed function": (
-        {"__init__.py": ('"grid"', '"lattice"'), "results/grids.py": ("def grid(", "def lattice(")},
+        {"__init__.py": ('"grid"', '"lattice"'),
+         "results/grids.py": ("SHAPE = ", "def lattice(content):\n    return grid(content)\n\n\nSHAPE = ")},
         "Python hpcclear.grid: is gone",
     ),
     "a removed scene entry": (
