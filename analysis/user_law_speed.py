@@ -125,8 +125,8 @@ def main() -> None:
                     seconds[k] = time.process_time() - started
                 ratios.append(seconds[1] / seconds[0])
             low, middle, high = np.quantile(ratios, [0.25, 0.5, 0.75])
-            effects = ensemble(pair[1], 1).problem.effects
-            packed = executed_arithmetic(force_evaluation(effects, DEFAULT_LANES)).packed_share
+            problem = ensemble(pair[1], 1).problem
+            packed = executed_arithmetic(force_evaluation(problem, DEFAULT_LANES)).packed_share
             off = np.nanmax(np.abs(found[1] / found[0] - 1.0))
             print(
                 f"{name:30} time {middle:.3f} ({low:.3f} to {high:.3f}) of ours, "

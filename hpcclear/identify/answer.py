@@ -183,7 +183,7 @@ def _verdicts(
 ) -> Found:  # fmt: skip
     """What each table says, by models for the noisiest of them."""
     pairs = [features_of(row, layouts) for row in tables]
-    variance = np.max([own for _, own in pairs], axis=0)
+    variance: Array = np.max(np.array([own for _, own in pairs]), axis=0)
     made = prepare(ensemble, layouts, wanted.sensor, tables[0][0].frequency, variance, seed)
     return made, [judged(made, values, seed) for values, _ in pairs]
 

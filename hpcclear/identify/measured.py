@@ -176,7 +176,7 @@ def _frequency(time: Array, values: Array, nominal: float) -> float:
         total, phasor = 0.0, np.ones_like(wave)
         for _ in orders:
             phasor = phasor * wave
-            total += abs(own @ phasor) ** 2
+            total += float(abs(own @ phasor)) ** 2
         return total
 
     step = 1.0 / (4.0 * span * len(orders))
