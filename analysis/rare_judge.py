@@ -77,7 +77,7 @@ def probability(scene: Scene, choice: Choice, simulations: int, rng: np.random.G
     size = len(scene.required_study.case(choice.case).random)
 
     def value(u: np.ndarray) -> np.ndarray:
-        (f,) = rare._simulated(run, [(choice, u)], "judge")
+        f = rare.simulated(run, [(choice, u)], "judge")[0][goal.place]
         return np.where(np.isfinite(f), f, -np.inf)
 
     u = rng.standard_normal((count, size))
