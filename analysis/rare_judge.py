@@ -54,7 +54,7 @@ def judged(scene: Scene, place: Path, simulations: int) -> None:
     (case,) = scene.required_study.cases
     names = scene.required_study.design_variables(case.name)
     choice = Choice("", case.name, {name: float(best[name]) for name in names})
-    kept = place / "judge.json"
+    kept = place / f"judge_{simulations}.json"
     if not kept.exists():
         each = [
             probability(scene, choice, simulations // REPEATS, np.random.default_rng([81, k]))
