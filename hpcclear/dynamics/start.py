@@ -14,6 +14,7 @@ from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import Forest
 from hpcclear.dynamics.planar.problem import (
     linkage_of,
+    moves_geometry,
     moves_start,
     put_together,
     refused_of,
@@ -46,13 +47,17 @@ def start_states(
     n = len(trees.coordinates)
     start = Start.at_rest(len(par))
     places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
-    if points is None or not _moved(scene, points):
+    moved = () if points is None else tuple(map(scene.path_in_linkage, sum(points.paths, ())))
+    samples = None
+    if points is not None and any(map(moves_start, moved)):
+        samples = Samples(scene, points)
+        places.T[:], speeds.T[:] = samples.coordinates(trees)
+    else:
         places[:], speeds[:] = _of_scene(scene)
+    if samples is None or (samples.closed.all() and not any(map(moves_geometry, moved))):
         refusal = refused_of(scene) if walk else None
         found = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
-        samples = Samples(scene, points)
-        places.T[:], speeds.T[:] = samples.coordinates(trees)
         found = statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
     _start_contacts(scene, par, points, start)
     start.fail(found)
@@ -63,10 +68,6 @@ def start_states(
 def _of_scene(scene: Scene) -> tuple[Array, Array]:
     """Coordinates and velocities (n,) that all samples start with whose geometry is the scene's."""
     return coordinates(linkage_of(scene).forest, put_together(mechanism_of(scene.linkage)))
-
-
-def _moved(scene: Scene, points: Points) -> bool:
-    return any(moves_start(scene.path_in_linkage(path)) for paths in points.paths for path in paths)
 
 
 class Samples:

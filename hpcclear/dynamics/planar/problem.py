@@ -252,6 +252,11 @@ def moves_start(path: str) -> bool:
     return shaped and entry not in NOT_GEOMETRY
 
 
+def moves_geometry(path: str) -> bool:
+    """Whether it also changes whether a sample can turn: a mass centre moves coordinates, but no joint."""
+    return moves_start(path) and not path.endswith(".mass_center") and ".center." not in path
+
+
 def varies_geometry(scene: Scene) -> bool:
     """Whether a study varies what samples' starts and passages depend on."""
     return any(moves_start(scene.path_in_linkage(path)) for path in _varied(scene))
