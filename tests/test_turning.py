@@ -27,6 +27,7 @@ from hpcclear.scene.points import Points
 JOBS = Path(__file__).parents[1] / "jobs" / "linkages"
 ROCKER = tomllib.loads((JOBS / "crank_rocker.toml").read_text())
 MOTOR = ConstantSpeed("motor", "crank", 2 * math.pi)
+NOTHING = Points((), np.empty((1, 0)), ())
 LOCKED = "mechanism.bodies.coupler.length=0.088"
 FOUR = (
     ("o1", "crank.a", "ground.o"), ("o2", "crank.b", "coupler.a"),
@@ -303,6 +304,24 @@ def parallelogram(start, speed, **more):
 
 
 STARTS = (30.0, 45.0, 60.0, 61.3, 75.0, 77.7, 90.0, 100.1, 120.0, 180.5, -0.2, 250.0)
+
+
+@pytest.mark.parametrize(
+    "path", ["bodies.coupler.mass_center", "bodies.rocker.mass_center", "bodies.coupler.mass"]
+)
+@pytest.mark.parametrize("locked", [False, True])
+def test_designs_that_differ_in_mass_alone_all_turn_or_none(path, locked):
+    """Turning is judged by the scene's own geometry then; each has the bits of its own scene."""
+    path = f"mechanism.{path}"
+    apart = [f"mechanism.bodies.{one}.mass_center=0.03" for one in ("coupler", "rocker")]
+    scene = rocker(*apart, *([LOCKED] if locked else []))
+    values = np.array([[0.9], [1.1]]) * scene.number(path)
+    records = evaluate_records(scene, Points(("x",), values, ((path,),)))
+    assert records["status"].tolist() == [Status.CANNOT_TURN if locked else Status.OK] * 2
+    for value, record in zip(values[:, 0], records, strict=True):
+        (alone,) = evaluate_records(scene.with_({path: float(value)}), NOTHING)
+        assert alone["status"] == record["status"]
+        np.testing.assert_allclose(alone["objective"], record["objective"], rtol=1e-6)
 
 
 @pytest.mark.parametrize("speed", [6.0, -6.0])

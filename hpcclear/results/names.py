@@ -157,7 +157,7 @@ FURTHER_DIMS = {
 }
 """Coordinates that only some files have."""
 
-ROLE = "design_variable"  # value of the attribute `role`: tells design variables from results
+ROLE = "design_variable"  # value of the attribute `role` of design variables
 
 LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 

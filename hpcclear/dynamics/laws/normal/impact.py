@@ -1,11 +1,7 @@
 """Adams' IMPACT function: a power of the depth, and damping that grows to its greatest value over a depth."""
 
 from hpcclear.dynamics.laws.declared import ContactLaw, Parameter
-
-
-def elastic(depth, force_at, depth_at, exponent):
-    """N."""
-    return force_at * (depth / depth_at) ** exponent
+from hpcclear.dynamics.laws.geometry.power import elastic, energy, swing
 
 
 def share(depth, full_depth):
@@ -18,16 +14,6 @@ def force(depth, rate, force_at, depth_at, exponent, greatest_damping, full_dept
     """N."""
     damping = greatest_damping * share(depth, full_depth)
     return elastic(depth, force_at, depth_at, exponent) + damping * rate
-
-
-def energy(depth, force_at, depth_at, exponent):
-    """J."""
-    return force_at * depth_at * (depth / depth_at) ** (exponent + 1.0) / (exponent + 1.0)
-
-
-def swing(force, force_at, depth_at, exponent):
-    """Stiffness where the elastic part is ``force``, N/m."""
-    return exponent * force_at / depth_at * (force / force_at) ** (1.0 - 1.0 / exponent)
 
 
 LAW = ContactLaw(
