@@ -16,7 +16,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.identify import training
 from hpcclear.identify.advice import advice, noise_of
-from hpcclear.identify.answer import Wanted
 from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter
 from hpcclear.identify.history import DAY, history, seconds_of
@@ -25,6 +24,7 @@ from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.posterior import sequential
+from hpcclear.identify.settings import Settings
 from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
@@ -247,7 +247,7 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     variance = np.full(len(values), 0.5 * 0.05 / 20)
     prepared = prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 32)
     found = prepared, [judged(prepared, values, 1, 400)]
-    wanted = Wanted((UNKNOWN, other), (Path("a.csv"),))
+    wanted = Settings((UNKNOWN, other), "a.csv")
     gains = advice(ensemble, ["crank_moment"], Sensor(), SPEED, 0.1, 1)
     content = identified_dataset(ensemble, found, np.zeros(1), gains, wanted, 1, {})
     assert float(content["correlation"][0]) < -0.9
