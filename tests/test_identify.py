@@ -1,13 +1,14 @@
 """Unknown clearances from measured signals: features, posterior, calibration, model check, the command and its page."""
 
+import os
 import re
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from click.testing import CliRunner
-from commands import overrides, run
+from commands import finish, overrides, run, start, wait_for_parts
 from doc_pages import ROOT
 
 import hpcclear
@@ -254,6 +255,9 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     assert float(content["expected_correlation"][0, 0]) < -0.7  # the bounds cut errors off
     assert "correlation of errors -0." in lines(content)[-1].text
     assert any("not identified separately" in text for text in warnings(content))
+    together = next(line.text for line in lines(content) if line.label == "together")
+    found_sum = re.search(r"only (0\.\d+) crank_rod \+ (0\.\d+) rod_slider = (\d+) µm", together)
+    assert [float(one) for one in found_sum.groups()] == pytest.approx([0.5, 0.5, 80.0], rel=0.15)
     widths = np.ptp(content["interval"][0].values, axis=1)
     assert (widths > 3e-5).all()  # each is open, though their mean is known
     each = content["posterior"][0, :, :2]
@@ -346,20 +350,34 @@ def measured(tmp_path_factory, scene):
 
 @pytest.fixture(scope="module")
 def identified(measured, tmp_path_factory):
-    """The file, and what the command printed."""
+    """The file, what the command printed, and its words; it was interrupted after half of its ensemble before."""
     place = tmp_path_factory.mktemp("identified") / "identify.nc"
     words = ["identify", str(SCENE), "--unknown", UNKNOWN, "-o", str(place), "--members", "32"]
     words += [word for change in SHORT for word in ("--set", change)]
     words += ["--advise", "--limit", "100um", "--progress", "quiet"]
     for table, date in zip(measured, ("2026-01-01", "2026-03-01"), strict=True):
         words += ["--signal", str(table), "--date", date]
-    done = CliRunner().invoke(cli, words, standalone_mode=False)
+    real, calls = training.responses_of, []
+
+    def breaking(*arguments):
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training, "CHUNK", 16)
+        patch.setattr(training, "responses_of", breaking)
+        broken = CliRunner().invoke(cli, words, standalone_mode=False)
+        assert not place.exists(), broken.output
+        done = CliRunner().invoke(cli, words, standalone_mode=False)
     assert done.exception is None, done.output
-    return place, done.output, done.return_value
+    assert len(calls) == 3  # the finished half was not simulated again
+    return place, done.output, done.return_value, words
 
 
 def test_the_command_prints_intervals_growth_and_advice(identified):
-    place, printed, code = identified
+    place, printed, code, _ = identified
     content = dataset.read(place, "identify")
     assert code == (0 if content["explained"].all() else 4)
     for words in ("crank_rod", "95 %", "per day", "time to", "by crank_moment", "by frame_force_x"):  # fmt: skip
@@ -371,7 +389,7 @@ def test_the_command_prints_intervals_growth_and_advice(identified):
 
 
 def test_the_page_and_the_figures_show_it(identified, tmp_path):
-    place, _, _ = identified
+    place = identified[0]
     page = write_report(place, output=tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Unknowns of the machine" in page
     assert "was left out" not in page
@@ -402,39 +420,33 @@ def test_an_answer_is_never_more_certain_than_it_is(identified):
     assert any(line.label == "calibration" for line in lines(refused))
 
 
-def test_it_resumes_and_ends_with_the_same_bytes(measured, tmp_path, monkeypatch, scene):
-    monkeypatch.setattr(training, "CHUNK", 16)
-    words = (scene, UNKNOWN, measured[0])
-    place = tmp_path / "a.nc"
-    real, calls = training.responses_of, []
-
-    def breaking(*arguments):
-        calls.append(1)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return real(*arguments)
-
-    monkeypatch.setattr(training, "responses_of", breaking)
-    with pytest.raises(KeyboardInterrupt):
-        hpcclear.identify(*words, members=32, output=place, progress="quiet")
-    first = hpcclear.identify(*words, members=32, output=place, progress="quiet")
-    assert len(calls) == 3  # the finished half was not simulated again
-    again = hpcclear.identify(*words, members=32, output=place, progress="quiet")
-    xr.testing.assert_identical(first, again)
-    with pytest.raises(InputError, match="another run"):
-        hpcclear.identify(*words, members=64, output=place)
+def test_the_same_command_finds_it_finished_and_another_is_refused(identified):
+    place, _, _, words = identified
+    before = place.read_bytes()
+    again = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert again.exception is None
+    assert place.read_bytes() == before
+    other = CliRunner().invoke(cli, [*words, "--noise", "0.1"], standalone_mode=False)
+    assert other.return_value == 2
+    assert "another run" in " ".join(other.output.split())
 
 
 @pytest.mark.mpi
 @pytest.mark.full
 def test_ranks_and_a_kill_change_no_byte(measured, tmp_path):
     """`pytest -m full tests/test_identify.py`."""
-    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "--signal", str(measured[0]), "--members", "64"]  # fmt: skip
+    words = ["identify", str(SCENE), "--unknown", UNKNOWN, "--signal", str(measured[0]), "--members", "128"]  # fmt: skip
     words += overrides(*SHORT)
     files = []
     for ranks in (0, 2):
         out = tmp_path / str(ranks) / "identify.nc"
         out.parent.mkdir()
+        if ranks:  # killed once the first half of the ensemble is kept
+            job = start([*words, "-o", str(out)], ranks)
+            wait_for_parts(job, out.parent)
+            os.killpg(job.pid, signal.SIGKILL)
+            finish(job)
+            assert not out.exists()
         code, printed = run([*words, "-o", str(out)], ranks)
         assert code in (0, 4), printed
         files.append(out.read_bytes())

@@ -13,7 +13,14 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.identify.advice import NOISE, REVOLUTIONS, Advice, advice, noise_of
+from hpcclear.identify.advice import (
+    NOISE,
+    REVOLUTIONS,
+    Advice,
+    advice,
+    largest_correlation,
+    noise_of,
+)
 from hpcclear.identify.features import Layout
 from hpcclear.identify.history import history, seconds_of
 from hpcclear.identify.inputs import Inputs
@@ -195,11 +202,10 @@ def identified(
 
 def _of_verdicts(verdicts: Sequence[Verdict], particles: Array, unknowns: int) -> dict[str, Any]:
     """Variables over the records."""
-    related = np.stack([np.atleast_2d(np.corrcoef(one[:, :unknowns].T)) for one in particles])
     return {
         "posterior": particles,
         "interval": np.stack([one.interval.T for one in verdicts]),
-        "correlation": related[:, 0, 1] if unknowns > 1 else np.full(len(verdicts), np.nan),
+        "correlation": np.array([largest_correlation(one[:, :unknowns]) for one in particles]),
         "explained": np.array([one.explained for one in verdicts], np.int8),
         "doubt": np.array([one.doubt.max() for one in verdicts]),
         "worst_feature": np.array([one.worst for one in verdicts]),

@@ -10,7 +10,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
-from hpcclear.identify.signals import revolutions_of, series_of, unit_of
+from hpcclear.identify.signals import IMPACTS, revolutions_of, series_of, unit_of
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -30,7 +30,7 @@ def write_made(
     names : sequence of str
         Signals.
     noise : float
-        Standard deviation of white noise in each sample, over the RMS of the signal about its mean.
+        Standard deviation of white noise in each sample, over the RMS of the signal about its mean; counts have none.
     revolutions, samples : int
         Revolutions of the drive, and samples of each.
     seed : int
@@ -55,8 +55,13 @@ def write_made(
     clockwise = response["crank_angle"][-1] < response["crank_angle"][0]
     columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
-        values = make_interp_spline(turns, series_of(response, name), k=3)(places)
-        columns.append(values + noise * values.std() * rng.standard_normal(len(values)))
+        values = series_of(response, name)
+        if name.startswith(IMPACTS):  # whole events since the sample before, which have no noise
+            count = np.round(np.interp(places, turns, np.cumsum(values)))
+            columns.append(np.diff(count, prepend=count[0]))
+        else:
+            sampled = make_interp_spline(turns, values, k=3)(places)
+            columns.append(sampled + noise * sampled.std() * rng.standard_normal(len(places)))
         unit = unit_of(response, name)
         headings.append(name if unit == "1" else f"{name} [{unit}]")
     _write(Path(path), headings, columns)
