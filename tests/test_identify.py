@@ -359,11 +359,11 @@ def identified(measured, tmp_path_factory):
         words += ["--signal", str(table), "--date", date]
     real, calls = training.responses_of, []
 
-    def breaking(*arguments):
+    def breaking(*arguments, **options):
         calls.append(1)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return real(*arguments)
+        return real(*arguments, **options)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(training, "CHUNK", 16)
