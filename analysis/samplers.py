@@ -8,12 +8,13 @@ are differences of the 2.5 %, 50 % and 97.5 % quantiles of each unknown from the
 """
 
 import argparse
+import logging
 import time
 from pathlib import Path
 
 import emcee
 import numpy as np
-from identify_machines import ensemble_of, frequency_of, group_of, machine, model_of
+from identify_machines import ensemble_of, frequency_of, group_of, model_of, tables_of
 
 from hpcclear.identify.features import Layout
 from hpcclear.identify.judgement import PARTICLES, features_of, prepare
@@ -24,6 +25,7 @@ from hpcclear.identify.training import prepared_scene
 
 WALKERS, STEPS, DROPPED = 32, 1500, 500
 REFERENCE = 30_000
+logging.getLogger("emcee.autocorr").setLevel(logging.ERROR)  # that chains are short is the point
 SIGNAL, UNIT = "crank_moment", "N m"
 
 
@@ -72,7 +74,7 @@ def report(folder: Path, mechanism: str, count: int, machines: int, members: int
     frequency = frequency_of(prepared_scene(model_of(mechanism, count)[0]))
     group = (mechanism, count, SIGNAL, 0.1)
     numbers = [k for k in range(200) if group_of(1, k) == group][:machines]
-    read = [read_measured(machine(folder, 1, k)[1], SIGNAL, UNIT, frequency) for k in numbers]
+    read = [read_measured(one, SIGNAL, UNIT, frequency) for one in tables_of(folder, 1, numbers)]
     layout = Layout.of(read[0], Sensor())
     pairs = [features_of([one], [layout]) for one in read]
     model = prepare(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from hpcclear.base.arrays import Array
@@ -17,7 +18,7 @@ from hpcclear.scene.planar import turns_of
 
 def write_made(
     scene: Scene, path: str | Path, names: Sequence[str], *, noise: float, revolutions: int = 30,
-    samples: int = 512, seed: int = 0,
+    samples: int = 512, seed: int = 0, response: xr.Dataset | None = None,
 ) -> None:  # fmt: skip
     """Simulate a scene and write what a sensor would record over the crank angle, after the transient.
 
@@ -34,14 +35,17 @@ def write_made(
     revolutions, samples : int
         Revolutions of the drive, and samples of each.
     seed : int
+    response : xarray.Dataset, optional
+        Of the scene, with one revolution more than is written; by default it is simulated here.
 
     Raises
     ------
     InputError
         The simulation fails.
     """
-    longer = {"numerics.averaged_revolutions": revolutions + 1}
-    response = simulate(scene.with_(longer), checked=False)
+    if response is None:
+        longer = {"numerics.averaged_revolutions": revolutions + 1}
+        response = simulate(scene.with_(longer), checked=False)
     status = Status(int(response["status"]))
     if not status.valid:
         raise InputError("scene", status.name.lower(), status.message, status.remedy)
