@@ -133,9 +133,9 @@ def simulate(
 
 
 def simulate_together(scenes: Sequence[Scene]) -> Iterator[tuple[int, xr.Dataset]]:
-    """Simulate scenes that differ in numbers only side by side; yield their places in the sequence and responses, in any order.
+    """Simulate scenes that differ in numbers only in one batch; yield their places in the sequence and responses, in any order.
 
-    Every response has the bytes of ``simulate(scene, checked=False)``. A scene whose kernel differs is simulated by itself.
+    Every response has the bytes of ``simulate(scene, checked=False)``. A scene whose kernel differs is simulated alone.
     """
     groups: dict[Any, list[int]] = {}
     for k, scene in enumerate(scenes):
@@ -160,7 +160,7 @@ def simulate_together(scenes: Sequence[Scene]) -> Iterator[tuple[int, xr.Dataset
 
 
 def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
-    """What scenes have in common that can run side by side; None of one that is simulated by itself."""
+    """Return what scenes of one batch have in common, or None if a scene has to be simulated alone."""
     steady = scene.numerics.target_error is not None and scene.clearance_joints()
     if steady or coordinate_count(scene) == 0 or refused_of(scene) is not None:
         return None

@@ -39,7 +39,7 @@ def responses_of(
     copies : int
         Starts of each variant; all but the first are perturbed.
     together : int
-        Responses that a rank simulates side by side, which share its memory; no result depends on it.
+        Responses in a batch, which share the memory of a rank; results do not depend on it.
 
     Returns
     -------
@@ -96,7 +96,7 @@ class Responses:
         return next(self._begun)
 
     def _records(self, taken: Sequence[tuple[int, int, int]]) -> Iterator[np.ndarray]:
-        """Records (1,) of responses, those that are no copies side by side."""
+        """Yield records (1,) of responses; those without a perturbed start are simulated in one batch."""
         scenes = [self._scene.with_(self._variants[variant]) for _, variant, _ in taken]
         plain = [k for k, (_, _, copy) in enumerate(taken) if not copy]
         for k, (_, _, copy) in enumerate(taken):

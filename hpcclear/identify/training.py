@@ -30,7 +30,7 @@ CHUNK = 64
 """Members between two checkpoints."""
 
 TOGETHER = 8
-"""Members that a rank simulates side by side: stepping them costs little more than one, their time series fill its memory."""
+"""Members in a batch: integration costs little more than that of one member, but the time series fill the memory."""
 
 LEAST_REVOLUTIONS = 10
 """Revolutions that a member is averaged over at least: chaos takes some to be seen."""
