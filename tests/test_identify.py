@@ -264,6 +264,40 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     assert float(each.mean("input").std()) < 0.3 * float(each.std("particle").min())
 
 
+def test_a_resonance_that_is_known_is_taken_off_and_an_unknown_one_is_noticed(made):
+    ensemble, layout, _ = made
+    sensor = Sensor(resonance=300.0, quality=5.0)  # Hz; the sixth harmonic
+    truth, rng = np.array([0.3, 0.5]), np.random.default_rng(8)
+    seen = Spectrum.unpacked(spectra_of(truth[None], rng)[0, 0], 20)
+    mean = seen.mean * sensor.response(np.arange(ORDERS + 1) * SPEED)
+    measured = Measured("crank_moment", Spectrum(mean, np.full(ORDERS + 1, 0.05), 20), True, SPEED, ORDERS)  # fmt: skip
+    values, variance = features_of([measured], [layout])
+    known, unknown = (
+        judged(prepare(ensemble, [layout], one, SPEED, variance, 1, 32), values, 1, 400)
+        for one in (sensor, Sensor())
+    )
+    clearance = ensemble.inputs.values(truth[None])[0, 0]
+    assert known.explained
+    assert known.interval[0, 0] < clearance < known.interval[2, 0]
+    assert known.interval[2, 0] - known.interval[0, 0] < 0.3 * 140e-6
+    assert not unknown.explained
+    assert re.search(r"harmonic [67] ", made[2].labels[unknown.worst])
+
+
+def test_impacts_are_counted_in_a_simulated_measurement(tmp_path, scene):
+    """Timing is in the harmonics, the count in the mean; both as the motion itself has them."""
+    loose = {"joints.crank_rod.clearance": 150e-6, "study": None}
+    own = prepared_scene(scene.with_(loose))
+    response, name = hpcclear.simulate(own, checked=False), "impacts crank_rod"
+    place = tmp_path / "impacts.csv"
+    write_made(own, place, [name], noise=0.1, revolutions=9, response=response)
+    found = read_measured(place, name, "1", SPEED).spectrum
+    counts = response["impacts_by_revolution"].sel(joint="crank_rod").values
+    assert counts.mean() > 1.0
+    assert found.mean[0].real == pytest.approx(counts[:9].mean(), rel=0.1)
+    assert np.abs(found.mean[1:20]).max() > 0.3 * found.mean[0].real
+
+
 def test_noise_without_a_signal_leaves_the_unknown_open(made):
     ensemble, layout, _ = made
     size = len(layout.labels)
