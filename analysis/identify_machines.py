@@ -2,6 +2,7 @@
 
     nice -n 15 python analysis/identify_machines.py OUT [--machines 200] [--seed 1] [--rows ROWS.json]
     python analysis/identify_machines.py --table ROWS.json
+    python analysis/identify_machines.py OUT --advise
     python analysis/identify_machines.py OUT --raw
 
 Three mechanisms, one and two unknown clearances, random masses, friction and restitution, noise of 2, 10 and 30 %. All signals
@@ -10,7 +11,7 @@ lacks. Each mechanism, number of unknowns and noise has the same share of these.
 
 One ensemble serves all machines of a mechanism and number of unknowns, and one calibration those that also share signal and
 noise: each machine costs one simulated signal and one posterior. Ensembles, signals and groups are kept in OUT as they finish:
-the same command continues. `--raw` fits the raw signal by least squares for comparison.
+the same command continues. `--advise` compares signals for two unknowns. `--raw` fits the raw signal by least squares.
 """
 
 import argparse
@@ -24,6 +25,7 @@ import numpy as np
 
 from hpcclear import load_scene, simulate
 from hpcclear.dynamics.response import simulate_together
+from hpcclear.identify.advice import advice
 from hpcclear.identify.features import Layout
 from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.judgement import features_of, judged, prepare
@@ -36,6 +38,7 @@ from hpcclear.ranks.boundary import alone
 JOBS = Path(__file__).resolve().parent.parent / "jobs"
 NOISE = (0.02, 0.1, 0.3)
 SIGNALS = ("crank_moment", "frame_force_x")
+SHORT = {"crank_moment": "torque", "frame_force_x": "frame force"}
 MECHANISMS = ("slider-crank", "crank-rocker", "press")
 SOFT = {"youngs_modulus": 1e9, "poisson_ratio": 0.38}  # polymer bushes: fewer steps than bronze
 
@@ -262,6 +265,20 @@ def table_of(rows: list[dict[str, Any]]) -> str:
     return "\n".join(found)
 
 
+def advised(folder: Path, members: int) -> None:
+    """Print the half-widths to expect of two unknowns from 20 revolutions with 10 % noise, by signal, as Markdown."""
+    print("| mechanism | signal | first clearance | second clearance | correlation of errors |")
+    print("| --- | --- | --- | --- | --- |")
+    for name in MECHANISMS:
+        ensemble = ensemble_of(folder, name, 2, members)
+        frequency = frequency_of(prepared_scene(model_of(name, 2)[0]))
+        found = advice(ensemble, SIGNALS, Sensor(), frequency, 0.1, 1)
+        for k, signal in enumerate(found.names):
+            first, second = (f"± {1e6 * width:.0f} µm" for width in found.half_width[k, 1])
+            related = f"{found.correlation[k, 1]:.2f}"
+            print(f"| {name} | {SHORT[signal]} | {first} | {second} | {related} |")
+
+
 def raw(folder: Path, members: int) -> None:
     """Least squares on the raw signal, and features, of a chaotic machine of 42 um with more friction and a heavier piston."""
     scene, _ = model_of("chaotic", 1)
@@ -319,14 +336,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--rows", type=Path, help="file of all rows")
     parser.add_argument("--table", type=Path, help="print the table of such a file")
+    parser.add_argument("--advise", action="store_true", help="half-widths to expect, by signal")
     parser.add_argument("--raw", action="store_true")
     words = parser.parse_args()
     if words.table:
         print(table_of(json.loads(words.table.read_text())))
         return
     words.folder.mkdir(exist_ok=True, parents=True)
-    if words.raw:
-        raw(words.folder, words.members)
+    if words.raw or words.advise:
+        (raw if words.raw else advised)(words.folder, words.members)
         return
     groups: dict[tuple[str, int, str, float], list[int]] = {}
     for k in range(words.machines):

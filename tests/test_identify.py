@@ -1,8 +1,10 @@
 """Unknown clearances from measured signals: features, posterior, calibration, model check, the command and its page."""
 
+import json
 import os
 import re
 import signal
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,9 @@ from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
 from hpcclear.results import dataset
+
+sys.path.insert(0, str(ROOT / "analysis"))
+import identify_machines
 
 SCENE = ROOT / "jobs" / "identify.toml"
 UNKNOWN = "joints.crank_rod.clearance=10um:150um"
@@ -493,3 +498,17 @@ def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, 
     with pytest.raises(InputError, match="no such signal"):
         hpcclear.identify(scene, UNKNOWN, measured[0], of="crank_momen")
     assert Unknown.of(scene, UNKNOWN).unit == "m"
+
+
+def test_the_table_of_the_page_is_that_of_the_machines():
+    """`python analysis/identify_machines.py results/machines --rows analysis/identify_machines.json`."""
+    rows = json.loads((ROOT / "analysis" / "identify_machines.json").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "how-to" / "identify.md").read_text(encoding="utf-8")
+    assert [row["machine"] for row in rows] == list(range(200))
+    assert identify_machines.table_of(rows) in page
+    right = [hit for row in rows if not row["lacks"] for hit in identify_machines.held(row)]
+    other = [row for row in rows if row["lacks"]]
+    fine = [not row["explained"] or all(identify_machines.held(row)) for row in other]
+    assert len(other) >= 60
+    assert np.mean(right) >= 0.93
+    assert np.mean(fine) >= 0.9
