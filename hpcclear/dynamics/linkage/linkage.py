@@ -62,13 +62,7 @@ class Linkage:
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        for energies in (False, True):
-            for series in (False, True):
-                for responses in (False, True):
-                    self._text(
-                        self._on._replace(energies=energies, series=series, responses=responses)
-                    )
-        self._text(_with_impacts(self._on))
+        self._whole = self._text(_with_impacts(self._on))  # has the rows of all others
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -97,7 +91,9 @@ class Linkage:
             rows = rows.behind(self._bristles)
             text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
             self._texts[on] = text
-            self._take({text.derived.get(name, name): row for name, row in text.parameters.items()})
+            taken = {text.derived.get(name, name): row for name, row in text.parameters.items()}
+            assert len(self._texts) == 1 or taken.keys() <= self._given.keys(), on
+            self._take(taken)
         return self._texts[on]
 
     def _take(self, rows: dict[str, int]) -> None:
@@ -157,9 +153,8 @@ class Linkage:
     ) -> None:
         """Write the rows of its own into parameters (m, PARAMETERS), of a mechanism with numbers (m,) or single ones."""
         base = values(sample, self.cartesian, gravity=gravity, feedback=feedback)
-        for text in self._texts.values():
-            for row, value in row_of(text, base).items():
-                par[:, row] = value
+        for row, value in row_of(self._whole, base).items():
+            par[:, row] = value
         for name, row in self._given.items():
             if name in base:
                 par[:, row] = base[name]

@@ -107,6 +107,12 @@ def straight(mechanism: Mechanism) -> Mechanism:
     return with_numbers(mechanism, bodies=bodies)
 
 
+def uncentred(mechanism: Mechanism) -> Mechanism:
+    """The same with mass centres at the origins of the bodies' axes: where it stands does not depend on masses."""
+    bodies = tuple(replace(body, center=(0.0, 0.0)) for body in mechanism.bodies)
+    return with_numbers(mechanism, bodies=bodies)
+
+
 def modes_of(mechanism: Mechanism) -> int:
     """How many modes of bending there are."""
     return sum(body.bending.modes for body in mechanism.bodies if body.bending is not None)

@@ -94,7 +94,7 @@ def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage
     """
     mechanism = assembly.loops.mechanism
     main, loops = mechanism.period, Loops(mechanism, trees=True)
-    start, _ = coordinates(loops.forest, assembly)
+    start, _ = coordinates(loops.forest, assembly, mechanism)
     found = walked(loops, start, main.seconds, getattr(main, "turns", 1), rounds)
     for change in found.changes:
         if freedom(mechanism) == 0 and _diverges(assembly, found, change, gravity):
