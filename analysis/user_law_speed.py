@@ -21,8 +21,12 @@ from scenes import JOB, LAWS, ensemble
 
 from hpcclear import load_scene
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_reported
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.evaluation.evaluator import (
+    DEFAULT_LANES,
+    outcome_records,
+    responses_reported,
+)
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 
 SOURCE = """

@@ -16,7 +16,7 @@ from running import run
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.physics import powers
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.laws import ENTRIES
 from hpcclear.scene.paths import quantities

@@ -16,7 +16,7 @@ from rich.text import Text
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
-from hpcclear.dynamics.steady.wording import in_a_line
+from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.report.answer import answer
@@ -87,7 +87,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
     scene's own design can turn."""
     out = console()
-    from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
+    from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
     locked = _locked(scene)
@@ -241,7 +241,7 @@ def _over(over: str | tuple[float, ...]) -> str:
 def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
     from hpcclear.dynamics.evaluation import evaluate_records
-    from hpcclear.dynamics.evaluator import DEFAULT_LANES
+    from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
     from hpcclear.scene.points import Points
 
     path = next(path for path in scene.numeric_paths() if path.endswith(".mass"))

@@ -174,8 +174,8 @@ def simulate(written: Written, output: Path) -> int:
     lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
+    from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.dynamics.steady.wording import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset

@@ -11,7 +11,7 @@ from hpcclear.dynamics.contacts.declared import Shape
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.laws import numbers
 from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import length_path
 

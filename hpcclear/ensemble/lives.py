@@ -8,8 +8,8 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
+from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.wear.curves import THROUGH, Curves, curves, lifetime, local_bounds
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.record import Life
