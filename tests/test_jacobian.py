@@ -8,13 +8,14 @@ import pytest
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import Problem, problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.implicit import memory as mem
 from hpcclear.dynamics.stepping.implicit.columns import new_columns
 from hpcclear.dynamics.stepping.implicit.control import fit_to_ramp
 from hpcclear.dynamics.stepping.implicit.memory import COLUMNS, Moved, N
 from hpcclear.dynamics.stepping.implicit.newton import evaluate_stages, new_jacobian
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import load_scene
 
 JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

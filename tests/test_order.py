@@ -9,10 +9,11 @@ import pytest
 
 from hpcclear.dynamics.layout.views import Parameters, Settings
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import Problem, problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, Tableau
 from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

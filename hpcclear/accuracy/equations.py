@@ -12,7 +12,7 @@ from hpcclear.base.jit import scalar_function
 from hpcclear.dynamics.layout import MAX_JOINTS
 from hpcclear.dynamics.layout.views import Parameters, Start
 from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
-from hpcclear.dynamics.setup.problem import Problem
+from hpcclear.dynamics.stepping.problem import Problem
 
 
 @scalar_function

@@ -18,9 +18,10 @@ from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.layout import views
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import Problem, problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
 
 LARGEST_STEP = 1.0 / 64.0

@@ -16,9 +16,10 @@ from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import Problem, problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 

@@ -90,7 +90,7 @@ def simulate(
         What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
         need ``numerics.responses`` where there is no study that requires them.
     copy : int
-        Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.evaluation.steady.copies`); a
+        Start a little beside the scene's start, in the direction of this number (`evaluation.steady.copies`); a
         motion without clearance has no copies.
     checked : bool
         Whether the objective gets a half-width (``objective_uncertainty``), by replicas beside it; never for a copy.

@@ -25,12 +25,12 @@ from hpcclear.dynamics.layout.settings import (
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.observe import observe, observing_code
 from hpcclear.dynamics.linkage.rhs import compiled_text
-from hpcclear.dynamics.setup.problem import Problem
 from hpcclear.dynamics.stepping.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.stepping.explicit.steps import explicit_code
 from hpcclear.dynamics.stepping.implicit.batch import batch_code
 from hpcclear.dynamics.stepping.implicit.columns import new_columns
 from hpcclear.dynamics.stepping.implicit.memory import COLUMNS
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.dynamics.stepping.profile import profile_code
 from hpcclear.dynamics.stepping.record import columns
 from hpcclear.dynamics.stepping.special import special_code

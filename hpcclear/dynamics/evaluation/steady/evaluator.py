@@ -70,7 +70,7 @@ class _Ask:
 
 
 class SteadyEvaluator:
-    """Finds the steady mean of points of one scene as a stream; to be used like `hpcclear.dynamics.evaluation.evaluator.Evaluator`.
+    """Finds the steady mean of points of one scene as a stream; to be used like `evaluation.evaluator.Evaluator`.
 
     Parameters
     ----------
