@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.cli.printing import describe_scene
+from hpcclear.cli.check import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.linkage.assembly import assemble

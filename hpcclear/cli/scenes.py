@@ -132,7 +132,7 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """
 
     def program(ranks: "Ranks") -> int:
-        from hpcclear.cli.printing import describe_scene
+        from hpcclear.cli.check import describe_scene
 
         scene = written.scene(warn=False)
         turns = describe_scene(scene, cost, ranks)
