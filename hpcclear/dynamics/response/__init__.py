@@ -22,7 +22,7 @@ from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.response.impacts import Turns, measured, spectral
-from hpcclear.dynamics.response.recorded import ITSELF, Piece, Recording, pieces
+from hpcclear.dynamics.response.steps import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.setup.parameters import Numbers, parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.setup.start import start_states

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.response.recorded import Steps
+from hpcclear.dynamics.response.steps import Steps
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.statistics import spectra
 
