@@ -12,7 +12,12 @@ from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY, Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluation.evaluator import alone, outcome_records, responses_reported
+from hpcclear.dynamics.evaluation.evaluator import (
+    alone,
+    impacts_reported,
+    outcome_records,
+    responses_reported,
+)
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.joint_laws import widest_contact
 from hpcclear.dynamics.planar.curves import curve_at
@@ -128,6 +133,8 @@ def simulate(
     names = [
         name for name in (*_REPORTED, *STEADY, "regime") if name in _REPORTED or steady is not None
     ]
+    if steady is None and not still:  # what the sample measures as well has its bits
+        names += [name for name in impacts_reported(problem_of(scene)) if name in data]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(
             scene.effects.slider_load,
