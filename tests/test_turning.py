@@ -15,14 +15,14 @@ from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import ConstantSpeed, Harmonic, TorqueDrive
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.turning import refused
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Outcome, Parameters, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.points import Points
 
 JOBS = Path(__file__).parents[1] / "jobs" / "linkages"

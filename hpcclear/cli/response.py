@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import console, fitting, objective_of, quantity, remark, table
-from hpcclear.dynamics.steady.wording import in_a_line
+from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels, motion
 from hpcclear.scene.citation import TITLE

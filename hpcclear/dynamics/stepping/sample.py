@@ -5,7 +5,7 @@ import math
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.settings import (
+from hpcclear.dynamics.layout.settings import (
     AVERAGED,
     CHOSEN,
     CYCLE,
