@@ -8,6 +8,7 @@ from types import ModuleType
 
 from hpcclear.base.one_text import module_of
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.generator import Motion
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
@@ -17,9 +18,7 @@ from numba import carray
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-{geometries}from hpcclear.dynamics.linkage.elements import (
-    along, drag, harmonic, held_inverse, hinge, one_sided, sign_of, spring_force, table_value,
-)
+{geometries}from hpcclear.dynamics.linkage.elements import {elements}
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated
 '''
@@ -67,8 +66,10 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
         for row, first, (before, angle) in _curves(motion)
     )
     geometries = dict.fromkeys(c.geometry for c in motion.forest.mechanism.contacts)
+    called = [name for name in functions() if f" {name}(" in motion.source + looked_up]
     head = _HEAD.format(
-        geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries)
+        geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries),
+        elements=", ".join(called or ["table_value"]),
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"

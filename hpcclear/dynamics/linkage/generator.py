@@ -14,7 +14,6 @@ from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.loads.writing import Writing
@@ -31,6 +30,12 @@ from hpcclear.dynamics.linkage.parts import (
     Torque,
     TorqueDrive,
     split,
+)
+from hpcclear.dynamics.linkage.rubbing import (
+    RubbingGuide,
+    coupled,
+    rubbing_of,
+    ties_of,
 )
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
@@ -330,15 +335,12 @@ class _Generator:
         for column, torque in torques:
             right[self.number[column]] = right[self.number[column]] + torque
         right |= {r: -row.asked for r, row in enumerate(self.constraints, n)}
-        self.guides = [
-            Guide(joint, self.balance, self.closing, self.columns, self.constraints)
-            for joint in _rubbing(self.mechanism)
-        ]
+        self.rubbing = rubbing_of(self)
+        # friction that moves nothing is worked out last, by those texts that ask for moments or losses
+        self.late = [one for one in self.rubbing if not one.moved]
+        self.early = [one for one in self.rubbing if one.moved]
         found: dict[int, Term] = {}
-        ties = {
-            (guide.place, k) for guide in self.guides for k in (*guide.normal, *guide.influence)
-        }
-        for block in blocks(range(n + len(self.constraints)), matrix, ties):
+        for block in blocks(range(n + len(self.constraints)), matrix, ties_of(self.early)):
             found |= self._block(block, matrix, right, n)
         return {k: self._accelerated(k, term) for k, term in sorted(found.items())}
 
@@ -363,15 +365,19 @@ class _Generator:
     def _block(
         self, block: list[int], matrix: Matrix, right: dict[int, Term], n: int
     ) -> dict[int, Term]:
-        rubbing = [guide for guide in self.guides if guide.place in block]
+        rubbing = [one for one in self.early if one.touched[0] in block]
         held = sum(k >= n for k in block)
-        for guide in rubbing:
-            guide.measure()
-            if not guide.normal:
-                guide.known(right)
-        moving = [guide for guide in rubbing if guide.normal]
+        for one in rubbing:
+            one.measure()
+            if not one.depends:
+                one.known({})
+                for k, term in one.moved.items():
+                    right[k] = right[k] - one.force * term
+        moving = [one for one in rubbing if one.depends]
         if len(block) == 2 and not held and len(moving) == 1:
-            return moving[0].paired(block, matrix, right)
+            (guide,) = moving
+            if isinstance(guide, RubbingGuide):
+                return guide.paired(block, matrix, right)
         factored = Elimination(self.writer, matrix, block, held, self.inverse, self._passed(block))
         found = factored.solve(right)
         return coupled(moving, factored, found) if moving else found
@@ -400,6 +406,9 @@ class _Generator:
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
         if on.energies or on.series or on.responses or on.objective:
+            for rub in self.late:
+                rub.measure()
+                rub.known(found)
             moments = [self._moment(drive, found, torques) for drive in self._drives()]
             if on.series or on.responses or on.objective:
                 self._rate(at.DRIVE_MOMENT, moments[0])
@@ -415,8 +424,8 @@ class _Generator:
             loss = ZERO
             for one in self.losses:
                 loss = loss + one
-            for guide in self.guides:
-                loss = loss + guide.force * guide.speed
+            for rub in self.rubbing:
+                loss = loss + rub.force * rub.speed
             for bend in self.kinematics.bends.values():
                 loss = loss + bend.loss()
             self._rate(at.DISSIPATION, loss)
@@ -514,15 +523,14 @@ class _Generator:
             total = total + self.balance.mass(column, one) * found[k]
         for r, row in enumerate(self.constraints, len(self.columns)):
             total = total - row.others.get(column, ZERO) * found[r]
+        for rub in self.rubbing:
+            if column in rub.influence:
+                total = total + rub.force * rub.influence[column]
         return total - self.balance.force(column)
 
     def _rate(self, row: int, term: Term) -> None:
         text = self.writer.text(term)
         self.writer.line(f"work[{self.rows.rates + row} * W + i] = {text}")
-
-
-def _rubbing(mechanism: Mechanism) -> list[Slide]:
-    return [j for j in mechanism.joints if isinstance(j, Slide) and j.friction is not None]
 
 
 def _guide_of(mechanism: Mechanism, body: str) -> Slide:

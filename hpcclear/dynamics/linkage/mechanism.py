@@ -251,6 +251,12 @@ def _numbers(m: Mechanism) -> None:
                 raise InputError(
                     f"{key}.{entry}", 0.0, "there would be no motion", "Write a speed or amplitude"
                 )
+    for joint in m.ideal:
+        if isinstance(joint, Revolute) and joint.friction is not None and modes_of(m):
+            raise InputError(
+                f"joints.{joint.name}.friction", joint.friction.coefficient,
+                "reactions of pins are not modelled where a bar bends", "Remove it, or bending",
+            )  # fmt: skip
     for joint in m.clearances:
         if isinstance(joint, Clearance) and joint.clearance >= joint.bearing_radius:
             raise InputError(

@@ -67,12 +67,22 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True)
+class PinFriction:
+    """Friction of a pin over its reaction, radius (m), and sliding speed (m/s) below which it falls linearly to 0."""
+
+    coefficient: float
+    radius: float
+    ramp_speed: float
+
+
+@dataclass(frozen=True)
 class Revolute:
     """A pin without clearance between two places."""
 
     name: str
     journal: str
     bearing: str
+    friction: PinFriction | None = field(default=None, kw_only=True)
     contacts: ClassVar[tuple[Contact, ...]] = ()
 
     @property

@@ -118,7 +118,9 @@ def _compliances(both: Materials) -> tuple[float, float]:
 
 def _joint(joint: Any) -> parts.Joint:
     if isinstance(joint, PlanarRevolute):
-        return parts.Revolute(joint.name, joint.journal, joint.bearing)
+        return parts.Revolute(
+            joint.name, joint.journal, joint.bearing, friction=_rubbing(joint.friction)
+        )
     if isinstance(joint, PlanarClearance):
         both, start = joint.materials, joint.start_eccentricity
         stiffness = contact_stiffness(*_compliances(both), joint.bearing_radius, joint.clearance)
@@ -129,10 +131,18 @@ def _joint(joint: Any) -> parts.Joint:
     if isinstance(joint, PlanarSlide) and joint.clearance is not None:
         return _loose_slide(joint)
     if isinstance(joint, PlanarSlide):
-        rubs = joint.friction
-        friction = None if rubs is None else parts.GuideFriction(rubs.coefficient, rubs.ramp_speed)
+        friction = _rubbing(joint.friction)
         return parts.Slide(joint.name, joint.point, joint.line, joint.angle, friction)
     return parts.Fixed(joint.name, joint.point, joint.line, joint.angle)
+
+
+def _rubbing(table: Any) -> Any:
+    """Friction of a guide, or of a pin, which has a radius."""
+    if table is None:
+        return None
+    if (radius := getattr(table, "radius", None)) is None:
+        return parts.GuideFriction(table.coefficient, table.ramp_speed)
+    return parts.PinFriction(table.coefficient, radius, table.ramp_speed)
 
 
 def _loose_slide(joint: Any) -> parts.LooseSlide:
