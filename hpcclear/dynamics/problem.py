@@ -1,8 +1,7 @@
 """What is common to the samples of a scene: effects, coordinates, method, tolerances, tables."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,18 +16,15 @@ from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.laws.objectives import rate_in_lanes
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import modes_of
-from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
+from hpcclear.dynamics.linkage.parts import RunUp, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text
-from hpcclear.dynamics.linkage.table_drive import PARTS
 from hpcclear.dynamics.parameters import parameter_rows, parameters
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar import swings
-from hpcclear.dynamics.planar.curves import periodic_cells
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.stepping.settings import STRICT
 from hpcclear.dynamics.views import Outcome, Parameters, Settings, Start
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import main_drive
 
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
@@ -215,18 +211,18 @@ def implicit_method(scene: Scene) -> str:
     return "stiff" if stiff[there].any() else "never"
 
 
-def _cells_of_curves(
-    linkage: Linkage, tables: dict[str, Any], cells: Callable[[Any], Array]
-) -> tuple[Array, ...]:
+def _cells_of_curves(scene: Scene, linkage: Linkage) -> tuple[Array, ...]:
     """Cells of a linkage's curves, in the order of their rows."""
     driven = {
         f"{drive.name}.{part}": cells
         for drive in linkage.mechanism.drives
-        if isinstance(drive, TableDrive)
-        for part, cells in zip(PARTS, drive.cells, strict=True)
+        if isinstance(drive, (TableDrive, RunUp))
+        for part, cells in zip(drive.curves, drive.cells, strict=True)
     }
+    tables, interpolation = curves_of(scene.linkage), scene.numerics.interpolation
     return tuple(
-        driven[name] if name in driven else cells(tables[name]) for name in linkage.curve_rows
+        driven[name] if name in driven else tables[name].cells(interpolation)
+        for name in linkage.curve_rows
     )
 
 
@@ -245,13 +241,7 @@ def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = No
     """What is common to all samples of a scene."""
     e = scene.effects
     check_objective(scene)
-    drive: Any = main_drive(scene.linkage)
     linkage = planar.linkage_of(scene)
-    cells = partial(
-        periodic_cells,
-        turns=getattr(drive, "turns", 1),
-        interpolation=scene.numerics.interpolation,
-    )
     return Problem(
         linkage=linkage,
         effects=effects_of(scene, series=series, energies=energies),
@@ -266,9 +256,9 @@ def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         implicit=implicit_method(scene),
         cycle=linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
-        curves=_cells_of_curves(linkage, curves_of(scene.linkage), cells),
+        curves=_cells_of_curves(scene, linkage),
         chosen=scene.objective.joints,
-        from_rest=getattr(drive, "expected_speed", None) is not None,
+        from_rest=getattr(linkage.mechanism.period, "expected_speed", None) is not None,
     )
 
 

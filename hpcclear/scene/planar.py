@@ -260,7 +260,10 @@ class Planar(Table):
                 for entry in ("torque", "size"):
                     curve = getattr(row, entry, None)
                     if isinstance(curve, tuple):
-                        check_period(curve, turns, f"{table}.{row.name}.{entry}")
+                        by_another = getattr(row, "angle_of", None) is not None
+                        check_period(
+                            curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}"
+                        )
         return self
 
     @model_validator(mode="before")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.bits import no_more
 from hpcclear.base.jit import lane_function
 
 _TINY = 1e-300  # keeps the direction of a spring without length defined (and zero)
@@ -100,6 +101,16 @@ def table_value(table, first, cells, angle):
     """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell, from `first` on."""
     turns = angle * (0.5 / math.pi)
     x = (turns - math.floor(turns)) * cells
+    cell = min(int(x), cells - 1)
+    s = x - cell
+    k = first + 4 * cell
+    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+
+
+@lane_function
+def table_until(table, first, cells, share):
+    """The same of a table that does not repeat, at a share of its length not below 0; level beyond its end."""
+    x = no_more(share, 1.0) * cells
     cell = min(int(x), cells - 1)
     s = x - cell
     k = first + 4 * cell

@@ -6,7 +6,7 @@ contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
@@ -17,6 +17,7 @@ from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vecto
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.loads.writing import Writing
+from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
@@ -25,12 +26,14 @@ from hpcclear.dynamics.linkage.parts import (
     Drive,
     Force,
     Revolute,
+    RunUp,
     Slide,
     Spring,
     Torque,
     TorqueDrive,
     split,
 )
+from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.rubbing import (
     RubbingGuide,
     coupled,
@@ -55,30 +58,6 @@ class On(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Where a text finds and leaves its numbers: first rows of `work`, rows of parameters, first row that is free."""
-
-    coordinates: int = at.QS
-    velocities: int = at.VS
-    accelerations: int = at.ACC
-    rates: int = at.RATE_NOW
-    time: int = at.STAGE_TIME
-    holds: int | None = None  # first of the multipliers, where they are asked for
-    parameters: Mapping[str, int] = field(default_factory=dict)
-    free: int = 0
-    curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
-
-    def behind(self, bristles: int) -> "Rows":
-        """The same of a motion whose coordinates come after so many of bristles."""
-        return replace(
-            self,
-            coordinates=self.coordinates + bristles,
-            velocities=self.velocities + bristles,
-            accelerations=self.accelerations + bristles,
-        )
-
-
-@dataclass(frozen=True)
 class Motion:
     """A text and what it needs."""
 
@@ -95,8 +74,8 @@ class Motion:
     """Names of the multipliers."""
     curves: Mapping[str, int] = field(default_factory=dict)
     """Rows of tabulated values, by drive or load."""
-    turned: tuple[tuple[str, ...], str] = ((), "")
-    """Statements, and the angle at which tables are looked up after them, divided by the turns of a revolution."""
+    look_ups: Mapping[str, LookUp] = field(default_factory=dict)
+    """Where each of them is looked up; those that move bodies first, since the angle of loads may be theirs."""
 
 
 def generate(
@@ -136,42 +115,29 @@ class _Generator:
             self._contact(k, contact)
         for load in self.mechanism.loads:
             self._load(load)
-        torques = [self._torque(d) for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
+        free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
+        torques = [self._torque(d) for d in free if not isinstance(d, RunUp)]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
+        for drive in free:
+            if isinstance(drive, RunUp):
+                given = (self._turned(f"{drive.name}.{part}") for part in drive.curves)
+                self.constraints.append(self.closing.run_up(drive, *given))
         found = self._solved(torques)
         self._store(found, dict(torques))
         lines = "\n".join(f"    {line}" for line in (self._described(), *self.writer.lines))
-        turned, looking = self._looked_up_at()
-        read = self.writer.read | looking.read
-        names = {k: row for k, row in looking.rows.items() if k in read}
+        look_ups = LookUps(self.forest, self.rows, self.writer)
+        read = self.writer.read | look_ups.read
+        names = {k: row for k, row in look_ups.rows.items() if k in read}
         return Motion(
             f"def lane(effects, joints, work, par, i, W):\n{lines}\n",
             self.forest,
             names,
             {name: text for name, text in self.writer.derived.items() if name in names},
-            tuple(self.writer.inputs | looking.inputs),
+            tuple(self.writer.inputs | look_ups.inputs),
             tuple(row.name for row in self.constraints),
             self.rows.curves,
-            turned,
+            look_ups.found,
         )
-
-    def _looked_up_at(self) -> tuple[tuple[tuple[str, ...], str], Writer]:
-        """`Motion.turned`: the angle of the body whose turn is the revolution, from the x axis. It has a writer of its own,
-        since tables are looked up before the lane's text runs."""
-        rows, drive = self.rows, self.mechanism.period
-        write = Writer(self.writer.rows, self.writer.free, hoist=False)
-        if not any(
-            getattr(one, "table", False) for one in (*self.mechanism.drives, *self.mechanism.loads)
-        ):
-            return ((), ""), write
-        kin = Kinematics(
-            self.forest, write, rows.coordinates, rows.velocities, rows.time, rows.curves
-        )
-        angle = kin.angle(drive.body)
-        if drive.turns != 1:
-            angle = angle * named(repr(1.0 / drive.turns))
-        text = write.text(angle)
-        return (tuple(write.lines), text), write
 
     def _described(self) -> str:
         """First line of the text: what is integrated, where the contacts are, what closes loops."""
@@ -267,7 +233,7 @@ class _Generator:
 
     def _turned(self, name: str) -> Term:
         """What the curve of a drive or load says at the stage."""
-        turned = f"turned_{name}"
+        turned = f"turned_{name.replace('.', '_')}"
         self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
 

@@ -6,11 +6,13 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
 from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_reported
 from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.start import start_states
 from hpcclear.dynamics.steady.copies import scales
@@ -65,6 +67,16 @@ class _Ask:
         return not self._rows
 
 
+def check_steady(scene: Scene) -> None:
+    """Refuse a scene whose motion goes by the time since the start, which has no steady mean; raises InputError."""
+    if linkage_of(scene).mechanism.clocked:
+        raise InputError(
+            "numerics.target_error", scene.numerics.target_error,
+            "a load or drive goes by the time since the start, so there is no steady mean",
+            "Leave it out, and average the revolutions of interest (numerics.averaged_revolutions)",
+        )  # fmt: skip
+
+
 class SteadyEvaluator:
     """Finds the steady mean of points of one scene as a stream; to be used like `hpcclear.dynamics.evaluator.Evaluator`.
 
@@ -89,6 +101,7 @@ class SteadyEvaluator:
         lanes: int = DEFAULT_LANES,
         procedure: Procedure | None = None,
     ) -> None:
+        check_steady(scene)
         self._procedure = procedure or _to_target(scene)
         self.scene = scene
         self.lanes = lanes
