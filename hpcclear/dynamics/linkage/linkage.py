@@ -12,13 +12,13 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
-from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
+from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import TableDrive
+from hpcclear.dynamics.linkage.parts import curves_of
 from hpcclear.dynamics.linkage.poses import Pose, Poses
-from hpcclear.dynamics.linkage.table_drive import PARTS
+from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
@@ -131,7 +131,7 @@ class Linkage:
         tabled = [
             name
             for one in (*self.mechanism.drives, *self.mechanism.loads)
-            for name in _curves_of(one)
+            for name in curves_of(one)
         ]
         if len(tabled) > at.MAX_CURVES:
             raise InputError(
@@ -215,10 +215,3 @@ class Linkage:
 def _with_impacts(on: On) -> On:
     """What a text that measures impacts has: all that is measured, so that there is one of them."""
     return on._replace(energies=True, series=True, responses=True, impacts=True)
-
-
-def _curves_of(part: object) -> list[str]:
-    """Names of the curves that a drive or load has."""
-    if isinstance(part, TableDrive):
-        return [f"{part.name}.{one}" for one in PARTS]
-    return [part.name] if getattr(part, "table", False) else []  # type: ignore[attr-defined]
