@@ -13,13 +13,13 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import FIELDS, IMPACTS, OUTCOME, RESPONSES
+from hpcclear.base.outcome import FIELDS, IMPACTS, OUTCOME, RESPONSES, WIDEST
 
 Function = Callable[..., Any]
 
 RECORDED = {"objective": "m"} | {
     name: FIELDS[name].unit.removeprefix("1")
-    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS)
+    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS, *WIDEST)
 }
 """Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
@@ -187,6 +187,14 @@ OURS = {
     "peak-contact-force": Objective(
         "peak contact force, of the joint where it is larger", "N",
         lambda peak_contact_force: peak_contact_force.max(),
+    ),
+    "peak-contact-pressure": Objective(
+        "peak contact pressure, of the joint where it is larger", "Pa",
+        lambda peak_contact_pressure: np.nanmax(peak_contact_pressure),
+    ),
+    "contact-half-angle": Objective(
+        "half angle of contact at the peak force, of the joint where it is larger", "rad",
+        lambda contact_half_angle: np.nanmax(contact_half_angle),
     ),
     "peak-crank-moment": Objective(
         "peak torque of the drive on the crank", "N m", lambda peak_crank_moment: peak_crank_moment

@@ -175,6 +175,10 @@ FIELDS = {
     "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact"),
     "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact"),
     "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact"),
+    "peak_contact_pressure": Field(
+        "Pa", "largest pressure at the peak contact force", per="joint", when="request"),
+    "contact_half_angle": Field(
+        "rad", "half of the angle of contact at the peak contact force", per="joint", when="request"),
     "rate_of_objective": Field("rate", "what is made of the objective's own rate", per="joint", when="request"),
     "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
     "sliding_waves": Field(
@@ -206,6 +210,9 @@ RESPONSES = _fields("response")
 
 IMPACTS = _fields("impact")
 """Fields that measure impact and noise."""
+
+WIDEST = {"peak_contact_pressure": "pressure", "contact_half_angle": "half_angle"}
+"""Fields of the contact at its peak force, and what a geometry of contact calls them; not all geometries have a pressure."""
 
 ON_REQUEST = _fields("response", "impact", "request")
 """Fields that are NaN, and left out of datasets, unless a scene requests them."""

@@ -9,14 +9,14 @@ from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.base.outcome import STEADY, Status
+from hpcclear.base.outcome import STEADY, WIDEST, Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluator import alone, outcome_records, responses_reported
 from hpcclear.dynamics.impacts import Turns, measured, spectral
-from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.lanes import PrescribedSamples
-from hpcclear.dynamics.parameters import Numbers, parameters
+from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
@@ -125,9 +125,8 @@ def simulate(
     record = asked(record, objective)
     record["objective_uncertainty"] = half_width
     labels = scene.joint_labels
-    names = [
-        name for name in (*_REPORTED, *STEADY, "regime") if name in _REPORTED or steady is not None
-    ]
+    names = [*_REPORTED, *(WIDEST if has_pressure(scene) and not still else ())]
+    names += [] if steady is None else [*STEADY, "regime"]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(
             scene.effects.slider_load,
@@ -139,11 +138,7 @@ def simulate(
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
     return dataset.response_dataset(
         times,
-        {
-            **data,
-            **reported,
-            **widest_contact(scene, Numbers(scene, None), reported["peak_contact_force"]),
-        },
+        {**data, **reported},
         provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}

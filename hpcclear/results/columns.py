@@ -86,8 +86,6 @@ RESPONSE: Columns = {
     "load_work": number(("time",), "J", "work done by the slider load since the start"),
     "dissipated_energy": number(("time",), "J", "energy dissipated since the start"),
     "energy_residual": number(("time",), "J", "residual of the energy balance"),
-    "peak_contact_pressure": number(("joint",), "Pa", "largest pressure at the peak contact force"),
-    "contact_half_angle": number(("joint",), "rad", "half of the angle of contact at the peak contact force"),
     **outcome(),
 }
 

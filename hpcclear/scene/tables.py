@@ -9,6 +9,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, bound
+from hpcclear.base.outcome import WIDEST
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending, check_scene
@@ -234,6 +235,20 @@ class SceneTables(Table):
                 "Leave out the joints, or numerics.target_error",
                 key=key,
             )
+        return self
+
+    @model_validator(mode="after")
+    def _pressures_are_known(self) -> Self:
+        table: Any = self.effects.contact
+        geometry = None if table is None else table.declared.geometry
+        if geometry is not None and geometry.pressure is not None:
+            return self
+        for one in self._objectives():
+            if not one.asks.isdisjoint(WIDEST):
+                raise invalid(
+                    f"{one.name} needs a geometry of contact with a pressure",
+                    'Add geometry = "line" or "liner" to effects.contact', self.objective_key, one.name,
+                )  # fmt: skip
         return self
 
     @property
