@@ -94,6 +94,7 @@ SAMPLES: Columns = {
     "label": text(("sample",), "name of the design in the table that it comes from"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "wave": count(("wave",), "number of a wave around a surface, by joint: cosine and sine of each order"),
+    "band": number(("band",), "Hz", "middle of the third-octave band"),
     **outcome("sample"),
 }
 

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, Objective, bound
-from hpcclear.base.outcome import WIDEST
+from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
+from hpcclear.base.outcome import MAX_BANDS, WIDEST
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending, check_scene
@@ -251,6 +251,21 @@ class SceneTables(Table):
                 )  # fmt: skip
         return self
 
+    @model_validator(mode="after")
+    def _levels_can_be_recorded(self) -> Self:
+        bands = self.bands()
+        key = "numerics.levels" if self.numerics.levels else self.objective_key
+        if bands and not self.clearance_joints():
+            raise invalid("force levels need a joint with clearance", "Remove it", key)
+        if bands and self.numerics.target_error is not None:
+            raise invalid(
+                "force levels are those of a given number of revolutions",
+                "Remove numerics.target_error, and set averaged_revolutions", key,
+            )  # fmt: skip
+        if len(bands) > MAX_BANDS:
+            raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)
+        return self
+
     @property
     def required_study(self) -> Study:
         """The study of a scene that needs one.
@@ -296,7 +311,13 @@ class SceneTables(Table):
 
     def impacts_asked(self) -> bool:
         """Whether each sample records measures of impact and noise: ``numerics.impacts``, or what the study requires of it."""
-        return self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
+        asked = self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
+        return asked or bool(self.bands())
+
+    def bands(self) -> tuple[float, ...]:
+        """Middles of the third-octave bands whose levels each sample records, Hz: requested, or required by the study."""
+        asked = {band_of(one) for one in self.numerics.levels}
+        return tuple(sorted(asked | {one.band for one in self._objectives()} - {0.0}))
 
     def _objectives(self) -> list[Objective]:
         """The objective, and the further responses of the study."""
