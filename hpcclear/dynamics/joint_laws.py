@@ -122,14 +122,18 @@ def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
     if not has_pressure(scene):
         return {}
     law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
+    functions = {name: getattr(law.geometry, attribute) for name, attribute in WIDEST.items()}
+    by_depth = any("depth" in law.arguments(one) for one in functions.values())
     found = {name: np.full(forces.shape, np.nan) for name in WIDEST}
     for place, label in zip(scene.open_places, scene.contact_labels(), strict=True):
         given = joint_numbers(scene, get, label)
         own = numbers.sample_numbers(law, given | _given(get, "contact", scene.effects.contact))
         force = forces[:, place]
-        state = {**own, "force": force, "depth": numbers.depth_at(law, force, own)}
-        for name, attribute in WIDEST.items():
-            value = numbers.evaluate(getattr(law.geometry, attribute), state)
+        state = {**own, "force": force}
+        if by_depth:
+            state["depth"] = numbers.depth_at(law, force, own)
+        for name, function in functions.items():
+            value = numbers.evaluate(function, state)
             found[name][:, place] = np.where(force == 0.0, 0.0, value)
     return found
 
