@@ -236,7 +236,8 @@ def main():
     PICTURES.mkdir(exist_ok=True)
     for name in MACHINES:
         scene = scene_of(name)
-        save(sketch_figure(scene, poses_at_start(scene)), PICTURES / f"{name}.png")
+        turned = 0.0 if scene.template is None else 1.0
+        save(sketch_figure(scene, poses_at_start(scene, turned)), PICTURES / f"{name}.png")
         begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
         before, _, rest = page.partition(begin)
         page = f"{before}{begin}\n{tables(name)}\n{end}{rest.partition(end)[2]}"
