@@ -13,8 +13,8 @@ from some_laws import row
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.recorded.steps import Recording, Steps
 from hpcclear.dynamics.layout.views import Outcome
-from hpcclear.dynamics.response.steps import Recording, Steps
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states

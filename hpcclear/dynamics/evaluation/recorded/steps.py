@@ -76,6 +76,8 @@ class Recording:
         Perturb the start in the direction of this number (`hpcclear.dynamics.evaluation.steady.copies`); 0 does not.
     perturbations, objective
         Replicas beside it, and what they give a half-width, as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`.
+    design : Points
+        One point, by default the scene itself.
     """
 
     def __init__(
@@ -84,18 +86,21 @@ class Recording:
         copy: int = 0,
         perturbations: Sequence[int] = (),
         objective: Objective = MEAN_GAP,
+        design: Points = ITSELF,
     ) -> None:
         self.problem = problem_of(scene)
-        self._par = parameters(scene)
-        self._start = start_states(scene, self._par, walk=False)
-        self._refused = refused_of(scene)
+        self._par = parameters(scene, design)
+        alone = not design.names
+        self._start = start_states(scene, self._par, design, walk=not alone)
+        self._refused = refused_of(scene) if alone else None
+        self._values = design.values
         if copy:
             self._start = perturbed(self._start, scales(scene), range(copy, copy + 1))
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
         observed = effects_of(scene, series=True, energies=True, impacts=True)
         self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed)
         self._evaluator = Evaluator(
-            scene, ITSELF, perturbations=perturbations, objective=objective, recorder=self._lanes
+            scene, design, perturbations=perturbations, objective=objective, recorder=self._lanes
         )
         self._done: list[Records] = []
 
@@ -105,17 +110,21 @@ class Recording:
         par: Array = self._par[0]
         return par
 
+    def compile(self) -> None:
+        """Compile what it runs."""
+        self._lanes.step(0)
+
     def chunks(self) -> Iterator[Array]:
         """Integrate; yield rows of the record (m, columns), the start first. To be called once.
 
         Of a linkage that cannot turn there is the start alone.
         """
         lanes = self._lanes
-        lanes.step(0)  # compiles what observes the start
+        self.compile()  # what observes the start too
         yield self._first_row()
         if self._refused is not None:
             return
-        self._evaluator.queue(np.zeros(1, np.int64), self._par, self._start)
+        self._evaluator.queue(np.zeros(1, np.int64), self._par, self._start, self._values)
         while lanes.pending:
             while lanes.pending and not lanes.record_full:  # by steps, not by the clock
                 self._done.append(self._evaluator.advance(0.2))

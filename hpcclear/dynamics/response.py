@@ -9,8 +9,7 @@ from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.base.outcome import STEADY, Status
-from hpcclear.dynamics import layout as at
+from hpcclear.base.outcome import STEADY, WIDEST, Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import (
     alone,
@@ -18,17 +17,19 @@ from hpcclear.dynamics.evaluation.evaluator import (
     outcome_records,
     responses_reported,
 )
+from hpcclear.dynamics.evaluation.recorded.between import seen_between
+from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
+from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
+from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Recording, pieces
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.dynamics.joint_laws import widest_contact
+from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.response.impacts import Turns, measured, spectral
-from hpcclear.dynamics.response.steps import ITSELF, Piece, Recording, pieces
-from hpcclear.dynamics.setup.parameters import Numbers, parameters
+from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import PrescribedSamples
@@ -39,32 +40,6 @@ from hpcclear.scene.planar import turns_of
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
-
-
-def _between(piece: Piece, cycle: float) -> tuple[Array, Array, Array]:
-    """Coordinates and velocities (t, n) at the instants, and how far each lies in its step, from 0 to 1 (t,).
-
-    Positions by the quintic through position, velocity and acceleration at both ends of a step, which is as
-    accurate as the integrator; a free crank's angle restarts every `cycle` and is unwrapped first.
-    """
-    steps, k = piece.steps, piece.k
-    after = np.minimum(k + 1, len(steps.time) - 1)
-    q0, q1 = steps.q[k], steps.q[after]
-    if cycle:
-        q0[:, -1] += cycle * steps.revolution[k]
-        q1[:, -1] += cycle * steps.revolution[after]
-    h = (steps.time[after] - steps.time[k])[:, None]
-    h = np.where(h > 0.0, h, 1.0)  # the last of a motion that stalled
-    s = (piece.times - steps.time[k])[:, None] / h
-    d = q1 - q0
-    v0, v1 = h * steps.v[k], h * steps.v[after]
-    a0, a1 = h * h * steps.a[k], h * h * steps.a[after]
-    c3 = 10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
-    c4 = -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
-    c5 = 6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1)
-    position = q0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
-    velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
-    return position, velocity, s[:, 0]
 
 
 def _works_between(recording: Recording, piece: Piece, s: Array) -> Array:
@@ -132,9 +107,8 @@ def simulate(
     record = asked(record, objective)
     record["objective_uncertainty"] = half_width
     labels = scene.joint_labels
-    names = [
-        name for name in (*_REPORTED, *STEADY, "regime") if name in _REPORTED or steady is not None
-    ]
+    names = [*_REPORTED, *(WIDEST if has_pressure(scene) and not still else ())]
+    names += [] if steady is None else [*STEADY, "regime"]
     if steady is None and not still:  # what the sample measures as well has its bits
         names += [name for name in impacts_reported(problem_of(scene)) if name in data]
     if scene.effects.slider_load is not None:
@@ -148,11 +122,7 @@ def simulate(
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
     return dataset.response_dataset(
         times,
-        {
-            **data,
-            **reported,
-            **widest_contact(scene, Numbers(scene, None), reported["peak_contact_force"]),
-        },
+        {**data, **reported},
         provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
@@ -245,13 +215,15 @@ def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Ar
     count = scene.output.instants_per_revolution
     problem = recording.problem
     parts: list[dict[str, Array]] = []
-    taken, turns = 0, Turns()
+    taken, turns, spectra = 0, Turns(), spectra_of(scene, recording)
     for piece in pieces(recording.chunks(), count):
         series = {"time": piece.times, **_series_between(scene, recording, piece)}
         # copies: a column that is a view would keep all that was observed
         parts.append({name: one.copy() for name, one in series.items()})
         taken += len(piece.times)
         turns.take(piece.steps)
+        if spectra is not None:
+            spectra.take(piece)
         least = max(taken, count * (problem.transient + problem.averaged))
         _refuse_what_does_not_fit(least * _bytes_an_instant(parts[0]), count)
     turns.finish(piece.steps)
@@ -261,23 +233,20 @@ def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Ar
     data["energy_residual"] -= data["energy_residual"][0]
     record = recording.record()
     if Status(int(record["status"][0])).valid and problem.effects.joints:
-        data |= _measured(scene, recording, turns, data)
+        data |= _measured(scene, recording, turns)
+        data |= {} if spectra is None else spectra.measured()
+        if spectra is not None and scene.bands():
+            enter_levels(scene, recording, turns, spectra, record)
     return data.pop("time"), data, record
 
 
-def _measured(
-    scene: Scene, recording: Recording, turns: Turns, data: dict[str, Array]
-) -> dict[str, Any]:
-    """Measures of impact and noise of the averaged revolutions, and the coordinates that go with them."""
-    problem = recording.problem
-    periods, integrals = turns.averaged(problem.transient)
-    cycle = abs(problem.cycle) or at.TURN
-    joints = len(scene.joint_labels)
-    first = problem.transient + 1
+def _measured(scene: Scene, recording: Recording, turns: Turns) -> dict[str, Any]:
+    """Measures of impact and noise of the averaged revolutions, and the coordinate that goes with them."""
+    periods, integrals = turns.averaged(recording.problem.transient)
+    first = recording.problem.transient + 1
     return {
         "revolution": np.arange(float(first), first + len(periods)),
-        **measured(periods, integrals, cycle, joints, rigid=not scene.modes),
-        **spectral(data, periods, scene.output.instants_per_revolution),
+        **measured_of(scene, recording.problem, periods, integrals),
     }
 
 
@@ -300,26 +269,7 @@ def _refuse_what_does_not_fit(size: float, count: int) -> None:
 
 def _series_between(scene: Scene, recording: Recording, piece: Piece) -> dict[str, Array]:
     """Every time series at the instants of a piece."""
-    problem, par, times = recording.problem, recording.par, piece.times
-    turning = bool(at.rules_of(problem.effects).turning)  # the crank angle is the last coordinate
-    cycle = problem.cycle if turning else 0.0
-    q, v, s = _between(piece, cycle)
-    steps, k = piece.steps, piece.k
-    revolution, contacts = steps.revolution[k], steps.contacts[k]
-    began = (steps.time - steps.turn_time)[k]
-    turn_time = times - began
-    in_turn = _in_turn(q, revolution, cycle)
-    rates = recording.observe(np.hstack([in_turn, v]), contacts, turn_time, began)[1]
-    works = _works_between(recording, piece, s)
-    q, v, in_turn = (one[:, scene.bristles :] for one in (q, v, in_turn))
-    return planar_series(
-        scene, par, Seen(in_turn, v, turn_time, revolution, contacts, rates, works)
-    )
-
-
-def _in_turn(q: Array, revolution: Array, cycle: float) -> Array:
-    """Coordinates with the crank angle, if it is one, counted from the start of its revolution, as the kernel does."""
-    if cycle:
-        q = q.copy()
-        q[:, -1] -= cycle * revolution
-    return q
+    seen = seen_between(recording, piece)
+    works = _works_between(recording, piece, seen.share)
+    q, v = (one[:, scene.bristles :] for one in seen[:2])
+    return planar_series(scene, recording.par, Seen(q, v, *seen[2:6], works))
