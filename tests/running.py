@@ -60,7 +60,7 @@ def integrate(scene: Scene):
     """All steps of a response, its outcome record (1,) and parameters, SI."""
     recording = Recording(scene)
     steps = Steps.of(np.concatenate(list(recording.chunks())))
-    return steps, recording.record(), recording.par
+    return steps, recording.record(), recording.samples[0].par
 
 
 def kept_steps(problem, par, start, rows: int, budget: int) -> list[np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recording
+from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded
 from hpcclear.dynamics.layout.views import Rates
 
 
@@ -23,9 +23,9 @@ class Between(NamedTuple):
     share: Array
 
 
-def seen_between(recording: Recording, piece: Piece) -> Between:
+def seen_between(sample: Recorded, piece: Piece) -> Between:
     """What the motion is at the instants of a piece."""
-    problem, times = recording.problem, piece.times
+    problem, times = sample.problem, piece.times
     turning = bool(at.rules_of(problem.effects).turning)  # the crank angle is the last coordinate
     cycle = problem.cycle if turning else 0.0
     q, v, share = _state(piece, cycle)
@@ -34,7 +34,7 @@ def seen_between(recording: Recording, piece: Piece) -> Between:
     began = (steps.time - steps.turn_time)[k]
     turn_time = times - began
     q = _in_turn(q, revolution, cycle)
-    rates = recording.observe(np.hstack([q, v]), contacts, turn_time, began)[1]
+    rates = sample.observe(np.hstack([q, v]), contacts, turn_time, began)[1]
     return Between(q, v, turn_time, revolution, contacts, rates, share)
 
 

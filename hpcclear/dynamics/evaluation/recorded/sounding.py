@@ -13,7 +13,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.spectral import LEAST, Spectra
-from hpcclear.dynamics.evaluation.recorded.steps import Recording, pieces
+from hpcclear.dynamics.evaluation.recorded.steps import Recorded, Recording, pieces
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
@@ -79,8 +79,11 @@ class SoundingEvaluator:
     def _sample(self, index: int, values: Array) -> Iterator[Records | None]:
         """One sample, piece by piece; its record (1,) at last."""
         design = Points(self._columns.names, values[None], self._columns.paths)
-        recording = Recording(self.scene, 0, self._perturbations, self.scene.objective, design)
-        turns, heard = Turns(), Spectra(self.scene, recording, self._count)
+        recording = Recording(
+            self.scene, 0, self._perturbations, self.scene.objective, design=design
+        )
+        sample = recording.samples[0]
+        turns, heard = Turns(), Spectra(self.scene, sample, self._count)
         for piece in pieces(recording.chunks(), 1):
             turns.take(piece.steps)
             heard.take(piece)
@@ -89,17 +92,17 @@ class SoundingEvaluator:
         record = recording.record()
         record["sample"] = index
         if Status(int(record["status"][0])).valid:
-            enter_levels(self.scene, recording, turns, heard, record)
+            enter_levels(self.scene, sample, turns, heard, record)
         yield record
 
 
 def enter_levels(
-    scene: Scene, recording: Recording, turns: Turns, heard: Spectra, record: Records
+    scene: Scene, sample: Recorded, turns: Turns, heard: Spectra, record: Records
 ) -> None:
     """Enter levels in the scene's bands, and half-widths, into a record (1,) of a recorded sample that ended well."""
     bands = np.array(scene.bands())
-    periods, integrals = turns.averaged(recording.problem.transient)
-    known = measured_of(scene, recording.problem, periods, integrals)
+    periods, integrals = turns.averaged(sample.problem.transient)
+    known = measured_of(scene, sample.problem, periods, integrals)
     known |= heard.levels(bands) | {"band": bands}
     for name in LEVELS:
         if name in known:
@@ -132,10 +135,10 @@ def instants_of(scene: Scene) -> int:
     return max(needed, scene.output.instants_per_revolution, LEAST)
 
 
-def spectra_of(scene: Scene, recording: Recording) -> Spectra | None:
+def spectra_of(scene: Scene, sample: Recorded) -> Spectra | None:
     """Those of a response, None where it stores too few instants, or has no contacts."""
     count = scene.output.instants_per_revolution
     if scene.bands():
         count = instants_of(scene)
-    there = count >= FEWEST_INSTANTS and recording.problem.effects.joints
-    return Spectra(scene, recording, count) if there else None
+    there = count >= FEWEST_INSTANTS and sample.problem.effects.joints
+    return Spectra(scene, sample, count) if there else None

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.evaluation.recorded.between import seen_between
-from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recording
+from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded
 from hpcclear.scene import Scene
 from hpcclear.statistics import spectra
 
@@ -21,13 +21,13 @@ class Spectra:
     Parameters
     ----------
     scene : Scene
-    recording : Recording
+    sample : Recorded
     count : int
         Instants a revolution by which the highest order is chosen (`hpcclear.statistics.spectra.highest`).
     """
 
-    def __init__(self, scene: Scene, recording: Recording, count: int) -> None:
-        self._recording, self._count = recording, count
+    def __init__(self, scene: Scene, sample: Recorded, count: int) -> None:
+        self._sample, self._count = sample, count
         self._joints, self._rigid = len(scene.joint_labels), not scene.modes
         self._dense = spectra.OVERSAMPLING * max(count, LEAST)
         self._last: deque[Array] = deque(maxlen=spectra.WINDOW)
@@ -40,7 +40,7 @@ class Spectra:
         closing = np.flatnonzero(np.diff(steps.revolution) > 0)
         ends = np.unique([0, *closing, len(steps.time) - 1])
         for first, last in itertools.pairwise(ends):
-            if steps.revolution[last] >= self._recording.problem.transient:
+            if steps.revolution[last] >= self._sample.problem.transient:
                 self._add(piece, steps.time[first], steps.time[last])
 
     def _add(self, piece: Piece, start: float, end: float) -> None:
@@ -48,7 +48,7 @@ class Spectra:
         steps = piece.steps
         times = np.linspace(start, end, self._dense, endpoint=False)
         k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, len(steps.time) - 2)
-        rates = seen_between(self._recording, Piece(times, steps, k)).rates
+        rates = seen_between(self._sample, Piece(times, steps, k)).rates
         frame = [rates.frame_x[:, None], rates.frame_y[:, None]] if self._rigid else []
         self._last.append(np.hstack([rates.force[:, : self._joints], *frame]))
         self._periods.append(end - start)
