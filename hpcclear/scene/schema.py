@@ -155,7 +155,7 @@ def scene_schema() -> dict[str, Any]:
     entries = definitions["RandomInput"]["properties"]
     names = {"anyOf": [{"enum": list(OURS)}, {"type": "string"}]}
     entries["distribution"] = {**names, "description": entries["distribution"]["description"]}
-    for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
+    for key, words in (("file", "instead of values: a CSV table beside the scene file"),
                        ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip
         entries[key] = {"type": "string", "description": words}
     for name in ("Goal", "Constraint"):
