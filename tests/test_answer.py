@@ -277,7 +277,7 @@ def test_designs_of_nearly_the_same_merit_are_listed_and_the_lightest_of_them():
     near["m2"][1], near["m2"][3] = 0.24, 0.1
     lines = told(near)
     assert lines["equivalent"].startswith("none")
-    assert lines["near"].startswith("robust front 1: merit within 1% of the recommended design")
+    assert lines["near"].startswith("robust front 1: criterion within 1% of the recommended design")
     assert "they differ in m2 from 0.1 kg to 0.24 kg" in lines["near"]
     assert lines["near"].endswith("lightest: robust front 1, 0.14 kg less")
     assert "near" not in told(verified(MEAN, DEVIATION, 1e-8))

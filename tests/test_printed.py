@@ -152,7 +152,7 @@ def test_captions_and_the_answer_name_surrogates_that_do_not_fit():
     assert sum("worse than a constant" in text for text in drawn) == 2
     assert sum("R² = 0.69" in text for text in drawn) == 2
     told = " ".join(lines_of(**files)["warning"])
-    assert "response surface in m2, m3: R² = -0.31: worse than a constant" in told
+    assert "response surface in m2, m3: R² = -0.31, worse than a constant" in told
     assert "Kriging model in m2, m3, C: R² = 0.69" in told
 
 

@@ -283,7 +283,9 @@ def counted(ranks: int) -> str:
 
 def _all(count: int, each: float) -> str:
     """Number of samples and their time on one core; `each`: s."""
-    return f"{count} samples, {duration(count * each)} of one core"
+    seconds = count * each
+    shown = "less than 1 s" if seconds < 1.0 else duration(seconds)
+    return f"{count} samples, {shown} of one core"
 
 
 def _load(found: "Finished") -> list[tuple[str, str]]:
@@ -328,9 +330,10 @@ def describe_study(place: Path) -> None:
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
+    level = float(found["verification"].attrs.get("confidence", 0.95))
     for case, designs, rows in beside_original(found["verification"]):
         beside = Table(
-            title=f"Case {case}: simulated designs against the baseline",
+            title=f"Case {case}: simulated designs against the baseline (± {level:.0%} half-width)",
             title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
         )  # fmt: skip
         beside.add_column(
@@ -366,7 +369,7 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
     if len(good):
         words, unit = objective_of(samples)
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
-        rows += [("f", words), ("", f"{low} to {high}, median {middle}")]
+        rows += [("f", words), ("range of f", f"{low} to {high}, median {middle}")]
         rows.append(("half-width of f", _half_widths(samples)))
         in_time = samples["objective_spread"].to_numpy()[status == Status.OK] / good
     if len(good) and np.isfinite(in_time).any():

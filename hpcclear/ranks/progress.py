@@ -153,7 +153,7 @@ class LivesProgress(Progress):
     def text(self) -> str:
         """Lives that are over, part of the simulations done, their number and failures."""
         failed = f", {self._failed} failed" if self._failed else ""
-        share = f"{self._over}/{self._lives} lives over ({100.0 * self._behind:.0f} %)"
+        share = f"{self._over}/{self._lives} service lives finished ({100.0 * self._behind:.0f} %)"
         return f"{share}, {self._done} simulations{failed}"
 
     def _eta(self) -> str:

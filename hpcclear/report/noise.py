@@ -9,7 +9,7 @@ from hpcclear.report.figures import labels
 HEADER = ("joint", "impacts", "energy lost", "in flight", "RMS force")
 """Columns of the rows of `joints`."""
 
-TITLE = "Impacts, mean of a revolution"
+TITLE = "Impacts, mean per revolution"
 
 LOUDEST = 3
 """Third-octave bands that are named, the loudest first."""
@@ -50,7 +50,7 @@ def frame(response: xr.Dataset) -> list[tuple[str, str]]:
             for one, band in zip(level[order], bands, strict=True)
             if np.isfinite(one)
         )
-        found.append(("loudest third octaves", f"{words} (re 1 µN)"))
+        found.append(("third-octave levels", f"highest {words} (re 1 µN)"))
     return found
 
 

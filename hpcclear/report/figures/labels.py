@@ -74,13 +74,20 @@ def scale(units: str, values: ArrayLike) -> Scale:
     return Scale(10.0 ** (-exponent * power), pretty(_PREFIXES[exponent] + units))
 
 
+PLAIN = 1e6
+"""Numbers below it are printed without an exponent."""
+
+
 def quantity(value: float, units: str, digits: int = 4) -> str:
     """A number with its unit in a readable size, a dash where there is none."""
     if not np.isfinite(value):
         return "–"
     chosen = scale(units, value)
     unit = "" if chosen.unit == "–" else f" {chosen.unit}"
-    return f"{value * chosen.factor:.{digits}g}{unit}"
+    shown = f"{value * chosen.factor:.{digits}g}"
+    if "e+" in shown and abs(float(shown)) < PLAIN:
+        shown = f"{float(shown):.0f}"
+    return f"{shown}{unit}"
 
 
 def value(one: xr.DataArray) -> str:
