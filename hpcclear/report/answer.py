@@ -128,13 +128,18 @@ _NONE = {
 """What stands in place of a recommendation where no design significantly satisfies the constraints, by the best verdict."""
 
 
+ENDS_IN_WORDS = {"alpha": "lowest mean of f", "beta": "lowest standard deviation of f"}
+"""What the ends of a front are, of a case without objectives of its own."""
+
+
 def _named(best: xr.Dataset) -> str:
     name = str(best["design"].item())
     if (verdict := standing(str(best.get("constraints", xr.DataArray("")).item()))) in _NONE:
         return f"{_NONE[verdict]}; nearest: {name}"
     if name.rpartition(" ")[2] == "original":
         return f"keep the baseline design ({name}): no simulated design is better"
-    return name
+    role = ENDS_IN_WORDS.get(name.rpartition(" ")[2], "") if is_plain(best) else ""
+    return f"{name}: {role}" if role else name
 
 
 def _case(best: xr.Dataset) -> str:

@@ -111,17 +111,21 @@ def with_half_width(value: float, half_width: float, units: str) -> str:
     if not np.isfinite(half_width):
         return f"{quantity(value, units)}, {NOT_CHECKED}"
     chosen = scale(units, value)
-    shown, width = value * chosen.factor, half_width * chosen.factor
     unit = "" if chosen.unit == "–" else f" {chosen.unit}"
+    return f"{paired(value * chosen.factor, half_width * chosen.factor)}{unit}"
+
+
+def paired(value: float, half_width: float) -> str:
+    """Two finite numbers as "20.9 ± 1.2": no more digits than two of the half-width, which is rounded up."""
 
     def places(number: float, digits: int) -> int:
         return digits - 1 - int(np.floor(np.log10(number))) if number > 0.0 else digits
 
-    least = places(abs(shown), _MOST_DIGITS)
-    decimals = max(min(places(width, 2), least) if width > 0.0 else least, 0)
+    least = places(abs(value), _MOST_DIGITS)
+    decimals = max(min(places(half_width, 2), least) if half_width > 0.0 else least, 0)
     step = 10.0**-decimals
-    rounded = abs(np.ceil(width / step - 1e-9)) * step  # up: it is no narrower than it is
-    return f"{shown:.{decimals}f} ± {rounded:.{decimals}f}{unit}"
+    rounded = abs(np.ceil(half_width / step - 1e-9)) * step  # up: it is no narrower than it is
+    return f"{value:.{decimals}f} ± {rounded:.{decimals}f}"
 
 
 def between(low: float, high: float, units: str) -> str:
