@@ -9,7 +9,7 @@ A version is a commit or a directory with its source. All run in this environmen
 Without `--regular` the quickstart and two responses run on two ranks, and files must have the same bytes. A line per file
 says "same" or how large the largest relative difference of a variable is. timing.nc may differ and is left out.
 
-With `--regular` a response, samples, a map, a bifurcation, service lives and effect screening of a motion that repeats itself
+With `--regular` a response, samples, a map, service lives and effect screening of a motion that repeats itself
 run at rtol 1e-9, and variables must agree within `TOLERANCE`. Former names of variables must still be readable.
 Exit code 1 if anything else differs.
 """
@@ -36,10 +36,6 @@ REGULAR = {
     "response.nc": ("simulate", "hunt_crossley.toml", *ACCURATE),
     "samples.nc": ("sample", "hunt_crossley.toml", "--points", "designs.csv", *ACCURATE),
     "map.nc": ("map", "hunt_crossley.toml", "--x", "C=0.2mm:0.4mm:3"),
-    "bifurcation.nc": (
-        "bifurcation", "hunt_crossley.toml", "--x", "C=0.2mm:0.4mm:3", "--revolutions", "4", "--observe",
-        "max contact_force crank_rod", *ACCURATE,
-    ),
     "wear.nc": ("wear", "wear.toml", "--set", "wear.lives=2", "--set", "wear.cycles=1e5", *ACCURATE),
     "effects.nc": ("effects", "hunt_crossley.toml", "--samples", "64", "--set", "effects.gravity=9.81", *ACCURATE),
 }  # fmt: skip
