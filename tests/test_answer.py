@@ -200,7 +200,7 @@ def test_the_least_deviation_is_told_as_far_as_limits_tell(tmp_path, least, word
     dataset.write(verified(MEAN, [*DEVIATION[:3], least, 1e-5]), tmp_path / "verification.nc")
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert (
-        "lowest standard deviation of f of all simulated designs, or is statistically indistinguishable from it"
+        "lowest standard deviation of f of all simulated designs (or is statistically indistinguishable from the lowest)"
         in page
     ) is words
     assert "lowest mean of f of all simulated designs: " in page

@@ -229,12 +229,13 @@ def files() -> Iterator[str]:
         yield from (
             f"## {kind}",
             "",
-            "| name | dimensions | unit | what |",
+            "| name | dimensions | unit | meaning |",
             "| --- | --- | --- | --- |",
         )
         for name, row in {**table.coords, **table.data}.items():
             unit = _cell(row.unit("that of the objective"))
-            yield f"| `{name}` | {', '.join(row.dims)} | {unit} | {_cell(row.long_name)} |"
+            dims = ", ".join(f"`{one}`" for one in row.dims)
+            yield f"| `{name}` | {dims} | {unit} | {_cell(row.long_name)} |"
         yield ""
 
 

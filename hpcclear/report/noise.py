@@ -50,7 +50,7 @@ def frame(response: xr.Dataset) -> list[tuple[str, str]]:
             for one, band in zip(level[order], bands, strict=True)
             if np.isfinite(one)
         )
-        found.append(("third-octave levels", f"highest {words} (re 1 µN)"))
+        found.append(("highest third octaves", f"{words} (re 1 µN)"))
     return found
 
 

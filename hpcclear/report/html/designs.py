@@ -137,7 +137,7 @@ def _within_intervals(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: 
     case = str(one["case"].item()) if "case" in one else ""
     rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
     less = any(float(rival[f"{what}_true"]) < float(one[f"{what}_true"]) for rival in rivals)
-    return ", or is statistically indistinguishable from it" if less else ""
+    return " (or is statistically indistinguishable from the lowest)" if less else ""
 
 
 def _table(
