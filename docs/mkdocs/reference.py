@@ -51,7 +51,7 @@ def scene_entries() -> Iterator[str]:
         yield from ("| entry | value | default | meaning |", "| --- | --- | --- | --- |")
         for entry, field in part["properties"].items():
             required = entry in part.get("required", ())
-            default = "needed" if required else _default(field)
+            default = "required" if required else _default(field)
             meaning = _cell(field.get("description") or _first_meaning(field, parts))
             yield f"| `{entry}` | {_value(field, names)} | {default} | {meaning} |"
         yield ""

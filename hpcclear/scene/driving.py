@@ -83,13 +83,13 @@ class PlanarHarmonic(Table):
     body: str
     """Body that oscillates."""
     amplitude: Angle
-    """rad."""
+    """Amplitude, rad."""
     frequency: Annotated[float, Quantity("Hz", above=0)]
     """Oscillations per second, Hz. For an angular speed such as "1200 rpm": turns per second."""
     mean: Angle = 0.0
-    """rad."""
+    """Mean angle, rad."""
     phase: Angle = 0.0
-    """rad."""
+    """Phase at time 0, rad."""
     period: bool = False
     """Whether one oscillation of this drive defines the revolution. Default: true for the first drive if no drive has
     this entry."""
@@ -121,7 +121,7 @@ class PlanarTorque(Table):
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """Torque, N m; constant, or a table against the angle of the body that defines the period."""
     torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
-    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
+    """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
     between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque is 0, rad/s. The torque decreases linearly with the speed, as that of a motor. Without
@@ -155,9 +155,9 @@ class Components(PairTable):
     """A force by its components along the ground's axes, N. ``[x, y]`` is a short form."""
 
     x: Annotated[float, Quantity("N")]
-    """N."""
+    """x component, N."""
     y: Annotated[float, Quantity("N")]
-    """N."""
+    """y component, N."""
 
 
 class ForceLoad(Table):

@@ -115,7 +115,7 @@ class TorqueDrive(Table):
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """N m, constant or ``[[crank angle, torque], ...]`` over the turns of a revolution."""
     torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
-    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
+    """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
     between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque is 0, rad/s. The torque decreases linearly with the speed, as that of a motor. Without
@@ -240,8 +240,8 @@ class Joints(Table):
     """The joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
-    """O12."""
+    """Joint of crank and rod (O12 in the paper)."""
     rod_slider: Joint
-    """O23."""
+    """Joint of rod and slider (O23 in the paper)."""
     guide: SliderGuide | None = None
     """Clearance of the slider's guide. Without it the guide is ideal."""

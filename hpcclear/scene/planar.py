@@ -105,7 +105,7 @@ class Ground(Table):
     """The ground, which does not move."""
 
     points: NamedPlaces = (NamedPlace(name="o", x=0.0, y=0.0),)
-    """m."""
+    """Named points of the ground, m."""
 
 
 class PlanarRevolute(Table):

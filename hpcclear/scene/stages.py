@@ -224,7 +224,7 @@ class Verification(Table):
     tolerance: Share = 0.02
     """Relative surrogate error of the mean of alpha and beta above which a warning is printed."""
     deviation_tolerance: Share = 0.05
-    """The same for the standard deviation."""
+    """Relative surrogate error of the standard deviation of alpha and beta above which a warning is printed."""
     infill_rounds: Annotated[int, Count(0, 100)] = 8
     """Largest number of rounds of adaptive refinement: further designs are simulated where they may change the front.
     0: only designs of the search are verified."""

@@ -106,9 +106,10 @@ class Lives(Table):
     points: Annotated[int, Count(2, 10**4)] = 41
     """Number of ages at which curves are stored."""
     limit: Limits = Limits()
-    """Values that end a service life."""
+    """Thresholds that end a service life."""
     beyond_limit: bool = False
-    """Whether service lives continue beyond their limit, to `cycles` or to a clearance of a quarter of the bearing radius."""
+    """Whether service lives continue beyond the thresholds in `limit`, to `cycles` or to a clearance of a quarter of
+    the bearing radius."""
 
     @property
     def waves(self) -> int:
