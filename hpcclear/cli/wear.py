@@ -140,7 +140,7 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
             if np.isfinite(even).all()
             else ""
         )
-        rows.append((f"largest around {name}", f"{largest} at the end{beside} (medians)"))
+        rows.append((f"largest clearance, {name}", f"{largest} at the end{beside} (medians)"))
     if any(name.startswith("limit_") for name in content.attrs):
         cycles, parts = float(content["cycle"][-1]), []
         for name in ("lifetime_quantile", "even_lifetime_quantile"):

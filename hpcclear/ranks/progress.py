@@ -111,7 +111,11 @@ class Progress:
 
     def _eta(self) -> str:
         rate = self._rate()
-        return f"{duration((self._total - self._done) / rate)} left" if rate > 0.0 else "? left"
+        return (
+            f"{duration((self._total - self._done) / rate)} left"
+            if rate > 0.0
+            else "time left not known"
+        )
 
     def _write(self, text: str) -> None:
         assert self._stream is not None
@@ -159,7 +163,7 @@ class LivesProgress(Progress):
     def _eta(self) -> str:
         gone = self._clock() - self._began
         left = gone * (1.0 - self._behind) / self._behind if self._behind > 0.0 else 0.0
-        return f"about {duration(left)} left" if left > 0.0 else "? left"
+        return f"about {duration(left)} left" if left > 0.0 else "time left not known"
 
     def _draw(self) -> None:
         self._bar.update(
