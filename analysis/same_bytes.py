@@ -27,8 +27,9 @@ import xarray as xr
 ROOT = Path(__file__).resolve().parent.parent
 RESPONSES = ("slider_crank", "hunt_crossley")
 
-TOLERANCE = 1e-6
-"""Largest difference of two values of a regular motion, relative to the largest value of the variable."""
+TOLERANCE = 1e-5
+"""Largest difference of two values of a regular motion at rtol 1e-9, relative to the largest value of the variable. Series are
+interpolated between the ends of steps."""
 
 ACCURATE = ("--set", "numerics.rtol=1e-9", "--set", "numerics.method=tsitouras")
 DESIGNS = "m2 [kg], C [mm]\n0.21, 0.2\n0.21, 0.3\n0.15, 0.3\n0.3, 0.4\n"
@@ -42,9 +43,9 @@ REGULAR = {
 """Commands of the regular motions, by the file that they write."""
 
 INTENDED = {
-    "rhs_evaluations": "steps end at fewer places",
-    "evaluations": "the same",
-    "work": "an evaluation of an implicit step counts 2.5 times",
+    "rhs_evaluations": "a cost, not a result",
+    "evaluations": "a cost, not a result",
+    "work": "a cost, not a result",
     "energy_residual": "an error, not a result",
     "constraint_violation": "an error, not a result",
     "objective_uncertainty": "nine replicas instead of three",
@@ -54,6 +55,9 @@ INTENDED = {
     "kick_growth": "an estimate with a half-width of its own",
     "kick_growth_limit": "a half-width",
     "objective_limit": "a half-width",
+    "clearance_limit": "a half-width",
+    "clearance_error": "an error, not a result",
+    "effect": "play is called clearance",
 }
 """Variables that may differ by more than the tolerance, with the reason."""
 
@@ -126,6 +130,7 @@ def values(one: Path, other: Path) -> bool:
     """Print how the variables of two files differ, a row of a table each; whether all agree that should."""
     good = True
     with xr.open_dataset(one) as a, xr.open_dataset(other) as b:
+        a, b = damped(a), damped(b)
         for name in map(str, a.variables):
             if name not in b.variables:
                 good, text = False, "**missing**"
@@ -152,6 +157,14 @@ def values(one: Path, other: Path) -> bool:
             f"| {one.name} | {len(a.variables)} variables, {len(added)} new ones | {', '.join(added) or '-'} |"
         )
     return good
+
+
+def damped(found: xr.Dataset) -> xr.Dataset:
+    """A file without the variants of effect screening that have no contact damping: their motion is chaotic."""
+    if "off" not in found:
+        return found
+    undamped = found["off"].isel(effect=found["effect"] == "contact damping").any("effect")
+    return found.isel(variant=~undamped)
 
 
 def apart(a: np.ndarray, b: np.ndarray) -> str:

@@ -18,8 +18,8 @@ STATIONS = {
     "scene/mechanism.py": "check_journal",
     "scene/points.py": "check_points",
     "dynamics/joint_laws.py": "fill",
-    "dynamics/lanes.py": "step",
-    "dynamics/evaluator.py": "outcome_records",
+    "dynamics/stepping/lanes.py": "step",
+    "dynamics/evaluation/evaluator.py": "outcome_records",
     "results/netcdf.py": "save",
 }
 """Calls by their files: a clearance becomes a gap, a gap a record, a record a row of a file."""

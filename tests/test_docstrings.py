@@ -20,7 +20,7 @@ SHAPE = re.compile(
 )
 PHYSICAL = (
     "ensemble/api",
-    "dynamics/response",
+    "dynamics/response/__init__",
     "scene/points",
     "scene/table",
     "accuracy/equations",

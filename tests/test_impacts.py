@@ -15,7 +15,7 @@ from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import IMPACTS
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.problem import effects_of, problem_of
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.statistics import spectra
 
 LOOSE = {"law": "hunt-crossley", "damping": 0.05}

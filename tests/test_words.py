@@ -150,7 +150,7 @@ NUMBER = re.compile(r"[+-]?\d[\d ., ]*(e[+-]?\d+)?( (to|and) [+-]?[\d.]+(e[+-]?\
 
 UNITS = re.compile(
     r"\((m|s|ms|h|N|mm|kg|Pa|deg|dB)\b|, s;|seconds|dimensionless|\bunit\b|relative|ratio|divided by|times|"
-    r"count|number|errors?\b|share|exit code|efficiency|speed-up|impacts|intervals|instructions|version|Python|factor",
+    r"count|lines|number|errors?\b|share|exit code|efficiency|speed-up|impacts|intervals|instructions|version|Python|factor",
     re.I,
 )
 """What states the unit of a column of numbers, or that they have none."""

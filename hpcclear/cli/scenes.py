@@ -132,7 +132,7 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """
 
     def program(ranks: "Ranks") -> int:
-        from hpcclear.cli.printing import describe_scene
+        from hpcclear.cli.check import describe_scene
 
         scene = written.scene(warn=False)
         turns = describe_scene(scene, cost, ranks)
@@ -174,8 +174,8 @@ def simulate(written: Written, output: Path) -> int:
     lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
+    from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.dynamics.steady.wording import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset

@@ -16,8 +16,8 @@ from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks, Task
 
 if TYPE_CHECKING:
-    from hpcclear.dynamics.evaluator import Evaluator
-    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
+    from hpcclear.dynamics.evaluation.evaluator import Evaluator
+    from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
     from hpcclear.ranks.schedule import Worker
     from hpcclear.results.checkpoint import Checkpoint
     from hpcclear.scene import Scene
@@ -40,7 +40,7 @@ def content_of(scene: "Scene") -> dict[str, Any]:
 
 def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
     """What a rank needs to know before it gets points: plain content, small, the same everywhere."""
-    from hpcclear.dynamics.evaluator import DEFAULT_LANES
+    from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 
     return {
         "scene": content_of(scene),

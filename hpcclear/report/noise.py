@@ -71,6 +71,6 @@ def _with(value: float, reach: float, unit: str) -> str:
     """A mean with its half-width; three digits where there are too few revolutions for one."""
     if not np.isfinite(reach):
         return labels.quantity(value, unit, 3)
-    if reach <= 1e-4 * abs(value):
+    if reach <= 1e-3 * abs(value):
         return labels.quantity(value, unit, 4)
     return labels.with_half_width(value, reach, unit)

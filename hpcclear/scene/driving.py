@@ -14,7 +14,7 @@ from hpcclear.scene.fields import (
     check_one_of,
     invalid,
 )
-from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad
+from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad, by_time
 from hpcclear.scene.places import Angle, PairTable
 
 Turns = Annotated[int, Count(least=1, most=64)]
@@ -49,6 +49,24 @@ def check_torque(drive: Any) -> None:
             "torque_by_speed says already how the torque falls", "Remove it",
             key="no_load_speed", value=drive.no_load_speed,
         )  # fmt: skip
+
+
+def check_by(load: Any, entry: str) -> None:
+    """Refuse a load whose table goes by two things, or has no table to go by them; raises PydanticCustomError."""
+    timed = getattr(load, f"{entry}_by_time")
+    if timed is not None and getattr(load, entry) is not None:
+        raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
+    if load.angle_of is not None and not isinstance(getattr(load, entry), tuple):
+        reason = f"there is no table of {entry} against an angle"
+        raise invalid(reason, "Remove it", key="angle_of", value=load.angle_of)
+    if load.repeats and timed is None:
+        raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
+    if load.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
+        raise invalid(
+            "a table that repeats begins at 0 s, and ends at the value with which it begins",
+            "Make its first and last value equal",
+            key=f"{entry}_by_time",
+        )
 
 
 def speed_entry(drive: Any) -> str:
@@ -146,8 +164,39 @@ class PlanarTorque(Table):
         return self
 
 
+class PlanarRunUp(Table):
+    """A body turns at a prescribed speed that depends on time, such as a run-up, independent of the torque that this
+    requires."""
+
+    name: str
+    kind: Literal["run-up"]
+    body: str
+    """Body that rotates."""
+    speed_by_time: Annotated[Any, by_time("rad/s")]
+    """``[[time, speed], ...]``, s and rad/s, from 0 s on. Speeds are not negative, and the last one is positive. Values
+    in between follow a monotone cubic with zero slope at both ends; after the last row the speed is constant."""
+    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
+    """Moment of inertia of a flywheel on the body, kg m2."""
+    period: bool = False
+    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
+    turns: Turns = 1
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    @model_validator(mode="after")
+    def _forward(self) -> "PlanarRunUp":
+        speeds = [speed for _, speed in self.speed_by_time]
+        if min(speeds) < 0.0 or min(speeds[1:]) == 0.0:
+            raise invalid(
+                "the speed falls to 0 or below, where no revolution would end",
+                "Give speeds above 0 from the second row on",
+                key="speed_by_time",
+            )
+        return self
+
+
 PlanarDrive = Annotated[
-    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque, Field(discriminator="kind")
+    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp,
+    Field(discriminator="kind"),
 ]
 
 
@@ -171,6 +220,12 @@ class ForceLoad(Table):
     size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
     """Force along `direction`, N; constant, or a table against the angle of the body that defines the period. The angle
     is measured counter-clockwise from the x axis and includes `start_angle`, for both directions of rotation."""
+    size_by_time: Annotated[Any, by_time("N")] | None = None
+    """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether the table over time repeats after its last row."""
+    angle_of: str | None = None
+    """Another body against whose angle the table of `size` is read; it repeats with each turn of that body."""
     direction: Angle = 0.0
     """Angle of the force from the ground's x axis, rad."""
     follows: Annotated[bool, Field(strict=True)] = False
@@ -179,7 +234,9 @@ class ForceLoad(Table):
     @model_validator(mode="after")
     def _one_of_both(self) -> "ForceLoad":
         force = None if self.force is None else [self.force.x, self.force.y]
-        check_one_of("force", force, self.size, "Write force = [x, y], or size and direction")
+        size = self.size if self.size is not None else self.size_by_time
+        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
+        check_by(self, "size")
         return self
 
 
@@ -190,8 +247,22 @@ class TorqueLoad(Table):
     kind: Literal["torque"]
     body: str
     """Body on which the torque acts; the reaction acts on the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """Torque, N m; constant, or a table against the angle of the body that defines the period."""
+    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
+    """Instead of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on; smooth between the rows, constant after the
+    last."""
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether the table over time repeats after its last row."""
+    angle_of: str | None = None
+    """Another body against whose angle the table of `torque` is read; it repeats with each turn of that body."""
+
+    @model_validator(mode="after")
+    def _by_one(self) -> "TorqueLoad":
+        check_by(self, "torque")
+        remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
+        check_one_of("torque", self.torque, self.torque_by_time, remedy)
+        return self
 
 
 class SpringLoad(Table):

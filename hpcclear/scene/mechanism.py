@@ -24,6 +24,7 @@ from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.loads import Law
 from hpcclear.scene.materials import Material
 from hpcclear.scene.roundness import OutOfRound, check_waves
+from hpcclear.scene.rubbing import RubbingPin
 from hpcclear.scene.wear import Wear
 
 
@@ -217,6 +218,8 @@ class IdealJoint(Table):
     """A pin without clearance."""
 
     kind: Literal["ideal"]
+    friction: RubbingPin | None = None
+    """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
     @model_validator(mode="before")
     @classmethod
@@ -243,5 +246,7 @@ class Joints(Table):
     """Joint of crank and rod (O12 in the paper)."""
     rod_slider: Joint
     """Joint of rod and slider (O23 in the paper)."""
+    crank_frame: IdealJoint | None = None
+    """Joint of crank and frame (O14 in the paper). Required if it has friction."""
     guide: SliderGuide | None = None
     """Clearance of the slider's guide. Without it the guide is ideal."""

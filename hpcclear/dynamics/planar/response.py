@@ -9,13 +9,13 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import stored_energy
+from hpcclear.dynamics.layout.views import Parameters, Rates
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, as_complex, split
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 

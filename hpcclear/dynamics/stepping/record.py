@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.settings import RECORDED
+from hpcclear.dynamics.layout.settings import RECORDED
 
 # one row: time since the start of the run and of the revolution, contact state, works, measures, then q, v, a
 (TIME, TURN_TIME, REVOLUTION, CONTACTS) = range(4)
