@@ -113,5 +113,9 @@ def share(name: str, value: float, half_width: float) -> str:
     """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
     if value > half_width:
         places = 0 if half_width >= COARSE else 1
-        return f"{name} {value:.{places}%} ± {half_width:.{places}%}"
+        step = 10.0 ** -(places + 2)
+        shown = (
+            max(np.ceil(half_width / step - 1e-9), 1.0) * step
+        )  # up: it is no narrower than it is
+        return f"{name} {value:.{places}%} ± {shown:.{places}%}"
     return f"{name} below {max(half_width, value):.1%}"
