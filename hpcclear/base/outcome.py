@@ -196,11 +196,11 @@ FIELDS = {
         "Pa", "largest pressure at the peak contact force", per="joint", when="request"),
     "contact_half_angle": Field(
         "rad", "half of the angle of contact at the peak contact force", per="joint", when="request"),
-    "rate_of_objective": Field("rate", "what is made of the objective's own rate", per="joint", when="request"),
+    "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="request"),
     "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
     "sliding_waves": Field(
         "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="request"),
-    "energy_error": Field("1", "residual of the energy balance, relative", when="request"),
+    "energy_error": Field("1", "energy residual over the larger of kinetic energy and driving work", when="request"),
     "objective_limit": Field(
         "objective", "half-width of the 95 % confidence interval of f as a steady mean", when="steady"),
     "lyapunov_exponent": Field("1", "largest Lyapunov exponent, per revolution", when="steady"),

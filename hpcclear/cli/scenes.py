@@ -125,8 +125,8 @@ def import_(table: Path, file: Path, sketch: Path | None) -> int:
 def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
 
-    Exit code 1 if the file's own design cannot turn but its study varies the geometry; 2 if no design can.
-    Under mpiexec or srun it also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
+    If the design in the file cannot turn, the exit code is 1 if the study varies its geometry, and 2 otherwise.
+    Under mpiexec or srun the command also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """

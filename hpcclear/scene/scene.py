@@ -24,9 +24,8 @@ from hpcclear.scene.variables import Variable
 
 
 class Scene(ConsistentTables):
-    """A scene file, validated: SI numbers, frozen, equal when its content is equal.
-
-    Make one with `load_scene`; change one with `with_`, which validates anew.
+    """A validated scene file with SI numbers. It is immutable; scenes with equal content are equal. `load_scene` reads
+    one, and `with_` returns a changed copy, validated again.
     """
 
     _text: str = PrivateAttr("")

@@ -39,14 +39,15 @@ class SceneTables(Table):
     """The tables of a scene file, each valid by itself; SI numbers, frozen."""
 
     format_version: Literal[1, 2] = 1
-    """2 where the mechanism is a planar linkage."""
+    """Version of the format: 2 for a planar linkage, 1 for a slider-crank."""
     mechanism: Annotated[Mechanism | Planar, Field(discriminator="kind")]
     """A slider-crank, or any planar linkage."""
     # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.
     drive: Drive = cast(Any, None)
-    """Of a slider-crank, needed; a linkage has drives of its own."""
+    """Drive of a slider-crank, required there. A linkage has `mechanism.drives` instead."""
     joints: Joints = cast(Any, None)
-    """Of a slider-crank, needed; a linkage has joints of its own. The crank's on the frame is ideal."""
+    """Joints of a slider-crank, required there. A linkage has `mechanism.joints` instead. The joint of crank and frame
+    is always ideal."""
     effects: Effects = Effects()
     numerics: Numerics = Numerics()
     output: Output = Output()
