@@ -40,7 +40,8 @@ class Block:
     @property
     def runs(self) -> bool:
         """Whether it is there to be run, and can be run here."""
-        return self.language not in READ_ONLY and self.no_run is None and not self.quoted
+        read = self.language in READ_ONLY and self.title is None
+        return not read and self.no_run is None and not self.quoted
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"

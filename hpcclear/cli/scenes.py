@@ -78,9 +78,15 @@ def _copy_jobs(place: Path) -> None:
     )
 
 
-@click.command("import", short_help="Write a linkage from a table of its points.")
-@click.argument("table", type=PATH)
+@click.command("import", short_help="Write a linkage from a table of points or a drawing.")
+@click.argument("source", type=PATH)
 @click.argument("file", type=PATH)
+@click.option(
+    "--unit",
+    default="",
+    metavar="UNIT",
+    help="Of lengths, where the source states none, such as mm.",
+)
 @click.option(
     "--sketch",
     type=PATH,
@@ -88,25 +94,27 @@ def _copy_jobs(place: Path) -> None:
     help="Draw the linkage with names, axes and signs to this file (png, svg, pdf).",
 )
 @of_one_process
-def import_(table: Path, file: Path, sketch: Path | None) -> int:
-    """Write a linkage from a table of its points.
+def import_(source: Path, file: Path, unit: str, sketch: Path | None) -> int:
+    """Write a linkage from a table of points, a DXF drawing, a PMKS+ project or a Linkage document.
 
-    TABLE is a CSV file or Excel workbook with the columns name, x [mm], y [mm] and bodies; points that bodies share
-    are pins, "ground" stands still. Without bodies the points are a chain of bars between the first and the last.
-    FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
+    A table (CSV, Excel) has the columns name, x [mm], y [mm] and bodies; points that bodies share are pins, "ground"
+    stands still. Without bodies the points are a chain of bars between the first and the last. In a DXF drawing a
+    layer is a body. FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
 
     Example: hpcclear import points.csv linkage.toml --sketch linkage.png
     """
     from hpcclear.results import files
-    from hpcclear.scene import load_scene
-    from hpcclear.scene.points_of_linkage import linkage_of, text_of
+    from hpcclear.scene import importers, load_scene
 
     check_free(file)
-    content = linkage_of(table)
+    drawing = importers.drawing_of(source, unit)
+    content = importers.scene_of(drawing, str(source))
     scene = load_scene(content)
     mechanism = content["mechanism"]
-    files.write_bytes(file, text_of(content, table.name).encode())
+    files.write_bytes(file, importers.text_of(content, source.name, drawing.notes).encode())
     show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
+    for note in drawing.notes:
+        show(f"note     {note}")
     if sketch is not None:
         _draw(scene, sketch)
     show(f"next     put masses and the speed in, then: hpcclear check {file}")
