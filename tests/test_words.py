@@ -37,6 +37,7 @@ FILES = (
     "docs/how-to/accuracy.md",
     "docs/how-to/archive.md",
     "docs/how-to/bring-your-data.md",
+    "docs/how-to/walkthroughs.md",
     "docs/how-to/chaos.md",
     "docs/how-to/cluster.md",
     "docs/how-to/contact-law.md",

@@ -35,9 +35,13 @@ if TYPE_CHECKING:
     "--four-stroke",
     "A four-stroke engine, written as a linkage; its gas force repeats every two turns of the crank.",
 )
+@flag(
+    "--compressor",
+    "A piston compressor with fits by ISO 286, and a sample of machines as they are made.",
+)
 @flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @of_one_process
-def init(file: Path, four_stroke: bool, jobs: bool) -> int:
+def init(file: Path, four_stroke: bool, compressor: bool, jobs: bool) -> int:
     """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
     With --jobs, write the scenes and scripts that the documentation names, as a directory. Nothing is overwritten.
@@ -53,7 +57,9 @@ def init(file: Path, four_stroke: bool, jobs: bool) -> int:
         _copy_jobs(file)
         return Exit.DONE
     files.probe(place_of(file))
-    name = "four_stroke.toml" if four_stroke else "starter.toml"
+    name = (
+        "four_stroke.toml" if four_stroke else "compressor.toml" if compressor else "starter.toml"
+    )
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
     show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
