@@ -52,7 +52,6 @@ def main() -> None:
                 cwd=reader.place,
                 env=os.environ | {"PATH": path},
                 stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
                 check=True,
             )
             title = [x for x in lines[: block.line] if x.startswith("## ")][-1][3:].split(":")[0]
