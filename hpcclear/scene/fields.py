@@ -53,7 +53,7 @@ def check_table(data: Any) -> None:
 class Table(BaseModel):
     """A table of the scene file: frozen, and closed against unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Keys that a user might expect here and that belong to another kind: reason and remedy."""

@@ -150,7 +150,7 @@ def law_entries(kind: str) -> Iterator[tuple[str, Quantity]]:
 class LawTable(Table):
     """A table with a law and its parameters."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, defer_build=True)
 
     kind: ClassVar[str] = ""
     formula: ClassVar[str] = ""
