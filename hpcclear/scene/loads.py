@@ -22,7 +22,7 @@ class Law(Converted):
     unit: str
     constant: bool = False
 
-    def convert(self, value: Any) -> Any:
+    def convert(self, value: object) -> Any:
         """A number, or a tuple of pairs in SI; raises PydanticCustomError."""
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)

@@ -67,7 +67,7 @@ class SceneTables(Table):
 
     @field_validator("format_version", mode="before")
     @classmethod
-    def _version_is_a_number(cls, value: Any) -> Any:
+    def _version_is_a_number(cls, value: object) -> Any:
         if isinstance(value, bool):  # equal to 1 in Python
             raise invalid("true or false is not a version", "Write format_version = 1")
         return value
@@ -522,7 +522,7 @@ def _with_paths_of_clearance(data: Any, paths: list[str]) -> Any:
     return data
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]
