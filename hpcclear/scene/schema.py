@@ -112,7 +112,7 @@ def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     ]  # fmt: skip
 
 
-def _with_files(schema: Any) -> Any:
+def _with_files(schema: object) -> Any:
     """A schema with references to `FileCurve` wherever a curve may come from a file."""
     if schema == OF_FILE:
         return {"$ref": "#/$defs/FileCurve"}

@@ -290,7 +290,7 @@ class Off:
         }
 
 
-def _correlated(table: Mapping[str, Any] | None, names: Mapping[str, Any]) -> dict[str, Any]:
+def _correlated(table: Mapping[str, Any] | None, names: Mapping[str, object]) -> dict[str, Any]:
     """The study's correlation among the random inputs that are left, if it has one."""
     rows = [] if table is None else [k for k, name in enumerate(table["inputs"]) if name in names]
     if table is None or len(rows) < 2:

@@ -349,7 +349,7 @@ class SceneTables(Table):
         return self._known_numbers
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]

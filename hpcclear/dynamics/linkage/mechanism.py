@@ -99,7 +99,7 @@ class Mechanism:
         return next((drive for drive in self.drives if drive.body == body), None)
 
 
-def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
+def with_numbers(mechanism: Mechanism, **tables: object) -> Mechanism:
     """A mechanism with other numbers, arrays among them, which its checks are not made for."""
     made = object.__new__(Mechanism)
     for one in fields(Mechanism):

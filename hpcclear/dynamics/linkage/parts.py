@@ -187,7 +187,7 @@ class LooseSlide(Slide):
         """What the constraints of a guide without clearance are at the start: offset, sine of the tilt."""
         return self.start_offset, np.sin(self.start_tilt)
 
-    def corners(self, middle: Any) -> dict[str, tuple[Any, Any]]:
+    def corners(self, middle: object) -> dict[str, tuple[Any, Any]]:
         """Points of the slider that are centres of its corners, `middle` its place in the slider's axes."""
         size = self.length, self.height
         return {
@@ -404,7 +404,7 @@ class Acting:
     """Whether it goes by the angle of a body, which must not go round with the revolutions."""
 
     @classmethod
-    def of(cls, table: Any) -> Self:
+    def of(cls, table: object) -> Self:
         """That of a table of the scene, whose entries have the names of the fields."""
         return cls(**{one.name: getattr(table, one.name) for one in fields(cls)})
 

@@ -165,7 +165,7 @@ def _loose_slide(joint: Any) -> parts.LooseSlide:
     )  # fmt: skip
 
 
-def _drive(drive: Any) -> parts.Drive:
+def _drive(drive: object) -> parts.Drive:
     if isinstance(drive, PlanarSpeed):
         return parts.ConstantSpeed(drive.name, drive.body, drive.speed, drive.period, drive.turns)
     if isinstance(drive, PlanarHarmonic):

@@ -238,7 +238,7 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
     return lines
 
 
-def _range(load: Any) -> str:
+def _range(load: object) -> str:
     """Of a force: its size, or the range of its table."""
     size = getattr(load, "size", None)
     if size is None:

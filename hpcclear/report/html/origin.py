@@ -1,7 +1,6 @@
 """The sections of the page on where results come from: effects, time of the ranks, how to do it again."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -38,7 +37,7 @@ def effects(content: Content) -> list[object] | None:
     return [*first, folded("The whole scene file", [preformatted(scene)])]
 
 
-def _flat(value: Any, path: str) -> Iterator[list[object]]:
+def _flat(value: object, path: str) -> Iterator[list[object]]:
     """Entries of nested tables, a row each."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
