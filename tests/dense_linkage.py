@@ -87,6 +87,7 @@ class Dense:
     alpha: float = 0.0
     beta: float = 0.0
     curve: float = 1.0  # what tables of loads and torques say
+    curves: dict = field(default_factory=dict)  # or by name, functions of what they go by
     seen: dict = field(default_factory=dict)
 
     def __post_init__(self):
@@ -109,6 +110,13 @@ class Dense:
     def driven(self, drive, t):
         if isinstance(drive, m.ConstantSpeed):
             return self.mechanism.body(drive.body).start_angle + drive.speed * t
+        if isinstance(drive, m.RunUp):
+            start, speed = self.mechanism.body(drive.body).start_angle, self.curves[drive.name]
+            if not isinstance(t, Jet):
+                return start + speed.antiderivative()(t)
+            now, rate, _ = t.parts
+            parts = speed.antiderivative()(now), speed(now) * rate, speed(now, 1) * rate**2
+            return Jet(start + parts[0], *parts[1:])
         return drive.mean + drive.amplitude * sine(2 * math.pi * drive.frequency * t + drive.phase)
 
     def constraints(self, q, t):
@@ -126,7 +134,7 @@ class Dense:
             if isinstance(joint, m.Fixed):
                 rows[joint.name, "along"] = dx * (x - bx) + dy * (y - by)
         for drive in self.mechanism.drives:
-            if drive.prescribed:
+            if drive.prescribed or isinstance(drive, m.RunUp):
                 rows[drive.name, "drive"] = q[self.first[drive.body] + 2] - self.driven(drive, t)
         return rows
 
@@ -199,7 +207,14 @@ class Dense:
         }  # fmt: skip
         return (on_b - on_j).T @ force
 
-    def loads(self, q, v):
+    def looked_up(self, load, q, t):
+        """What the table of a load says."""
+        if load.name not in self.curves:
+            return self.curve
+        by = load.by or m.By(self.mechanism.period.body)
+        return self.curves[load.name](t if by.seconds else q[self.first[by.body] + 2])
+
+    def loads(self, q, v, t=0.0):
         Q, power = np.zeros(self.n), 0.0
         for load in self.mechanism.loads:
             own = np.zeros(self.n)
@@ -243,7 +258,7 @@ class Dense:
                         pull = 0.0
                 own = (Jb - Ja).T @ (n * pull)
             if getattr(load, "table", False):
-                own = own * self.curve
+                own = own * self.looked_up(load, q, t)
             Q, power = Q + own, power + own @ v
         self.seen["load_power"] = power
         return Q
@@ -261,10 +276,10 @@ class Dense:
     def accelerations(self, q, v, t=0.0):
         """Accelerations; forces, powers and multipliers stay in `seen`."""
         M, self.seen = np.diag(self.masses()), {}
-        Q = self.loads(q, v)
+        Q = self.loads(q, v, t)
         Q[1::3] -= self.masses()[1::3] * self.gravity
         for drive in self.mechanism.drives:
-            if not drive.prescribed:
+            if not (drive.prescribed or isinstance(drive, m.RunUp)):
                 k = self.first[drive.body] + 2
                 torque = drive.torque * (self.curve if drive.table else 1.0)
                 if drive.by_speed is not None:
