@@ -130,6 +130,8 @@ class Dense:
             tilt = self.angle(q, joint.line) + joint.angle
             dx, dy = turned((1.0, 0.0), tilt)
             rows[joint.name, "across"] = dx * (y - by) - dy * (x - bx)
+            if isinstance(joint, m.Slot):
+                continue
             rows[joint.name, "angle"] = self.angle(q, joint.point) - tilt
             if isinstance(joint, m.Fixed):
                 rows[joint.name, "along"] = dx * (x - bx) + dy * (y - by)
@@ -176,9 +178,17 @@ class Dense:
             return
         middle, on_line = (np.array(self.place(q, place), float) for place in joint.places)
         line = self.angle(q, joint.line) + joint.angle
-        r, face = joint.corner_radius, 0.5 * joint.height + joint.clearance
-        for name, (ahead, left) in CORNERS.items():
-            arm = (ahead * (0.5 * joint.length - r), left * (0.5 * joint.height - r))
+        if isinstance(joint, m.LooseSlot):
+            r, face = joint.pin_radius, joint.pin_radius + joint.clearance
+            arms = {"left": (1, (0.0, 0.0)), "right": (-1, (0.0, 0.0))}
+        else:
+            r, face = joint.corner_radius, 0.5 * joint.height + joint.clearance
+            half = 0.5 * joint.length - r, 0.5 * joint.height - r
+            arms = {
+                name: (left, (ahead * half[0], left * half[1]))
+                for name, (ahead, left) in CORNERS.items()
+            }
+        for name, (left, arm) in arms.items():
             corner = middle + np.array(turned(arm, self.angle(q, joint.point)))
             n = left * np.array(turned((0.0, 1.0), line))  # towards the face
             gap = (corner - on_line) @ n + r - face
@@ -360,7 +370,7 @@ def loose(dense, joint):
     def tilt(q):
         return dense.angle(q, joint.point) - dense.angle(q, joint.line) - joint.angle
 
-    return offset, tilt
+    return (offset,) if isinstance(joint, m.LooseSlot) else (offset, tilt)
 
 
 def assembled(dense, guess, t, eccentricities):
@@ -380,7 +390,7 @@ def assembled(dense, guess, t, eccentricities):
                 jacobians.append(Ja - Jb)
                 continue
             # across and tilt, by differences small enough for Newton's method
-            for row, asked in zip(loose(dense, joint), e, strict=True):
+            for row, asked in zip(loose(dense, joint), e, strict=False):
                 rows.append([row(q) - asked])
                 slopes = [(row(q + h) - row(q - h)) / 2e-6 for h in 1e-6 * np.eye(dense.n)]
                 jacobians.append([slopes])
