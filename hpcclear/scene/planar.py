@@ -28,6 +28,7 @@ from hpcclear.scene.mechanism import check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound
 from hpcclear.scene.rubbing import Rubbing, RubbingPin
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.wear import Wear
 
 Rows = NamedRows()
@@ -214,7 +215,8 @@ class PlanarFixed(Table):
 
 
 PlanarJoint = Annotated[
-    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarFixed, Field(discriminator="kind")
+    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarSlot | PlanarFixed,
+    Field(discriminator="kind"),
 ]
 
 

@@ -46,7 +46,7 @@ def _flat(value: object, path: str) -> Iterator[list[object]]:
         yield [path, f"{value} {_unit(path, value)}".rstrip()]
 
 
-def _unit(path: str, value: Any) -> str:
+def _unit(path: str, value: object) -> str:
     """SI unit of a plain number of a scene, "" where its text has one or it has none."""
     plain = isinstance(value, int | float) and not isinstance(value, bool)
     unit = quantities()[path].unit if plain and path in quantities() else ""
