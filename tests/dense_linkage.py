@@ -277,7 +277,9 @@ class Dense:
         c, dc, turning = self.along(q, v, t)
         right = -turning - 2 * self.alpha * dc - self.beta**2 * c
         names = list(self.constraints(q, t))
-        guides = [j for j in self.mechanism.joints if getattr(j, "friction", None)]
+        rubbed = [j for j in self.mechanism.joints if getattr(j, "friction", None)]
+        guides = [j for j in rubbed if isinstance(j, m.Slide)]
+        pins = [j for j in rubbed if not isinstance(j, m.Slide)]
         for signs in itertools.product((1.0, -1.0), repeat=len(guides)):
             K = np.block([[M, -J.T], [J, np.zeros((len(c), len(c)))]])
             loss, ok = 0.0, True
@@ -294,15 +296,42 @@ class Dense:
                 k = self.n + names.index((joint.name, "across"))
                 K[: self.n, k] += sign * ratio * influence
                 rubbing.append((k, sign, ratio * speed))
-            solution = np.linalg.solve(K, np.concatenate([Q, right]))
+            solution, pin_loss = self.with_pins(pins, names, K, Q, right, v)
             ok = all(sign * solution[k] >= 0.0 for k, sign, _ in rubbing)
             loss = sum(power * abs(solution[k]) for k, _, power in rubbing)
             if ok:
                 break
         assert ok
         self.seen["multipliers"] = dict(zip(names, solution[self.n :], strict=True))
-        self.seen["guide_loss"] = loss
+        self.seen["guide_loss"] = loss + pin_loss
         return solution[: self.n]
+
+    def with_pins(self, pins, names, K, Q, right, v):
+        """The solution with moments mu r |reaction| of pins, by going round, and the power that they lose."""
+        sizes = np.zeros(len(pins))
+        for _ in range(100):
+            given, loss = np.concatenate([Q, right]), 0.0
+            for joint, size in zip(pins, sizes, strict=True):
+                signs = np.zeros(self.n)
+                for place, sign in zip(joint.places, (1.0, -1.0), strict=True):
+                    if m.split(place)[0] != m.GROUND:
+                        signs[self.first[m.split(place)[0]] + 2] = sign
+                rubs, turning = joint.friction, signs @ v
+                x = turning * rubs.radius / rubs.ramp_speed
+                moment = rubs.coefficient * rubs.radius * size * min(max(x, -1.0), 1.0)
+                given[: self.n] -= moment * signs
+                loss += moment * turning
+            solution = np.linalg.solve(K, given)
+            before = sizes
+            sizes = np.array(
+                [
+                    np.hypot(*(solution[self.n + names.index((joint.name, k))] for k in "xy"))
+                    for joint in pins
+                ]
+            )
+            if np.abs(sizes - before).max(initial=0.0) <= 1e-14 * sizes.max(initial=0.0):
+                return solution, loss
+        raise AssertionError("reactions and friction of pins do not settle")
 
 
 def loose(dense, joint):

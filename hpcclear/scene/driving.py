@@ -14,7 +14,7 @@ from hpcclear.scene.fields import (
     check_one_of,
     invalid,
 )
-from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad
+from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad, by_time
 from hpcclear.scene.places import Angle, PairTable
 
 Turns = Annotated[int, Count(least=1, most=64)]
@@ -49,6 +49,24 @@ def check_torque(drive: Any) -> None:
             "torque_by_speed says already how the torque falls", "Remove it",
             key="no_load_speed", value=drive.no_load_speed,
         )  # fmt: skip
+
+
+def check_by(load: Any, entry: str) -> None:
+    """Refuse a load whose table goes by two things, or has no table to go by them; raises PydanticCustomError."""
+    timed = getattr(load, f"{entry}_by_time")
+    if timed is not None and getattr(load, entry) is not None:
+        raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
+    if load.angle_of is not None and not isinstance(getattr(load, entry), tuple):
+        reason = f"there is no table of {entry} against an angle"
+        raise invalid(reason, "Remove it", key="angle_of", value=load.angle_of)
+    if load.repeats and timed is None:
+        raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
+    if load.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
+        raise invalid(
+            "a table that repeats begins at 0 s, and ends at the value with which it begins",
+            "Make its first and last value equal",
+            key=f"{entry}_by_time",
+        )
 
 
 def speed_entry(drive: Any) -> str:
@@ -140,8 +158,38 @@ class PlanarTorque(Table):
         return self
 
 
+class PlanarRunUp(Table):
+    """A body turns at speeds against the time, such as those of a run-up, whatever torque that takes."""
+
+    name: str
+    kind: Literal["run-up"]
+    body: str
+    """That turns."""
+    speed_by_time: Annotated[Any, by_time("rad/s")]
+    """``[[time, speed], ...]``, s and rad/s, from 0 s on, never below 0, at last above it. A monotone cubic lies between; it
+    begins and ends level, and beyond the table the speed stays as it is."""
+    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
+    """Inertia that turns with the body, kg m2."""
+    period: bool = False
+    """Whether a turn of the body is the revolution; the first drive is, where none says so."""
+    turns: Turns = 1
+    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns."""
+
+    @model_validator(mode="after")
+    def _forward(self) -> "PlanarRunUp":
+        speeds = [speed for _, speed in self.speed_by_time]
+        if min(speeds) < 0.0 or min(speeds[1:]) == 0.0:
+            raise invalid(
+                "the speed falls to 0 or below, where no revolution would end",
+                "Give speeds above 0 from the second row on",
+                key="speed_by_time",
+            )
+        return self
+
+
 PlanarDrive = Annotated[
-    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque, Field(discriminator="kind")
+    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp,
+    Field(discriminator="kind"),
 ]
 
 
@@ -165,6 +213,12 @@ class ForceLoad(Table):
     size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
     """N along `direction`, constant or against the angle of the body that gives the period: from the x axis, counter-clockwise,
     `start_angle` included, whichever way it turns."""
+    size_by_time: Annotated[Any, by_time("N")] | None = None
+    """In place of `size`: ``[[time, size], ...]``, s and N, from 0 s on, smooth between the rows and level beyond."""
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether that table begins anew at its last time."""
+    angle_of: str | None = None
+    """Another body whose angle the table of `size` goes by; it repeats with every turn of it."""
     direction: Angle = 0.0
     """From the ground's x axis, rad."""
     follows: Annotated[bool, Field(strict=True)] = False
@@ -173,7 +227,9 @@ class ForceLoad(Table):
     @model_validator(mode="after")
     def _one_of_both(self) -> "ForceLoad":
         force = None if self.force is None else [self.force.x, self.force.y]
-        check_one_of("force", force, self.size, "Write force = [x, y], or size and direction")
+        size = self.size if self.size is not None else self.size_by_time
+        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
+        check_by(self, "size")
         return self
 
 
@@ -184,8 +240,21 @@ class TorqueLoad(Table):
     kind: Literal["torque"]
     body: str
     """That the torque acts on, against the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """N m, constant or against the angle of the body that gives the period."""
+    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
+    """In place of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on, smooth between the rows and level beyond."""
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether that table begins anew at its last time."""
+    angle_of: str | None = None
+    """Another body whose angle the table of `torque` goes by; it repeats with every turn of it."""
+
+    @model_validator(mode="after")
+    def _by_one(self) -> "TorqueLoad":
+        check_by(self, "torque")
+        remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
+        check_one_of("torque", self.torque, self.torque_by_time, remedy)
+        return self
 
 
 class SpringLoad(Table):

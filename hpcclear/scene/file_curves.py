@@ -25,8 +25,10 @@ FINEST = math.radians(0.1)
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
 """Units of gauge pressures."""
 _VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
+_MOTIONS = {"angle": "rad", "speed": "rad/s"}
 _HINTS = {
     "angle": ("angle", "deg", "phi", "φ", "crank", "winkel", "kw", "ca", "theta", "θ"),
+    "speed": ("speed", "drehzahl", "omega", "n"),
     "time": ("time", "zeit", "t"),
     "pressure": ("pressure", "druck", "p_", "p"),
     "force": ("force", "kraft", "f"),
@@ -43,7 +45,9 @@ class FileCurve(Table):
     angle: str | None = None
     """Unit or heading of the crank angles; left out, what the headings say."""
     time: str | None = None
-    """Of a drive's motion: unit or heading of the times."""
+    """Of what goes by the time: unit or heading of the times."""
+    speed: str | None = None
+    """Of a run-up: unit or heading of the speeds."""
     pressure: str | None = None
     """Unit or heading of pressures, which push on a piston of that `bore`."""
     force: str | None = None
@@ -141,12 +145,16 @@ def pairs_of(
     return [[float(a), float(v)] for a, v in zip(angles, values, strict=True)], shown
 
 
-def motion_of(curve: FileCurve, folder: Path, key: str) -> tuple[list[list[float]], str]:
-    """The pairs of a drive's motion, s and rad, as `pairs_of` does."""
+def against_time(
+    curve: FileCurve, folder: Path, unit: str, key: str
+) -> tuple[list[list[float]], str]:
+    """The pairs of a curve against the time, s and `unit`, as `pairs_of` does; the motion of a drive begins at 0 s."""
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
+    kind = next(name for name, own in {**_VALUES, **_MOTIONS}.items() if own == unit)
     first, times = _column(sheet, "time", curve.time, "s", key, ())
-    _, angles = _column(sheet, "angle", curve.angle, "rad", key, (first,))
-    made = np.column_stack([times - times[0], angles]).tolist()
+    _, values = _column(sheet, kind, getattr(curve, kind), unit, key, (first,))
+    start = times[0] if kind in _MOTIONS else 0.0
+    made = np.column_stack([times - start, values]).tolist()
     return made, f"{sheet.found}, {len(times)} rows"
 
 

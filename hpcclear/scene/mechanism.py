@@ -24,6 +24,7 @@ from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.loads import Law
 from hpcclear.scene.materials import Material
 from hpcclear.scene.roundness import OutOfRound, check_waves
+from hpcclear.scene.rubbing import RubbingPin
 from hpcclear.scene.wear import Wear
 
 
@@ -214,6 +215,8 @@ class IdealJoint(Table):
     """A pin without clearance."""
 
     kind: Literal["ideal"]
+    friction: RubbingPin | None = None
+    """Torque in proportion to the pin's reaction; left out, it turns freely."""
 
     @model_validator(mode="before")
     @classmethod
@@ -240,5 +243,7 @@ class Joints(Table):
     """O12."""
     rod_slider: Joint
     """O23."""
+    crank_frame: IdealJoint | None = None
+    """O14; needed where it has friction."""
     guide: SliderGuide | None = None
     """The slider's guide; left out, it has no clearance."""

@@ -15,7 +15,6 @@ from hpcclear.scene.fields import (
     NamedRows,
     PositiveLength,
     Quantity,
-    Speed,
     Table,
     check_period,
     invalid,
@@ -28,6 +27,7 @@ from hpcclear.scene.materials import Materials
 from hpcclear.scene.mechanism import check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound
+from hpcclear.scene.rubbing import Rubbing, RubbingPin
 from hpcclear.scene.wear import Wear
 
 Rows = NamedRows()
@@ -116,6 +116,8 @@ class PlanarRevolute(Table):
     """``body.point``, or ``ground.point``."""
     bearing: str
     """``body.point``, or ``ground.point``."""
+    friction: RubbingPin | None = None
+    """Torque in proportion to the pin's reaction; left out, it turns freely."""
 
 
 class PlanarClearance(Table):
@@ -156,15 +158,6 @@ class PlanarClearance(Table):
     def _journal_fits(self) -> "PlanarClearance":
         check_journal(self)
         return self
-
-
-class Rubbing(Table):
-    """Friction of a guide."""
-
-    coefficient: Annotated[float, Quantity("", least=0)]
-    """Of Coulomb's law."""
-    ramp_speed: Speed = 0.01
-    """Sliding speed below which the force falls to zero with the speed, m/s."""
 
 
 class PlanarSlide(OfContacts, Table):
@@ -267,7 +260,10 @@ class Planar(Table):
                 for entry in ("torque", "size"):
                     curve = getattr(row, entry, None)
                     if isinstance(curve, tuple):
-                        check_period(curve, turns, f"{table}.{row.name}.{entry}")
+                        by_another = getattr(row, "angle_of", None) is not None
+                        check_period(
+                            curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}"
+                        )
         return self
 
     @model_validator(mode="before")

@@ -165,13 +165,9 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("slider load", {"effects.slider_load": None})
         turns = turns_of(scene.linkage)
         yield from _mean("slider load", "effects.slider_load", effects.slider_load, turns)
-    if effects.guide_friction is not None:
-        yield Switch("guide friction", {"effects.guide_friction": None})
+    for key, (words, _) in scene.joint_frictions().items():
+        yield Switch(words, {key: None})
     if isinstance(mechanism, Planar):
-        for joint in mechanism.joints:
-            if isinstance(joint, PlanarSlide) and joint.friction is not None:
-                key = f"mechanism.joints.{joint.name}.friction"
-                yield Switch(f"guide friction in {joint.name}", {key: None})
         for load in mechanism.loads:
             key = f"mechanism.loads.{load.name}"
             yield Switch(f"{load.kind} {load.name}", {key: None})

@@ -244,12 +244,20 @@ class SceneTables(Table):
         """Dotted path of the table that has the materials of a joint with clearance."""
         return self.joint_key(label) + (".materials" if self.template is None else "")
 
-    def guide_friction_keys(self) -> tuple[str, ...]:
-        """Dotted paths of the tables of friction in guides."""
-        rubs = [one for one in self.linkage.joints if getattr(one, "friction", None) is not None]
-        if self.template is not None:
-            return ("effects.guide_friction",) * len(rubs)
-        return tuple(f"mechanism.joints.{one.name}.friction" for one in rubs)
+    def joint_frictions(self) -> dict[str, tuple[str, float]]:
+        """Words and coefficient of friction in joints without clearance, by the dotted paths of its tables."""
+        found = {}
+        for one in self.linkage.joints:
+            if (rubs := getattr(one, "friction", None)) is not None:
+                guide = isinstance(one, PlanarSlide)
+                key, words = (
+                    f"{self.joint_key(one.name)}.friction",
+                    f"{'guide' if guide else 'pin'} friction in {one.name}",
+                )
+                if self.template is not None and guide:
+                    key, words = "effects.guide_friction", "guide friction"
+                found[key] = words, rubs.coefficient
+        return found
 
     def pin(self, name: str) -> ClearanceJoint | PlanarClearance:
         """The table of a pin in a bearing."""

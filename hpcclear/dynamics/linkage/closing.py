@@ -16,6 +16,7 @@ from hpcclear.dynamics.linkage.parts import (
     Fixed,
     Joint,
     Revolute,
+    RunUp,
     Slide,
     split,
 )
@@ -174,6 +175,12 @@ class Closing:
             )
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
         return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
+
+    def run_up(self, drive: RunUp, speed: Term, rise: Term) -> Row:
+        """A free body's acceleration as its drive has it; what its speed is off by is fed back."""
+        own = self.kinematics.forest.frames[drive.body]
+        rate = self.kinematics.spin(own) - speed
+        return self._row(f"{drive.name}_angle", {Column("angle", own): ONE}, -rise, rate, ZERO)
 
     def _driven(self, drive: Drive) -> Row:
         kin, name = self.kinematics, f"{drive.name}_drive"

@@ -40,9 +40,11 @@ def values(
         if isinstance(joint, Slide):
             angle = trees.offsets[split(joint.line)[0]] + joint.angle
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
-            if joint.friction is not None:
-                found[f"{joint.name}_coefficient"] = joint.friction.coefficient
-                found[f"{joint.name}_inverse_ramp"] = 1.0 / joint.friction.ramp_speed
+        rubs = getattr(joint, "friction", None)
+        if rubs is not None:
+            radius = getattr(rubs, "radius", 1.0)  # of a pin: torques and speeds of turning
+            found[f"{joint.name}_coefficient"] = rubs.coefficient * radius
+            found[f"{joint.name}_inverse_ramp"] = radius / rubs.ramp_speed
     _outside(trees, found)
     return found
 

@@ -67,12 +67,22 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True)
+class PinFriction:
+    """Friction of a pin over its reaction, radius (m), and sliding speed (m/s) below which it falls linearly to 0."""
+
+    coefficient: float
+    radius: float
+    ramp_speed: float
+
+
+@dataclass(frozen=True)
 class Revolute:
     """A pin without clearance between two places."""
 
     name: str
     journal: str
     bearing: str
+    friction: PinFriction | None = field(default=None, kw_only=True)
     contacts: ClassVar[tuple[Contact, ...]] = ()
 
     @property
@@ -258,6 +268,8 @@ class TableDrive:
     period: bool = False
     prescribed: ClassVar[bool] = True
     turns: ClassVar[int] = 1
+    curves: ClassVar[tuple[str, ...]] = ("angle", "spin", "turn")
+    """Angle but for what it gains evenly (rad), and its first and second derivative (rad/s, rad/s2)."""
 
     @property
     def seconds(self) -> float:
@@ -308,12 +320,39 @@ class TorqueDrive:
         return 2 * math.pi * self.turns
 
 
+@dataclass(frozen=True)
+class RunUp(TorqueDrive):
+    """A body whose angle is free turns at speeds given by rows (s, rad/s), smooth and level beyond, whatever torque that takes.
+
+    `cells`: of its `curves`, as the kernel reads them.
+    """
+
+    rows: tuple[Pair, ...] = ()
+    cells: Any = field(default=None, compare=False, repr=False)
+    curves: ClassVar[tuple[str, ...]] = ("speed", "rise")
+
+    @property
+    def length(self) -> float:
+        """Until the speed stays as it is, s."""
+        return self.rows[-1][0]
+
+
 Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 
 @dataclass(frozen=True)
+class By:
+    """What a load's table goes by in place of the angle of the period's body: that of another, or the time where it has a
+    length in s; then it repeats, or stays level."""
+
+    body: str = ""
+    seconds: float = 0.0
+    repeats: bool = False
+
+
+@dataclass(frozen=True)
 class Force:
-    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body.
+    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body, or `by`.
 
     `follows`: along the axes of its body instead.
     """
@@ -323,16 +362,18 @@ class Force:
     force: Pair
     table: bool = False
     follows: bool = False
+    by: By | None = None
 
 
 @dataclass(frozen=True)
 class Torque:
-    """A torque on a body, N m; `table` as of a force."""
+    """A torque on a body, N m; `table` and `by` as of a force."""
 
     name: str
     body: str
     torque: float
     table: bool = False
+    by: By | None = None
 
 
 @dataclass(frozen=True)
@@ -377,6 +418,13 @@ class Acting:
 
 
 Load = Force | Torque | Spring | Acting
+
+
+def curves_of(part: Drive | Load) -> list[str]:
+    """Names of the tabulated curves that a drive or load has."""
+    if isinstance(part, (TableDrive, RunUp)):
+        return [f"{part.name}.{one}" for one in part.curves]
+    return [part.name] if getattr(part, "table", False) else []
 
 
 def split(place: str) -> tuple[str, str]:

@@ -73,7 +73,9 @@ def _works_between(recording: Recording, piece: Piece, s: Array) -> Array:
     after = np.minimum(k + 1, len(steps.time) - 1)
     rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
     ends = np.hstack([steps.q[rows], steps.v[rows]])
-    powers = recording.observe(ends, steps.contacts[rows], steps.turn_time[rows])[1].powers
+    turn_time = steps.turn_time[rows]
+    began = steps.time[rows] - turn_time
+    powers = recording.observe(ends, steps.contacts[rows], turn_time, began)[1].powers
     before, behind = np.split(powers[where], 2)
     h = (steps.time[after] - steps.time[k])[:, None]
     s = s[:, None]
@@ -304,9 +306,10 @@ def _series_between(scene: Scene, recording: Recording, piece: Piece) -> dict[st
     q, v, s = _between(piece, cycle)
     steps, k = piece.steps, piece.k
     revolution, contacts = steps.revolution[k], steps.contacts[k]
-    turn_time = times - (steps.time - steps.turn_time)[k]
+    began = (steps.time - steps.turn_time)[k]
+    turn_time = times - began
     in_turn = _in_turn(q, revolution, cycle)
-    rates = recording.observe(np.hstack([in_turn, v]), contacts, turn_time)[1]
+    rates = recording.observe(np.hstack([in_turn, v]), contacts, turn_time, began)[1]
     works = _works_between(recording, piece, s)
     q, v, in_turn = (one[:, scene.bristles :] for one in (q, v, in_turn))
     return planar_series(

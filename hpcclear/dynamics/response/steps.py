@@ -128,12 +128,17 @@ class Recording:
         row[0, contacts] = self._start[0].contacts
         row[0, rec.STATE : rec.STATE + 2 * n] = self._start[0].state(n)
         states = row[:, rec.STATE : rec.STATE + 2 * n]
-        row[:, rec.STATE + 2 * n :] = self.observe(states, row[:, contacts], np.zeros(1))[0]
+        row[:, rec.STATE + 2 * n :] = self.observe(
+            states, row[:, contacts], np.zeros(1), np.zeros(1)
+        )[0]
         return row
 
-    def observe(self, states: Array, contacts: Array, turn_time: Array) -> tuple[Array, Rates]:
-        """Accelerations (t, n) and rates at states (t, 2 n), contacts (t, 2 MAX_JOINTS) and times in the revolution (t,)."""
-        out = self._lanes.observe(self.par, states, contacts, turn_time)
+    def observe(
+        self, states: Array, contacts: Array, turn_time: Array, began: Array
+    ) -> tuple[Array, Rates]:
+        """Accelerations (t, n) and rates at states (t, 2 n), contacts (t, 2 MAX_JOINTS), times in the revolution (t,) and when
+        that began (t,)."""
+        out = self._lanes.observe(self.par, states, contacts, turn_time, began)
         n = self.problem.coordinates
         return out[:, :n], Rates(out[:, n:])
 

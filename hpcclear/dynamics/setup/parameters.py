@@ -106,7 +106,7 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
     pin = np.abs(p[:, at.SPEED]) * p[:, at.DRIVEN_LENGTH]
     mass, force = _mass(scene, get), _inertia(scene, get, p)
     needed = np.ones(len(p))
-    for key in scene.guide_friction_keys():
+    for key in scene.joint_frictions():
         needed = np.maximum(needed, 1.0 / (OF_RAMP * get(f"{key}.ramp_speed")))
     for place in scene.open_places:
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]

@@ -1,8 +1,6 @@
 """What is common to the samples of a scene: its effects, coordinates, method, tolerances, tables, as a `Problem`."""
 
-from collections.abc import Callable
-from functools import lru_cache, partial
-from typing import Any
+from functools import lru_cache
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -11,18 +9,15 @@ from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.laws.objectives import rate_in_lanes
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.parts import TableDrive, TorqueDrive
-from hpcclear.dynamics.linkage.table_drive import PARTS
+from hpcclear.dynamics.linkage.parts import RunUp, TableDrive, TorqueDrive
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar import swings
-from hpcclear.dynamics.planar.curves import periodic_cells
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.setup.parameters import parameter_rows, parameters
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
 from hpcclear.dynamics.stepping.implicit.control import STEEP
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
-from hpcclear.scene.planar import main_drive
 
 IMPLICIT_METHODS = {"switching": "stiff", "radau": "always"}
 """Methods that take implicit steps whatever the scene, and when."""
@@ -105,18 +100,18 @@ def implicit_method(scene: Scene) -> str:
     return "stiff" if stiff[there].any() else "never"
 
 
-def _cells_of_curves(
-    linkage: Linkage, tables: dict[str, Any], cells: Callable[[Any], Array]
-) -> tuple[Array, ...]:
+def _cells_of_curves(scene: Scene, linkage: Linkage) -> tuple[Array, ...]:
     """Cells of a linkage's curves, in the order of their rows."""
     driven = {
         f"{drive.name}.{part}": cells
         for drive in linkage.mechanism.drives
-        if isinstance(drive, TableDrive)
-        for part, cells in zip(PARTS, drive.cells, strict=True)
+        if isinstance(drive, (TableDrive, RunUp))
+        for part, cells in zip(drive.curves, drive.cells, strict=True)
     }
+    tables, interpolation = curves_of(scene.linkage), scene.numerics.interpolation
     return tuple(
-        driven[name] if name in driven else cells(tables[name]) for name in linkage.curve_rows
+        driven[name] if name in driven else tables[name].cells(interpolation)
+        for name in linkage.curve_rows
     )
 
 
@@ -135,13 +130,7 @@ def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = No
     """What is common to all samples of a scene."""
     e = scene.effects
     check_objective(scene)
-    drive: Any = main_drive(scene.linkage)
     linkage = planar.linkage_of(scene)
-    cells = partial(
-        periodic_cells,
-        turns=getattr(drive, "turns", 1),
-        interpolation=scene.numerics.interpolation,
-    )
     return Problem(
         linkage=linkage,
         effects=effects_of(scene, series=series, energies=energies),
@@ -156,9 +145,9 @@ def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         implicit=implicit_method(scene),
         cycle=linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
-        curves=_cells_of_curves(linkage, curves_of(scene.linkage), cells),
+        curves=_cells_of_curves(scene, linkage),
         chosen=scene.objective.joints,
-        from_rest=getattr(drive, "expected_speed", None) is not None,
+        from_rest=getattr(linkage.mechanism.period, "expected_speed", None) is not None,
     )
 
 

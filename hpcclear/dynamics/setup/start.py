@@ -10,7 +10,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble_samples
 from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.mechanism import Mechanism, uncentred
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import Forest
 from hpcclear.dynamics.planar.problem import (
@@ -49,25 +49,34 @@ def start_states(
     places, speeds = start.coordinates(first + n)[:, first:], start.velocities(first + n)[:, first:]
     moved = () if points is None else tuple(map(scene.path_in_linkage, sum(points.paths, ())))
     samples = None
-    if points is not None and any(map(moves_start, moved)):
+    if points is not None and any(map(moves_geometry, moved)):
         samples = Samples(scene, points)
         places.T[:], speeds.T[:] = samples.coordinates(trees)
+    elif any(map(moves_start, moved)):  # mass centres alone
+        found = coordinates(trees, _assembled(scene), sample_of(scene, points))
+        places.T[:], speeds.T[:] = (one.reshape(n, -1) for one in found)
     else:
         places[:], speeds[:] = _of_scene(scene)
-    if samples is None or (samples.closed.all() and not any(map(moves_geometry, moved))):
+    if samples is None:
         refusal = refused_of(scene) if walk else None
-        found = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
+        ended = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
-        found = statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
+        ended = statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
     _start_contacts(scene, par, points, start)
-    start.fail(found)
+    start.fail(ended)
     return start
 
 
 @lru_cache(maxsize=16)
 def _of_scene(scene: Scene) -> tuple[Array, Array]:
     """Coordinates and velocities (n,) that all samples start with whose geometry is the scene's."""
-    return coordinates(linkage_of(scene).forest, put_together(mechanism_of(scene.linkage)))
+    mechanism = mechanism_of(scene.linkage)
+    return coordinates(linkage_of(scene).forest, _assembled(scene), mechanism)
+
+
+@lru_cache(maxsize=16)
+def _assembled(scene: Scene) -> Assembly:
+    return put_together(uncentred(mechanism_of(scene.linkage)))
 
 
 class Samples:
@@ -83,13 +92,14 @@ class Samples:
 
     def __init__(self, scene: Scene, points: Points) -> None:
         self._scene, self._points = _without_study(scene), points
-        structure = linkage_of(scene).mechanism
+        structure = uncentred(linkage_of(scene).mechanism)
         self.numbers = sample_of(scene, points)
-        self._made, self.closed = assemble_samples(structure, self.numbers, len(points))
+        bare = uncentred(self.numbers)
+        self._made, self.closed = assemble_samples(structure, bare, len(points))
         self._single: dict[int, Assembly] = {}
         for row in np.flatnonzero(~self.closed).tolist():
             try:
-                self._single[row] = put_together(self.mechanism(row))
+                self._single[row] = put_together(uncentred(self.mechanism(row)))
                 self.closed[row] = True
             except InputError:
                 continue
@@ -100,10 +110,10 @@ class Samples:
 
     def coordinates(self, forest: Forest) -> tuple[Array, Array]:
         """Coordinates and velocities (n, m) of a forest; NaN of samples that do not close."""
-        q, v = coordinates(forest, self._made)
+        q, v = coordinates(forest, self._made, self.numbers)
         q[:, ~self.closed] = v[:, ~self.closed] = np.nan
         for row, made in self._single.items():
-            q[:, row], v[:, row] = coordinates(forest, made)
+            q[:, row], v[:, row] = coordinates(forest, made, self.mechanism(row))
         return q, v
 
 

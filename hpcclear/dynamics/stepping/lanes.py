@@ -153,15 +153,18 @@ class Lanes:
             True  # last: a stepper must not call what an interrupted compilation left out
         )
 
-    def observe(self, par: Array, states: Array, contacts: Array, times: Array) -> Array:
+    def observe(
+        self, par: Array, states: Array, contacts: Array, times: Array, began: Array
+    ) -> Array:
         """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion with the observed effects.
 
         Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
         the first step.
         """
         out = np.zeros((len(times), self.problem.coordinates + at.RATES))
-        states, contacts, times = (np.ascontiguousarray(x) for x in (states, contacts, times))
-        observe(self._observer, par, self.problem.tables, states, contacts, times, out, self.width)
+        states, contacts, times, began = map(np.ascontiguousarray, (states, contacts, times, began))
+        tables, both = self.problem.tables, (times, began)
+        observe(self._observer, par, tables, states, contacts, both, out, self.width)
         return out
 
     def _arguments(self, budget: int) -> tuple[Any, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
 from hpcclear.dynamics.evaluation.evaluator import (
@@ -18,6 +19,7 @@ from hpcclear.dynamics.evaluation.steady.effort import Mean, Sample, Segment
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.evaluation.steady.procedure import steady_mean
 from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
@@ -69,6 +71,16 @@ class _Ask:
         return not self._rows
 
 
+def check_steady(scene: Scene) -> None:
+    """Refuse a scene whose motion goes by the time since the start, which has no steady mean; raises InputError."""
+    if linkage_of(scene).mechanism.clocked:
+        raise InputError(
+            "numerics.target_error", scene.numerics.target_error,
+            "a load or drive goes by the time since the start, so there is no steady mean",
+            "Leave it out, and average the revolutions of interest (numerics.averaged_revolutions)",
+        )  # fmt: skip
+
+
 class SteadyEvaluator:
     """Finds the steady mean of points of one scene as a stream; to be used like `evaluation.evaluator.Evaluator`.
 
@@ -93,6 +105,7 @@ class SteadyEvaluator:
         lanes: int = DEFAULT_LANES,
         procedure: Procedure | None = None,
     ) -> None:
+        check_steady(scene)
         self._procedure = procedure or _to_target(scene)
         self.scene = scene
         self.lanes = lanes

@@ -31,11 +31,10 @@ from hpcclear.dynamics.stepping.explicit.switching import sense_stiffness
 
 
 @lane_function
-def begin_stage(work, free, c, W):
+def begin_stage(work, c, W):
     """Time of this stage within the revolution."""
-    if not free:
-        for i in range(W):
-            work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
+    for i in range(W):
+        work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
 
 
 @lane_function
@@ -126,7 +125,7 @@ def take_explicit_steps(effects, observing, motion, step, tables, senses, stages
             start_state(work, step.n, W)
         else:
             any_stage_state(step, s, stages, W)
-        begin_stage(work, effects.rules.free, weights[tab.NODES + s], W)
+        begin_stage(work, weights[tab.NODES + s], W)
         run_observed(observing, motion, work, tables)
         if s == 0:
             adopt_fresh(effects, work, step.stages, step.n, W)

@@ -105,6 +105,7 @@ def begin_column(effects, moved, lane, W, block, m, i, settings):
     elif follows:
         go_on(m, i)
     m[mem.TIME + i] = work[at.TIME * W + lane]
+    m[at.BEGAN * COLUMNS + i] = work[at.BEGAN * W + lane]
     m[mem.STEP + i] = work[at.STEP * W + lane]
     for p in range(effects.rules.begin, effects.rules.end):
         for row in (at.ACTIVE + p, at.INVERSE_IMPACT + p):
