@@ -57,8 +57,8 @@ FEATURES = {
         "report/bearings.py dynamics/lubrication/*",
     "bars that bend":
         "dynamics/linkage/bending.py scene/bending.py dynamics/planar/swings.py dynamics/bending.py",
-    "guides with clearance":
-        "dynamics/contacts/guide.py scene/guides.py report/figures/guides.py scene/moving.py",
+    "guides with clearance, friction of other joints":
+        "dynamics/contacts/guide.py scene/guides.py scene/rubbing.py dynamics/linkage/rubbing.py dynamics/linkage/guides.py report/figures/guides.py scene/moving.py",
     "shapes of contact, roundness":
         "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
     "impact and noise, loads on bearings":
