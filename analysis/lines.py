@@ -58,7 +58,8 @@ FEATURES = {
     "bars that bend":
         "dynamics/linkage/bending.py scene/bending.py dynamics/planar/swings.py dynamics/bending.py",
     "guides with clearance, friction of other joints":
-        "dynamics/contacts/guide.py scene/guides.py scene/rubbing.py dynamics/linkage/rubbing.py dynamics/linkage/guides.py report/figures/guides.py scene/moving.py",
+        "dynamics/contacts/guide.py scene/guides.py scene/rubbing.py dynamics/linkage/rubbing.py "
+        "dynamics/linkage/guides.py report/figures/guides.py scene/moving.py",
     "shapes of contact, roundness":
         "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
     "impact and noise, loads on bearings":
