@@ -4,10 +4,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
+from hpcclear.base.outcome import MAX_BANDS
 from hpcclear.base.remarks import remark
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
 from hpcclear.scene.goals import ObjectiveName
+
+Frequency = Annotated[float, Quantity("Hz", least=1.0, most=1e5)]
 
 
 class Numerics(Table):
@@ -60,6 +63,10 @@ class Numerics(Table):
     """Whether each sample also records measures of impact and noise. Of each joint in a revolution: number of impacts, energy
     lost in them, impulse, angle without contact; root mean squares of contact forces and of the force on the frame. A study of
     one of these enables it."""
+
+    levels: Annotated[tuple[Frequency, ...], Field(max_length=MAX_BANDS)] = ()
+    """Third-octave bands, by a frequency in each, Hz, whose force levels each sample records, with half-widths and those of the
+    measures of impact. A study of a level enables its band. A sample then takes as long as a single response."""
 
     @field_validator("method", mode="before")
     @classmethod
