@@ -298,6 +298,11 @@ class Study(Moving, Table):
                 raise invalid(
                     "is a load case", "Remove it, or name another entry", f"random.{row.name}"
                 )
+        self._check_lists(of_loads)
+        self._check_groups()
+
+    def _check_lists(self, of_loads: list[str]) -> None:
+        """Names in lists of the study's variables."""
         lists: list[tuple[str, Iterable[str]]] = [
             ("surrogate.optimisation", self.surrogate.optimisation or ()),
             *(("surrogate.models", model) for model in self.surrogate.models or ()),
@@ -331,6 +336,9 @@ class Study(Moving, Table):
                 "Name one, or remove the empty list",
                 key="surrogate.models",
             )
+
+    def _check_groups(self) -> None:
+        """The fixed parameter of response surfaces."""
         if self.sensitivity.groups:
             if self.sensitivity.parameter is None:
                 raise invalid(
