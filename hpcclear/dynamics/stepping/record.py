@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.settings import KEPT, RECORDED
+from hpcclear.dynamics.layout.settings import KEPT, RECORDED
 
 # one row: time since the start of the run and of the revolution, its number, place of the sample in the queue, contact state,
 # works, measures, then q, v, a
