@@ -62,7 +62,7 @@ FEATURES = {
     "shapes of contact, roundness":
         "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
     "impact and noise, loads on bearings":
-        "dynamics/response/impacts.py statistics/spectra.py report/noise.py report/html/loads.py study/loads.py "
+        "dynamics/evaluation/recorded/impacts.py statistics/spectra.py report/noise.py report/html/loads.py study/loads.py "
         "scene/loads.py",
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",

@@ -10,9 +10,9 @@ from running import HUNT_CROSSLEY, scene_with
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import response
+from hpcclear.dynamics.evaluation.recorded import steps as recorded
+from hpcclear.dynamics.evaluation.recorded.steps import Steps, pieces
 from hpcclear.dynamics.response import simulate
-from hpcclear.dynamics.response import steps as recorded
-from hpcclear.dynamics.response.steps import Steps, pieces
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import load_scene
 

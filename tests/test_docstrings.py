@@ -20,7 +20,7 @@ SHAPE = re.compile(
 )
 PHYSICAL = (
     "ensemble/api",
-    "dynamics/response/__init__",
+    "dynamics/response",
     "scene/points",
     "scene/table",
     "accuracy/equations",

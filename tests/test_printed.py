@@ -95,9 +95,7 @@ def test_first_order_and_total_indices_stand_apart_with_their_errors():
     )
     assert own.endswith("x0 35% ± 2%, x1 10% ± 2%, x2 5% ± 2%, x3 4% ± 2%, x4 2% ± 2%")
     assert "first-order Sobol indices" in own
-    assert whole.endswith(
-        "x0 84% ± 2%, x1 48% ± 2%, x2 26% ± 2%, x3 22% ± 2%, x4 17% ± 2%"
-    )
+    assert whole.endswith("x0 84% ± 2%, x1 48% ± 2%, x2 26% ± 2%, x3 22% ± 2%, x4 17% ± 2%")
     assert "may exceed 100 %" in whole
 
 

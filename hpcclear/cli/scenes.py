@@ -67,7 +67,7 @@ def _copy_jobs(place: Path) -> None:
     from hpcclear.results import files
 
     with resources.as_file(resources.files(__package__).joinpath("jobs")) as source:
-        kinds = ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+        kinds = ("*.toml", "linkages/*.toml", "machines/*.toml", "*.slurm", "until_done.sh")
         found = sorted(path for kind in kinds for path in source.glob(kind))
         for path in found:
             target = place / path.relative_to(source)

@@ -34,7 +34,12 @@ def content_of(scene: "Scene") -> dict[str, Any]:
     """
     content = scene.resolved()
     content.pop("study", None)
-    content["numerics"] |= {"responses": scene.responses_asked(), "objective": scene.objective.name}
+    content["numerics"] |= {
+        "responses": scene.responses_asked(),
+        "impacts": scene.impacts_asked(),
+        "levels": scene.bands(),
+        "objective": scene.objective.name,
+    }
     return content
 
 

@@ -86,8 +86,6 @@ RESPONSE: Columns = {
     "load_work": number(("time",), "J", "work done by the slider load since the start"),
     "dissipated_energy": number(("time",), "J", "energy dissipated since the start"),
     "energy_residual": number(("time",), "J", "residual of the energy balance"),
-    "peak_contact_pressure": number(("joint",), "Pa", "largest pressure at the peak contact force"),
-    "contact_half_angle": number(("joint",), "rad", "half of the angle of contact at the peak contact force"),
     **outcome(),
 }
 
@@ -96,6 +94,7 @@ SAMPLES: Columns = {
     "label": text(("sample",), "name of the design in the table that it comes from"),
     "joint": text(("joint",), "joint with clearance, O12 and O23"),
     "wave": count(("wave",), "number of a wave around a surface, by joint: cosine and sine of each order"),
+    "band": number(("band",), "Hz", "middle of the third-octave band"),
     **outcome("sample"),
 }
 

@@ -21,7 +21,7 @@ IDENTIFY: Columns = {
     "prior_upper": number(("unknown",), "m", "upper bound before the measurement", required=True),
     "posterior": number(("record", "particle", "input"), "1", "samples of the posterior, each in the unit of its input"),
     "interval": number(("record", "unknown", "end"), "m", "calibrated 95 % interval and median"),
-    "correlation": number(("record",), "1", "correlation of the first two unknowns in the posterior"),
+    "correlation": number(("record",), "1", "largest correlation of two unknowns in the posterior"),
     "explained": flag(("record",), "whether the model explains the signal"),
     "doubt": number(("record",), "1", "standard score of the fit among those of simulated signals"),
     "worst_feature": count(("record",), "number of the feature that fits least"),

@@ -5,6 +5,7 @@ from typing import Any, Self
 
 from pydantic import field_validator, model_validator
 
+from hpcclear.base.outcome import MAX_BANDS, WIDEST
 from hpcclear.scene.bending import check_scene
 from hpcclear.scene.fields import check_period, invalid, nearest
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
@@ -186,6 +187,35 @@ class ConsistentTables(SceneTables):
                 "Leave out the joints, or numerics.target_error",
                 key=key,
             )
+        return self
+
+    @model_validator(mode="after")
+    def _pressures_are_known(self) -> Self:
+        table: Any = self.effects.contact
+        geometry = None if table is None else table.declared.geometry
+        if geometry is not None and geometry.pressure is not None:
+            return self
+        for one in self._objectives():
+            if not one.asks.isdisjoint(WIDEST):
+                raise invalid(
+                    f"{one.name} needs a geometry of contact with a pressure",
+                    'Add geometry = "line" or "liner" to effects.contact', self.objective_key, one.name,
+                )  # fmt: skip
+        return self
+
+    @model_validator(mode="after")
+    def _levels_can_be_recorded(self) -> Self:
+        bands = self.bands()
+        key = "numerics.levels" if self.numerics.levels else self.objective_key
+        if bands and not self.clearance_joints():
+            raise invalid("force levels need a joint with clearance", "Remove it", key)
+        if bands and self.numerics.target_error is not None:
+            raise invalid(
+                "force levels are those of a given number of revolutions",
+                "Remove numerics.target_error, and set averaged_revolutions", key,
+            )  # fmt: skip
+        if len(bands) > MAX_BANDS:
+            raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)
         return self
 
 

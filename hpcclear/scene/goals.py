@@ -28,7 +28,7 @@ class ObjectiveName(PluginName):
         found = self.registry.get(name)
         if not isinstance(found, Objective):
             raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
-        if name not in self.registry.ours():
+        if not self.registry.is_ours(name):
             check_objective(found)
         return name
 

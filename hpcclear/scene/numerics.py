@@ -4,10 +4,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
+from hpcclear.base.outcome import MAX_BANDS
 from hpcclear.base.remarks import remark
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
 from hpcclear.scene.goals import ObjectiveName
+
+Frequency = Annotated[float, Quantity("Hz", least=1.0, most=1e5)]
 
 
 class Numerics(Table):
@@ -62,6 +65,11 @@ class Numerics(Table):
     """Whether each sample also records measures of impact and noise. For each joint and revolution: number of impacts,
     energy lost in them, impulse, angle without contact, RMS contact force. For the mechanism: RMS force on the frame.
     Enabled automatically if the study needs one of them."""
+
+    levels: Annotated[tuple[Frequency, ...], Field(max_length=MAX_BANDS)] = ()
+    """Frequencies, Hz. Each sample records the force levels of the third-octave bands that contain them, with
+    half-widths, and half-widths of the measures of impact. Enabled automatically if the study needs a level. A sample
+    then takes as long as a single response."""
 
     @field_validator("method", mode="before")
     @classmethod

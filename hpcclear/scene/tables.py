@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 from pydantic import Field, PrivateAttr
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, Objective, bound
+from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending
@@ -110,7 +110,13 @@ class SceneTables(Table):
 
     def impacts_asked(self) -> bool:
         """Whether each sample records measures of impact and noise: ``numerics.impacts``, or what the study requires of it."""
-        return self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
+        asked = self.numerics.impacts or any(one.needs_impacts for one in self._objectives())
+        return asked or bool(self.bands())
+
+    def bands(self) -> tuple[float, ...]:
+        """Middles of the third-octave bands whose levels each sample records, Hz: requested, or required by the study."""
+        asked = {band_of(one) for one in self.numerics.levels}
+        return tuple(sorted(asked | {one.band for one in self._objectives()} - {0.0}))
 
     def _objectives(self) -> list[Objective]:
         """The objective, and the further responses of the study."""

@@ -97,6 +97,7 @@ infill_rounds = 1
 infill_designs = 6
 """
 
+CHUNK = 200  # samples that a call evaluates
 FIELD = ""  # of a record that gets the objective as well
 FAILS_ABOVE = np.inf
 BIAS = 0.0
@@ -131,14 +132,15 @@ class FormulaWorker:
         self._queue += zip(index.tolist(), points, strict=True)
 
     def advance(self, seconds: float) -> np.ndarray:
-        taken = [self._queue.pop() for _ in range(min(200, len(self._queue)))]
+        taken = [self._queue.pop() for _ in range(min(CHUNK, len(self._queue)))]
         if not taken:
             return np.zeros(0, OUTCOME)
         values = np.array([point for _, point in taken])
         column = {path: np.full(len(taken), x) for path, x in numbers(self._scene).items()}
         for k, paths in enumerate(self._paths):
             column |= dict.fromkeys(paths, values[:, k])
-        records = np.concatenate([failed(index, Status.STEP_CAP) for index, _ in taken])
+        records = np.repeat(failed(0, Status.STEP_CAP), len(taken))
+        records["sample"] = [index for index, _ in taken]
         fine = column["mechanism.slider.mass"] <= FAILS_ABOVE
         for name in ("objective", "objective_spread"):
             records[name][fine] = objective(column)[fine] if name == "objective" else 0.0

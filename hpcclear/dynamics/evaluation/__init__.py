@@ -7,6 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Records
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
+from hpcclear.dynamics.evaluation.recorded.sounding import SoundingEvaluator
 from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
@@ -14,12 +15,14 @@ from hpcclear.scene.points import Points
 
 def evaluator_of(
     scene: Scene, columns: Points, lanes: int = DEFAULT_LANES, perturbations: Sequence[int] = ()
-) -> Evaluator | SteadyEvaluator:
-    """The steady mean to a named error, or the segment of revolutions that the scene names; arguments and errors are those of
-    either.
+) -> Evaluator | SteadyEvaluator | SoundingEvaluator:
+    """The steady mean to a named error, or the segment of revolutions that the scene names, with force levels where it requires
+    them; arguments and errors are those of these.
     """
     if scene.numerics.target_error is not None and scene.clearance_joints():
         return SteadyEvaluator(scene, columns, lanes)
+    if scene.bands():
+        return SoundingEvaluator(scene, columns, lanes, perturbations)
     return Evaluator(scene, columns, lanes, perturbations)
 
 

@@ -12,10 +12,11 @@ from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
 from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.joint_laws import has_pressure, widest_contact
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.planar import energy
-from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.parameters import Numbers, parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
@@ -144,7 +145,9 @@ class Evaluator:
                 Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
             )
         self._problem = problem
+        self._pressed = has_pressure(scene)
         self._starts: dict[int, float] = {}  # energy of what runs, J
+        self._values: dict[int, Array] = {}  # of what runs, for its pressures
         self._partial: dict[int, Records] = {}
 
     @property
@@ -156,11 +159,14 @@ class Evaluator:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
         made = Points(self._columns.names, points, self._columns.paths)
         par = parameters(self.scene, made)
-        self.queue(index, par, start_states(self.scene, par, made))
+        self.queue(index, par, start_states(self.scene, par, made), points)
 
-    def queue(self, index: Integers, par: Array, start: Start) -> None:
-        """Queue samples by their indices (m,), kernel parameters (m, PARAMETERS) and m starts."""
+    def queue(self, index: Integers, par: Array, start: Start, points: Array | None = None) -> None:
+        """Queue samples by their indices (m,), kernel parameters (m, PARAMETERS), m starts, and their values (m, d) if any."""
         labels = np.asarray(index, np.int64) * self._copies
+        if self._pressed and points is not None:
+            for k in range(self._copies):
+                self._values.update(zip((labels + k).tolist(), points, strict=True))
         if self._copies > 1:
             par, start, labels = with_copies(
                 par, start, labels, self.scene.numerics.rtol, self._perturbations
@@ -179,6 +185,10 @@ class Evaluator:
         records = outcome_records(
             labels, outcome, par, responses, bool(effects.wear), self.scene.objective
         )
+        if self._pressed:
+            nothing = np.zeros(len(self._columns.names))
+            values = [self._values.pop(label, nothing) for label in labels.tolist()]
+            with_pressures(self.scene, self._columns, values, records)
         if self._starts and len(labels):
             before = np.array([self._starts.pop(label) for label in labels.tolist()])
             off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)
@@ -197,6 +207,18 @@ class Evaluator:
             if (group["flags"] & _ARRIVED).all():
                 done.append(joined(sample, self._partial.pop(sample), self._objective))
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
+
+
+def with_pressures(
+    scene: Scene, columns: Points, values: Sequence[Array], records: Records
+) -> Records:
+    """Records (m,) with pressures and angles of contact at their peak forces filled in; `values`: m rows (d,) of `columns`."""
+    points = np.reshape(values, (len(records), len(columns.names)))
+    made = Points(columns.names, points, columns.paths)
+    forces = records["peak_contact_force"]
+    for name, found in widest_contact(scene, Numbers(scene, made), forces).items():
+        records[name] = found
+    return records
 
 
 def responses_reported(problem: Problem) -> tuple[str, ...]:

@@ -32,8 +32,8 @@ STRICT = 1e-6
 """Relative tolerance of explicit steps that is never made stricter at the edge of stability."""
 
 # ---- counters shared by all lanes
-(NEXT_SLOT, SLOTS, FINISHED, RECORDED) = range(4)
-COUNTERS = 4
+(NEXT_SLOT, SLOTS, FINISHED, RECORDED, KEPT) = range(5)
+COUNTERS = 5
 
 # ---- numbers by which a stepper asks for what is compiled apart from it
 (

@@ -12,6 +12,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
     COUNTERS,
     FINISHED,
+    KEPT,
     MOTION,
     MOTION_OF_EIGHT,
     NEXT_SLOT,
@@ -50,10 +51,12 @@ class Lanes:
     width : int
         Lanes; 1 for a single response.
     record : numpy.ndarray, optional
-        Buffer (rows, columns) for every accepted step of the first sample of the queue, which runs in lane 0.
+        Buffer (rows, columns) for every accepted step of the first samples of the queue, which run in the first lanes.
     observed : Effects, optional
-        With which the same motion is run a second time while that sample is recorded, for its works and what `observe` returns.
-        No other number depends on it.
+        With which the same motion is run a second time while these samples are recorded, for their works and what `observe`
+        returns. No other number depends on it.
+    kept : int
+        How many samples are recorded.
 
     Raises
     ------
@@ -67,10 +70,12 @@ class Lanes:
         width: int,
         record: Array | None = None,
         observed: at.Effects | None = None,
+        kept: int = 1,
     ) -> None:
         n = problem.coordinates
         self.problem = problem
         self.width = width
+        self._kept = kept
         self.record = np.zeros((0, columns(n))) if record is None else record
         bank = aligned((at.STAGES + problem.tableau.stages * at.MAX_COORDINATES) * width)
         bank[at.WORK * width : at.STAGES * width] = (
@@ -184,6 +189,7 @@ class Lanes:
         )
         self.counters[:] = 0
         self.counters[SLOTS] = count
+        self.counters[KEPT] = self._kept
 
     @property
     def running(self) -> Booleans:
@@ -262,16 +268,17 @@ class Lanes:
     @property
     def record_full(self) -> bool:
         """Whether the record must be emptied before the stepper can go on."""
-        return 0 < len(self.record) == int(self.counters[RECORDED])
+        return 0 < len(self.record) < int(self.counters[RECORDED]) + self._kept
 
     def take_record(self) -> Array:
         """The recorded rows since the last call (a copy); the record is empty afterwards.
 
-        Once the recorded sample is over, those that go on are no longer observed.
+        Once the recorded samples are over, those that go on are no longer observed.
         """
         rows = self.record[: int(self.counters[RECORDED])].copy()
         self.counters[RECORDED] = 0
-        if not self.running[0] or self._block.book[at.SAMPLE * self.width] != 0.0:
+        places = self._block.book[at.SAMPLE * self.width : (at.SAMPLE + 1) * self.width]
+        if not (self.running & (places < self._kept)).any():
             self._method.numbers[[OBSERVING, OBSERVING_EIGHT]] = 0
         return rows
 

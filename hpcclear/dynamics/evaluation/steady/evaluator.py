@@ -13,6 +13,7 @@ from hpcclear.dynamics.evaluation.evaluator import (
     DEFAULT_LANES,
     outcome_records,
     responses_reported,
+    with_pressures,
 )
 from hpcclear.dynamics.evaluation.steady.copies import scales
 from hpcclear.dynamics.evaluation.steady.effort import Mean, Sample, Segment
@@ -44,8 +45,11 @@ def _to_target(scene: Scene) -> Procedure:
 class _Ask:
     """A design's procedure, the segment it waits for, and what of that has come in."""
 
-    def __init__(self, sample: int, par: Array, asking: Generator[Segment, Outcome, Mean]) -> None:
+    def __init__(
+        self, sample: int, values: Array, par: Array, asking: Generator[Segment, Outcome, Mean]
+    ) -> None:
         self.sample = sample
+        self.values = values
         self.par = par
         self.asking = asking
         self.segment = next(asking)
@@ -149,7 +153,7 @@ class SteadyEvaluator:
             design = Sample(
                 par[k : k + 1], start[k : k + 1], self._scale, self._latched, self._free
             )
-            self._asks[sample] = _Ask(sample, design.par, self._procedure(design))
+            self._asks[sample] = _Ask(sample, points[k], design.par, self._procedure(design))
         self._queue([self._asks[sample] for sample in numbers])
 
     def _queue(self, asks: "list[_Ask]") -> None:
@@ -188,9 +192,10 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                yield record_of(
+                record = record_of(
                     sample, ask.par, mean, self._responses, self._worn, self.scene.objective
                 )
+                yield with_pressures(self.scene, self._columns, [ask.values], record)
             elif ask.asks_anew:
                 going.append(ask)
         self._queue(going)

@@ -1,18 +1,16 @@
-"""Measures of impact and noise of one response: by revolution, means with confidence intervals, spectra of its forces."""
+"""Measures of impact and noise of one response: by revolution, and means with confidence intervals."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.response.steps import Steps
+from hpcclear.dynamics.evaluation.recorded.steps import Steps
 from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.scene import Scene
 from hpcclear.statistics import spectra
-
-FEWEST_INSTANTS = 64
-"""Instants a revolution from which on there are spectra."""
 
 
 def _columns(first: int, size: int = at.MAX_JOINTS) -> slice:
@@ -74,13 +72,15 @@ def by_revolution(
     return found
 
 
-def measured(
-    periods: Array, integrals: Array, cycle: float, joints: int, *, rigid: bool
+def measured_of(
+    scene: Scene, problem: Problem, periods: Array, integrals: Array
 ) -> dict[str, Array]:
     """What `by_revolution` gives as the file has it: of each revolution (r, joints), of all of them (joints,), and half-widths.
 
-    Arguments as of `by_revolution`.
+    Lengths (r,) and integrals (r, measures) of revolutions.
     """
+    cycle, joints = abs(problem.cycle) or at.TURN, len(scene.joint_labels)
+    rigid = not scene.modes
     each = by_revolution(periods, integrals, cycle, joints, rigid=rigid)
     together = by_revolution(
         periods.mean(keepdims=True),
@@ -95,42 +95,3 @@ def measured(
         result[name] = together[name][0]
         result[f"{name}_limit"] = spectra.half_width(values)
     return result
-
-
-def spectral(series: Mapping[str, Array], periods: Array, count: int) -> dict[str, Array]:
-    """Order spectra and third-octave levels of the forces of the last revolutions of a response, with the bands' middles.
-
-    Series of `contact_force` (t, joints) and, where it is known, `frame_force_x` and `frame_force_y` (t,), that end with an
-    instant at the end of the last revolution; `periods` (r,) of the revolutions; `count`: instants a revolution. Nothing of too
-    few instants.
-    """
-    revolutions = len(periods)
-    if count < FEWEST_INSTANTS or not revolutions:
-        return {}
-
-    def squares(name: str) -> Array:
-        values = series[name][-1 - revolutions * count :]
-        starts = count * np.arange(revolutions)[:, None]
-        values = values.reshape(len(values), -1)[starts + np.arange(count + 1)]
-        return np.stack(
-            [spectra.orders(values[:, :, j])[:, :most] for j in range(values.shape[2])], axis=-1
-        )
-
-    most = spectra.highest(count)
-    forces = {"contact_force": squares("contact_force")}
-    if "frame_force_x" in series:
-        forces["frame_force"] = (squares("frame_force_x") + squares("frame_force_y"))[:, :, 0]
-    centres = spectra.band_centres(1.0 / periods.max(), most / periods.max())
-    found: dict[str, Array] = {"order": np.arange(1.0, most + 1), "band": centres}
-    for name, one in forces.items():
-        found[f"{name}_orders"] = np.sqrt(one.mean(axis=0))
-        flat = one.reshape(revolutions, most, -1)
-        bands = np.stack(
-            [spectra.in_bands(flat[..., j], periods, centres) for j in range(flat.shape[2])], -1
-        ).reshape(revolutions, len(centres), *one.shape[2:])
-        ends = ("", "_lower", "_upper")
-        found |= {
-            f"{name}_level{end}": level
-            for end, level in zip(ends, spectra.levels(bands), strict=True)
-        }
-    return found
