@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from rich import box
 from rich.table import Table
 
@@ -19,10 +20,17 @@ def preview(plan: Plan, ranks: int) -> str:
     simulations = plan.simulations
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
     name = f"first look, {name}" if plan.first else name
+    doubts = [f"± {_percent(row.spread)} between designs"] if np.isfinite(row.spread) else []
+    doubts += ["probably less: a short batch leaves lanes idle"] if plan.first else []
     return (
         f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take "
         f"{duration(plan.wall_seconds(row, simulations, ranks))} on {counted(ranks)}"
+        + (f" ({'; '.join(doubts)})" if doubts else "")
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
 
 
 def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
@@ -47,7 +55,8 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
         made.add_row(
             "as in file" if one.error is None else f"{one.error:.0e}",
             one.settings(),
-            f"{1e3 * one.seconds:.3g}",
+            f"{1e3 * one.seconds:.3g}"
+            + (f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""),
             f"{total:.3g}",
             f"{total / 3600:.2g}",
             duration(plan.wall_seconds(one, simulations, ranks)),

@@ -18,7 +18,7 @@ from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session, samples_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
-from hpcclear.results.checkpoint import check_key
+from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 

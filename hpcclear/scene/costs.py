@@ -38,7 +38,7 @@ class Cost(Table):
     """Cost of each option of the variable, in their order."""
 
     @classmethod
-    def in_si(cls, given: Any, unit: str, fits: Sequence[Any] = ()) -> Any:
+    def in_si(cls, given: object, unit: str, fits: Sequence[object] = ()) -> Any:
         """A cost as a file has it, as the entries of this table: a list for all options, for fits a table by IT grades; errors
         for validators."""
         if isinstance(given, (list, tuple)):
@@ -90,7 +90,7 @@ class Cost(Table):
         return self.fixed + self.cost * np.exp((self.at - values) / self.scale)
 
 
-def _converted(given: Sequence[Any]) -> list[float]:
+def _converted(given: Sequence[object]) -> list[float]:
     found = []
     for k, one in enumerate(given):
         try:
@@ -101,7 +101,7 @@ def _converted(given: Sequence[Any]) -> list[float]:
     return found
 
 
-def _by_grades(given: Mapping[str, Any], fits: Sequence[Any]) -> list[float]:
+def _by_grades(given: Mapping[str, object], fits: Sequence[object]) -> list[float]:
     """Costs of fits: that of the hole's grade and that of the shaft's."""
     found = []
     for fit in fits:

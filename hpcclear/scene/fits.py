@@ -40,7 +40,7 @@ class Tolerance(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _in_metres(cls, data: Any) -> Any:
+    def _in_metres(cls, data: object) -> Any:
         if not isinstance(data, Mapping) or "range" not in data:
             return data
         ends = data["range"]
@@ -108,7 +108,7 @@ def law_of(entries: Mapping[str, Any]) -> tolerances.Clearance:
     return law
 
 
-def with_clearance(joint: Any) -> Any:
+def with_clearance(joint: object) -> Any:
     """Entries of a joint in the file with `clearance` and `bearing_radius` in place of a fit or a diametral clearance."""
     if not isinstance(joint, Mapping):
         return joint

@@ -22,7 +22,7 @@ Level = Annotated[float, Quantity("", above=0, below=1)]
 class ObjectiveName(PluginName):
     """An entry that names an objective."""
 
-    def convert(self, value: Any) -> str:
+    def convert(self, value: object) -> str:
         """The name of one that is there and without fault; raises PydanticCustomError."""
         name = super().convert(value)
         found = self.registry.get(name)
@@ -146,7 +146,7 @@ class Constraint(Goal):
 MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
-def in_si(case: Any, objective: object, key: str) -> Any:
+def in_si(case: object, objective: object, key: str) -> Any:
     """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
     Raises
@@ -167,7 +167,7 @@ def in_si(case: Any, objective: object, key: str) -> Any:
     return made
 
 
-def _goal(row: Any, unit: str, key: str) -> Any:
+def _goal(row: object, unit: str, key: str) -> Any:
     if isinstance(row, str):
         return {"statistic": row}
     if not isinstance(row, Mapping):

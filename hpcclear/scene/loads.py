@@ -26,7 +26,7 @@ class Law(Converted):
     least: float | None = None
     """Of the first numbers."""
 
-    def convert(self, value: Any) -> Any:
+    def convert(self, value: object) -> Any:
         """A number, or a tuple of pairs in SI; raises PydanticCustomError."""
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)

@@ -73,7 +73,7 @@ class Numerics(Table):
 
     @field_validator("method", mode="before")
     @classmethod
-    def _method_that_was(cls, value: Any) -> Any:
+    def _method_that_was(cls, value: object) -> Any:
         """One version long: collocation has gone, and what stands in its place is as tight."""
         if value != "lobatto":
             return value

@@ -28,6 +28,7 @@ from hpcclear.scene.mechanism import check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound
 from hpcclear.scene.rubbing import Rubbing, RubbingPin
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.wear import Wear
 
 Rows = NamedRows()
@@ -214,7 +215,8 @@ class PlanarFixed(Table):
 
 
 PlanarJoint = Annotated[
-    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarFixed, Field(discriminator="kind")
+    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarSlot | PlanarFixed,
+    Field(discriminator="kind"),
 ]
 
 
@@ -270,7 +272,7 @@ class Planar(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _alike(cls, data: Any) -> Any:
+    def _alike(cls, data: object) -> Any:
         """Entries of a body or joint that is ``like`` another, written out; tables among them, such as materials, take over
         what they do not say, points are a body's own."""
         if not isinstance(data, Mapping):

@@ -176,7 +176,7 @@ class RandomInput(NamedInput):
         form = form_of(self.distribution, self.parameters or {})
         return form.law(self.model_dump(exclude_none=True))
 
-    def changed(self, entries: Mapping[str, Any]) -> quantiles.Quantiles:
+    def changed(self, entries: Mapping[str, object]) -> quantiles.Quantiles:
         """Its quantile function with other entries, such as {"half_width": 1e-5, "bore.cp": 1.3}; errors for validators."""
         own = self.model_dump(exclude_none=True)
         for key, value in entries.items():

@@ -175,7 +175,7 @@ class MomentAccuracy(Table):
 MOMENTS = ("mean", "deviation")
 
 
-def of_both(entry: Any) -> Any:
+def of_both(entry: object) -> Any:
     """A number as the accuracy of mean and standard deviation; of a table with one of them, the other is the same.
 
     Raises

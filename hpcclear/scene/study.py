@@ -71,7 +71,7 @@ class Study(Moving, Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, data: Any) -> Any:
+    def _fill_in(cls, data: object) -> Any:
         """Cases as plain lists of names, random inputs with the paths of the variable of that name,
         and the sensitivity's parameter."""
         if not isinstance(data, Mapping):
@@ -298,6 +298,11 @@ class Study(Moving, Table):
                 raise invalid(
                     "is a load case", "Remove it, or name another entry", f"random.{row.name}"
                 )
+        self._check_lists(of_loads)
+        self._check_groups()
+
+    def _check_lists(self, of_loads: list[str]) -> None:
+        """Names in lists of the study's variables."""
         lists: list[tuple[str, Iterable[str]]] = [
             ("surrogate.optimisation", self.surrogate.optimisation or ()),
             *(("surrogate.models", model) for model in self.surrogate.models or ()),
@@ -331,6 +336,9 @@ class Study(Moving, Table):
                 "Name one, or remove the empty list",
                 key="surrogate.models",
             )
+
+    def _check_groups(self) -> None:
+        """The fixed parameter of response surfaces."""
         if self.sensitivity.groups:
             if self.sensitivity.parameter is None:
                 raise invalid(
@@ -466,7 +474,7 @@ class Study(Moving, Table):
         )
 
 
-def _with_paths(row: Any, variable: Any) -> Any:
+def _with_paths(row: object, variable: object) -> Any:
     """A random input with the path or paths of the variable of the same name, unless it has its
     own."""
     if not isinstance(row, Mapping) or not isinstance(variable, Mapping):
@@ -476,7 +484,7 @@ def _with_paths(row: Any, variable: Any) -> Any:
     return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
 
 
-def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
+def _with_unit(row: object, random: Mapping[str, object]) -> Any:
     """A variable that drives a random input with an entry that has the same unit."""
     if not isinstance(row, Mapping) or "like" in row:
         return row
@@ -490,7 +498,7 @@ def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
     return row if own.get("relative") or not paths else {**row, "like": paths[0]}
 
 
-def _only_clearance(variables: Mapping[str, Any]) -> str | None:
+def _only_clearance(variables: Mapping[str, object]) -> str | None:
     """Name of the only study variable that drives clearances; None if there is none or another."""
     found = []
     for name, row in variables.items():

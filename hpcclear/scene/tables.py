@@ -22,16 +22,17 @@ from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.study import Study
 from hpcclear.scene.wear import Lives
 
-Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide
+Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide | PlanarSlot
 """Tables of joints that may have clearance."""
 
 
 def _is_loose(joint: Any) -> bool:
     """Whether a joint of a linkage has clearance."""
-    slides = isinstance(joint, PlanarSlide)
+    slides = isinstance(joint, (PlanarSlide, PlanarSlot))
     return joint.clearance is not None if slides else isinstance(joint, PlanarClearance)
 
 
@@ -211,7 +212,8 @@ class SceneTables(Table):
         return tuple(joint.name for joint in self.linkage.joints if _is_loose(joint))
 
     def contact_labels(self) -> tuple[str, ...]:
-        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners."""
+        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a
+        slot's walls."""
         return self._contacts_in(self.clearance_joints())
 
     def _contacts_in(self, joints: tuple[str, ...]) -> tuple[str, ...]:
@@ -227,7 +229,7 @@ class SceneTables(Table):
         return tuple(n for n in self.clearance_joints() if not self.clearance_joint(n).corners)
 
     def guides(self) -> tuple[str, ...]:
-        """Names of the guides with clearance."""
+        """Names of the guides and slots with clearance."""
         return tuple(n for n in self.clearance_joints() if self.clearance_joint(n).corners)
 
     @property
@@ -349,7 +351,7 @@ class SceneTables(Table):
         return self._known_numbers
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]

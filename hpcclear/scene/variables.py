@@ -47,7 +47,7 @@ class Variable(NamedInput):
     """Cost of a design as a function of this value, for the statistic "cost" of a case."""
 
     @classmethod
-    def _without_numbers(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, Any]:
         if "catalogue" in data and "path" not in data:
             return {**data, "paths": texts_in(data.get("paths"))}
         given = data.get("paths", data.get("path", ()))

@@ -1,4 +1,4 @@
-"""What the search minimises in one case: mean and standard deviation of a surrogate over the random inputs, or other goals."""
+"""What the search minimises in one case: mean and standard deviation of a surrogate over random inputs, or other objectives."""
 
 import contextlib
 import itertools

@@ -1,7 +1,6 @@
 """The sections of the page on where results come from: effects, time of the ranks, how to do it again."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -38,7 +37,7 @@ def effects(content: Content) -> list[object] | None:
     return [*first, folded("The whole scene file", [preformatted(scene)])]
 
 
-def _flat(value: Any, path: str) -> Iterator[list[object]]:
+def _flat(value: object, path: str) -> Iterator[list[object]]:
     """Entries of nested tables, a row each."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
@@ -47,7 +46,7 @@ def _flat(value: Any, path: str) -> Iterator[list[object]]:
         yield [path, f"{value} {_unit(path, value)}".rstrip()]
 
 
-def _unit(path: str, value: Any) -> str:
+def _unit(path: str, value: object) -> str:
     """SI unit of a plain number of a scene, "" where its text has one or it has none."""
     plain = isinstance(value, int | float) and not isinstance(value, bool)
     unit = quantities()[path].unit if plain and path in quantities() else ""

@@ -3,6 +3,7 @@
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -107,7 +108,8 @@ def enter_levels(
     for name in LEVELS:
         if name in known:
             found = np.asarray(known[name])
-            record[name][(0, *map(slice, found.shape))] = found
+            place: Any = (0, *map(slice, found.shape))
+            record[name][place] = found
 
 
 def instants_of(scene: Scene) -> int:

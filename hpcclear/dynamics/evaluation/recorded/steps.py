@@ -188,7 +188,7 @@ class Recording:
         done = done[np.argsort(done["sample"], kind="stable")]
         for k, scene in enumerate(self._beside, 1):  # pressures by numbers of their own
             if has_pressure(scene):
-                with_pressures(scene, ITSELF, ITSELF.values, done[k : k + 1])
+                with_pressures(scene, ITSELF, [*ITSELF.values], done[k : k + 1])
         return done
 
 
