@@ -149,7 +149,7 @@ def test_sentences_of_a_page_are_short(name):
 NUMBER = re.compile(r"[+-]?\d[\d ., ]*(e[+-]?\d+)?( (to|and) [+-]?[\d.]+(e[+-]?\d+)?)?")
 
 UNITS = re.compile(
-    r"\((m|s|ms|h|N|mm|kg|Pa|deg|dB)\b|, s;|seconds|dimensionless|\bunit\b|relative|ratio|divided by|times|"
+    r"\((m|s|ms|h|N|mm|kg|Pa|deg)\b|\bdB\b|, s;|seconds|dimensionless|\bunit\b|relative|ratio|divided by|times|"
     r"count|lines|number|errors?\b|share|exit code|efficiency|speed-up|impacts|intervals|instructions|version|Python|factor",
     re.I,
 )

@@ -50,7 +50,7 @@ def _records(content: xr.Dataset) -> list[Line]:
     share = content["coverage"].to_numpy()
     shown = " and ".join(f"{one:.0%}" for one in share)
     factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
-    text = f"{shown} of simulated machines lie in their 95 % interval; widened by {factor}"
+    text = f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {factor}"
     return [*found, Line("calibration", text)]
 
 

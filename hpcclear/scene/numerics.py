@@ -67,8 +67,9 @@ class Numerics(Table):
     Enabled automatically if the study needs one of them."""
 
     levels: Annotated[tuple[Frequency, ...], Field(max_length=MAX_BANDS)] = ()
-    """Third-octave bands, by a frequency in each, Hz, whose force levels each sample records, with half-widths and those of the
-    measures of impact. A study of a level enables its band. A sample then takes as long as a single response."""
+    """Frequencies, Hz. Each sample records the force levels of the third-octave bands that contain them, with
+    half-widths, and half-widths of the measures of impact. Enabled automatically if the study needs a level. A sample
+    then takes as long as a single response."""
 
     @field_validator("method", mode="before")
     @classmethod

@@ -22,21 +22,21 @@ class PlanarSlot(OfContacts, Table):
     name: str
     kind: Literal["slot"]
     point: str
-    """``body.point`` that is the pin's centre."""
+    """``body.point`` at the centre of the pin."""
     line: str
     """``body.point``, or ``ground.point``, on the line midway between the walls."""
     angle: Angle = 0.0
-    """Direction of the line in its carrier's axes, rad."""
+    """Direction of the line in the axes of the body that carries it, rad."""
     clearance: PositiveLength | None = None
-    """Gap on either side of a pin in the middle of the slot, m; left out, there is none."""
+    """Gap on either side of a pin in the middle of the slot, m. Without it the joint is ideal."""
     pin_radius: PositiveLength | None = None
-    """Of the pin, m; with clearance, stiffness follows from it."""
+    """Radius of the pin, m. It determines the contact stiffness."""
     width: PositiveLength | None = None
-    """Of the slot's walls, at right angles to the plane, m; line contact needs it."""
+    """Width of the slot's walls at right angles to the plane, m. Line contact requires it."""
     materials: Materials | None = None
-    """Of slot (bearing) and pin (journal), with clearance."""
+    """Materials of slot (bearing) and pin (journal), with clearance."""
     start_offset: Length | None = None
-    """How far the pin's centre is to the left of the line at the start, m; in the middle unless said otherwise."""
+    """Distance of the pin's centre from the line at the start, positive to the left, m; default 0."""
 
     @model_validator(mode="after")
     def _with_all(self) -> "PlanarSlot":
