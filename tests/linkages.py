@@ -14,9 +14,11 @@ from hpcclear.dynamics.linkage.parts import (
     GuideFriction,
     Harmonic,
     LooseSlide,
+    LooseSlot,
     PinFriction,
     Revolute,
     Slide,
+    Slot,
     Spring,
     Torque,
     TorqueDrive,
@@ -142,6 +144,16 @@ def quick_return(*open_pins, friction=None):
     )
     loads = (Spring("return_spring", "lever.top", "ground.o", 300.0, 0.1, 2.0),)
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.0, -0.1)}, loads)
+
+
+def slotted_lever(*open_pins, clearance=None):
+    """A crank pin in the slot of a rocking lever."""
+    base = quick_return(*open_pins)
+    bodies = tuple(body for body in base.bodies if body.name != "block")
+    joints = [joint for joint in base.joints if joint.name in ("o1", "o3")]
+    places = ("slot", "crank.b", "lever.a", 0.1)
+    slot = Slot(*places) if clearance is None else LooseSlot(*places, clearance, 0.006, 2e9)
+    return Mechanism(bodies, (*joints, slot), base.drives, base.ground, base.loads)
 
 
 def three_rrr(*open_pins):
@@ -325,5 +337,9 @@ LINKAGES = {
     "turning slide, rubbing": rubbing(turning_slide(friction=RUB)),
     "3-RRR, rubbing": rubbing(three_rrr("tip0", "tip1", "tip2")),
     "held frame, rubbing": rubbing(held_frame("o2")),
+    "slotted lever": rubbing(slotted_lever()),
+    "slotted lever, torque": rubbing(replace(slotted_lever(), drives=(ENGINE,))),
+    "slotted lever, loose": rubbing(slotted_lever(clearance=2e-4)),
+    "slotted lever, all loose": replace(slotted_lever("o1", "o3", clearance=2e-4), drives=(ENGINE,)),
     "turning slide, loose": loosened(turning_slide("o2"), "arm"),
 }  # fmt: skip

@@ -214,6 +214,7 @@ def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
     assert "fit = 40 H7/" in values or "fit = 40 H6/" in values
 
 
+@pytest.mark.nightly
 def test_the_same_bytes_on_two_ranks(results, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(all_kinds().text)

@@ -72,6 +72,7 @@ def restitution(damping):
     )  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_impacts_converge_to_those_of_rigid_bodies(published, monkeypatch):
     """A slider tilted by 5 mrad, so that corners hit one by one: corners and crank angles, with 1, 10, 100 times the stiffness,
     and the first ten with 1e5 times.

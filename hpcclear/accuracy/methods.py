@@ -54,7 +54,7 @@ class Method:
     """Convert a tolerance level into the setting of the method: the same, or a step over the period."""
 
 
-def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
+def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Scene:
     """The scene for one revolution from the start, all of it averaged."""
     changes: dict[str, Any] = {
         "transient_revolutions": 0,

@@ -211,4 +211,6 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
 
 def _all(count: int, each: float) -> str:
     """Number of samples and their time on one core; `each`: s."""
-    return f"{count} samples, {duration(count * each)} of one core"
+    seconds = count * each
+    shown = "less than 1 s" if seconds < 1.0 else duration(seconds)
+    return f"{count} samples, {shown} of one core"

@@ -43,7 +43,9 @@ if TYPE_CHECKING:
     "--date", multiple=True, metavar="YYYY-MM-DD", help="Date of each signal, in their order."
 )
 @click.option(
-    "--limit", metavar="VALUE", help="Value of the unknowns whose time of reaching is printed."
+    "--limit",
+    metavar="VALUE",
+    help="Value of the unknowns; the time until it is reached is printed.",
 )
 @click.option("--band", metavar="LO:HI", help="Frequencies that the sensor passes, in Hz.")
 @click.option(

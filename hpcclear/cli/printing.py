@@ -125,9 +125,10 @@ def describe_study(place: Path) -> None:
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
+    level = float(found["verification"].attrs.get("confidence", 0.95))
     for case, designs, rows in beside_original(found["verification"]):
         beside = Table(
-            title=f"Case {case}: simulated designs against the baseline",
+            title=f"Case {case}: simulated designs against the baseline (± {level:.0%} half-width)",
             title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
         )  # fmt: skip
         beside.add_column(
@@ -163,7 +164,7 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
     if len(good):
         words, unit = objective_of(samples)
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
-        rows += [("f", words), ("", f"{low} to {high}, median {middle}")]
+        rows += [("f", words), ("range of f", f"{low} to {high}, median {middle}")]
         rows.append(("half-width of f", _half_widths(samples)))
         in_time = samples["objective_spread"].to_numpy()[status == Status.OK] / good
     if len(good) and np.isfinite(in_time).any():

@@ -45,9 +45,7 @@ def _impact_table(rows: list[list[str]]) -> Table:
     """What a revolution has of impacts, a row for each joint."""
     made = Table(title=noise.TITLE, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     for header in noise.HEADER:
-        made.add_column(
-            header, justify="left" if header == "joint" else "right", no_wrap=True, overflow="fold"
-        )
+        made.add_column(header, justify="left" if header == "joint" else "right", overflow="fold")
     for row in rows:
         made.add_row(*map(fitting, row))
     return made

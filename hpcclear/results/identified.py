@@ -29,7 +29,7 @@ IDENTIFY: Columns = {
     "predicted": number(("record", "feature"), "1", "predictive mean of the feature"),
     "predicted_deviation": number(("record", "feature"), "1", "predictive standard deviation of the feature"),
     "elapsed": number(("record",), "s", "time since the first record"),
-    "widening": number(("unknown",), "1", "factor of the intervals' width that simulated machines called for"),
+    "widening": number(("unknown",), "1", "factor by which all intervals were widened, from simulated machines"),
     "coverage": number(("unknown",), "1", "share of simulated machines in their 95 % interval before widening"),
     "rate": number(("end", "unknown"), "m/s", "growth per second"),
     "time_to_limit": number(("end", "unknown"), "s", "time from the last record to the limit; infinite if not reached"),

@@ -41,15 +41,15 @@ class FileCurve(Table):
     """A curve from a file: CSV or Excel workbook, in place of a table ``[[angle, value], ...]``."""
 
     file: str
-    """Relative to the scene file; "book.xlsx#Sheet" for one of several sheets."""
+    """Path relative to the scene file; "book.xlsx#Sheet" for one of several sheets."""
     angle: str | None = None
-    """Unit or heading of the crank angles; left out, what the headings say."""
+    """Unit or heading of the crank angles. Without it the headings of the file are used."""
     time: str | None = None
-    """Of what goes by the time: unit or heading of the times."""
+    """For tables over time: unit or heading of the times."""
     speed: str | None = None
-    """Of a run-up: unit or heading of the speeds."""
+    """For a run-up: unit or heading of the speeds."""
     pressure: str | None = None
-    """Unit or heading of pressures, which push on a piston of that `bore`."""
+    """Unit or heading of pressures on a piston of diameter `bore`."""
     force: str | None = None
     """Unit or heading of forces."""
     torque: str | None = None
@@ -57,14 +57,15 @@ class FileCurve(Table):
     bore: PositiveLength | None = None
     """Diameter of the piston, m."""
     area: Annotated[float, Quantity("m**2", above=0)] | None = None
-    """In place of `bore`: the area that the pressure pushes on, m2."""
+    """Instead of `bore`: area on which the pressure acts, m2."""
     ambient: Annotated[float, Quantity("Pa", least=0)] | None = None
-    """Pressure on the other side of the piston, Pa, needed with pressures: 0 where those of the file are gauge pressures."""
+    """Pressure on the other side of the piston, Pa. Required with pressures; 0 if the file contains gauge pressures."""
     pushes: Literal["+x", "-x"] | None = None
-    """Of the load on a slider: where the pressure pushes it; unless said otherwise "-x", away from a cylinder head beyond its
-    outer dead centre."""
+    """Direction in which the pressure pushes a slider; default "-x", away from a cylinder head beyond the outer dead
+    centre."""
     zero: Annotated[float, Quantity("rad")] = 0.0
-    """Crank angle of the scene at which the file has 0, rad: that of the dead centre it counts from."""
+    """Crank angle of the scene at which the angle of the file is 0, rad: that of the dead centre from which the file
+    counts."""
     clockwise: bool = False
     """Whether the angles of the file count clockwise."""
 

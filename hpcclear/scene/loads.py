@@ -26,7 +26,7 @@ class Law(Converted):
     least: float | None = None
     """Of the first numbers."""
 
-    def convert(self, value: Any) -> Any:
+    def convert(self, value: object) -> Any:
         """A number, or a tuple of pairs in SI; raises PydanticCustomError."""
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
@@ -73,21 +73,21 @@ class TorsionSpringLoad(Table):
     name: str
     kind: Literal["torsion-spring"]
     body: str
-    """That it acts on."""
+    """Body on which it acts."""
     other: str | None = None
-    """Against which body; left out, against the ground."""
+    """Second body, on which the reaction acts; default: the ground."""
     stiffness: Annotated[float, Quantity("N*m/rad", least=0)] = 0.0
-    """N m/rad."""
+    """Stiffness, N m/rad."""
     angle: Angle = 0.0
-    """At which it exerts no moment, rad: from the x axis, or from the other body."""
+    """Angle at which it exerts no torque, rad: from the x axis, or relative to the other body."""
     damping: Annotated[float, Quantity("N*m*s/rad", least=0)] = 0.0
-    """N m s/rad."""
+    """Damping, N m s/rad."""
     lower: Angle | None = None
-    """Stop: below this angle `stop_stiffness` acts besides, rad."""
+    """Lower stop, rad: below this angle `stop_stiffness` acts in addition."""
     upper: Angle | None = None
-    """Stop: above this angle `stop_stiffness` acts besides, rad."""
+    """Upper stop, rad: above this angle `stop_stiffness` acts in addition."""
     stop_stiffness: Annotated[float, Quantity("N*m/rad", least=0)] = 0.0
-    """Of the stops, N m/rad."""
+    """Stiffness of the stops, N m/rad."""
 
     @model_validator(mode="after")
     def _stops(self) -> "TorsionSpringLoad":
@@ -114,19 +114,19 @@ class CylinderLoad(Table):
     second: str
     """``body.point``, or ``ground.point``."""
     force: Annotated[Any, Law("m", "N", constant=True)]
-    """N that pushes both points apart (negative: together), constant or ``[[distance, force], ...]``."""
+    """Force that pushes both points apart (negative: together), N; constant or ``[[distance, force], ...]``."""
     damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
-    """N s/m, along the line between both points."""
+    """Damping along the line between both points, N s/m."""
 
 
 class DragLoad(Table):
-    """A torque against the turning of a body."""
+    """A torque that resists the rotation of a body."""
 
     name: str
     kind: Literal["drag"]
     body: str
-    """That turns, against the ground."""
+    """Body whose rotation relative to the ground is resisted."""
     linear: Annotated[float, Quantity("N*m*s/rad", least=0)] = 0.0
-    """N m s/rad: times the speed."""
+    """Torque per angular speed, N m s/rad."""
     quadratic: Annotated[float, Quantity("N*m*s**2/rad**2", least=0)] = 0.0
-    """N m s2/rad2: times the square of the speed, as of a fan."""
+    """Torque per square of the angular speed, N m s2/rad2, as of a fan."""

@@ -29,7 +29,7 @@ BY_TIME = {
 """Entries that are tables against the time."""
 
 
-def with_values(content: Mapping[str, Any], folder: Path) -> tuple[Mapping[str, Any], list[str]]:
+def with_values(content: Mapping[str, object], folder: Path) -> tuple[Mapping[str, Any], list[str]]:
     """The content of a scene with what files hold in the place of their names, and a sentence for each.
 
     Parameters
@@ -63,12 +63,12 @@ def with_values(content: Mapping[str, Any], folder: Path) -> tuple[Mapping[str, 
     return content, read_as
 
 
-def files_named(content: Mapping[str, Any], prefix: str = "") -> dict[str, Mapping[str, Any]]:
+def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, Any]]:
     """Return the tables of a parsed scene that name a file, by their dotted keys."""
     return dict(_named(content, prefix))
 
 
-def _named(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _named(content: Mapping[str, object], prefix: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for key, entry in content.items():
         if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
             if "file" in entry:
@@ -106,7 +106,7 @@ def _column(path: Path, column: str | None, key: str) -> tuple[list[float | str]
 
 
 def _curve(
-    content: Mapping[str, Any], row: Mapping[str, Any], key: str, folder: Path
+    content: Mapping[str, object], row: Mapping[str, object], key: str, folder: Path
 ) -> tuple[list[list[float]], str]:
     parts = key.split(".")
     general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
@@ -124,7 +124,7 @@ def _curve(
     return pairs_of(curve, folder, CURVES[general], key, _turns(content))
 
 
-def _turns(content: Mapping[str, Any]) -> int:
+def _turns(content: Mapping[str, object]) -> int:
     """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
     mechanism = content.get("mechanism")
     drives = mechanism.get("drives") if isinstance(mechanism, Mapping) else None

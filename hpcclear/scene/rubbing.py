@@ -9,13 +9,13 @@ class Rubbing(Table):
     """Friction of a guide."""
 
     coefficient: Annotated[float, Quantity("", least=0)]
-    """Of Coulomb's law."""
+    """Coefficient of friction of Coulomb's law."""
     ramp_speed: Speed = 0.01
-    """Sliding speed below which the force falls to zero with the speed, m/s."""
+    """Sliding speed below which the force decreases linearly to zero, m/s."""
 
 
 class RubbingPin(Rubbing):
-    """Friction of a pin: a torque, coefficient times radius times the size of its reaction."""
+    """Friction of a pin: a torque, equal to coefficient times radius times reaction force."""
 
     radius: PositiveLength
-    """Of the pin, m."""
+    """Radius of the pin, m."""

@@ -99,7 +99,7 @@ def _as_written(definitions: dict[str, Any]) -> None:
 def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     """Rows of catalogues with paths beside their names, costs as lists and by IT grades."""
     row = definitions["Row"]
-    row["properties"]["name"] = {"type": "string", "description": "what the row is called"}
+    row["properties"]["name"] = {"type": "string", "description": "name of the row"}
     row["required"], row["additionalProperties"] = ["name"], True  # entries by their paths
     cost = definitions["Cost"]["properties"]
     for key in ("at", "scale"):
@@ -112,7 +112,7 @@ def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     ]  # fmt: skip
 
 
-def _with_files(schema: Any) -> Any:
+def _with_files(schema: object) -> Any:
     """A schema with references to `FileCurve` wherever a curve may come from a file."""
     if schema == OF_FILE:
         return {"$ref": "#/$defs/FileCurve"}
@@ -170,8 +170,8 @@ def _inputs(definitions: dict[str, Any]) -> None:
     entries = definitions["RandomInput"]["properties"]
     names = {"anyOf": [{"enum": list(OURS)}, {"type": "string"}]}
     entries["distribution"] = {**names, "description": entries["distribution"]["description"]}
-    for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
-                       ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip
+    for key, words in (("file", "instead of values: a CSV table beside the scene file"),
+                       ("column", "heading of the column in that file; required if there are several")):  # fmt: skip
         entries[key] = {"type": "string", "description": words}
 
 

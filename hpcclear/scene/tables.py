@@ -22,16 +22,17 @@ from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.study import Study
 from hpcclear.scene.wear import Lives
 
-Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide
+Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide | PlanarSlot
 """Tables of joints that may have clearance."""
 
 
 def _is_loose(joint: Any) -> bool:
     """Whether a joint of a linkage has clearance."""
-    slides = isinstance(joint, PlanarSlide)
+    slides = isinstance(joint, (PlanarSlide, PlanarSlot))
     return joint.clearance is not None if slides else isinstance(joint, PlanarClearance)
 
 
@@ -39,14 +40,15 @@ class SceneTables(Table):
     """The tables of a scene file, each valid by itself; SI numbers, frozen."""
 
     format_version: Literal[1, 2] = 1
-    """2 where the mechanism is a planar linkage."""
+    """Version of the format: 2 for a planar linkage, 1 for a slider-crank."""
     mechanism: Annotated[Mechanism | Planar, Field(discriminator="kind")]
     """A slider-crank, or any planar linkage."""
     # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.
     drive: Drive = cast(Any, None)
-    """Of a slider-crank, needed; a linkage has drives of its own."""
+    """Drive of a slider-crank, required there. A linkage has `mechanism.drives` instead."""
     joints: Joints = cast(Any, None)
-    """Of a slider-crank, needed; a linkage has joints of its own. The crank's on the frame is ideal."""
+    """Joints of a slider-crank, required there. A linkage has `mechanism.joints` instead. The joint of crank and frame
+    is always ideal."""
     effects: Effects = Effects()
     numerics: Numerics = Numerics()
     output: Output = Output()
@@ -210,7 +212,8 @@ class SceneTables(Table):
         return tuple(joint.name for joint in self.linkage.joints if _is_loose(joint))
 
     def contact_labels(self) -> tuple[str, ...]:
-        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners."""
+        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a
+        slot's walls."""
         return self._contacts_in(self.clearance_joints())
 
     def _contacts_in(self, joints: tuple[str, ...]) -> tuple[str, ...]:
@@ -226,7 +229,7 @@ class SceneTables(Table):
         return tuple(n for n in self.clearance_joints() if not self.clearance_joint(n).corners)
 
     def guides(self) -> tuple[str, ...]:
-        """Names of the guides with clearance."""
+        """Names of the guides and slots with clearance."""
         return tuple(n for n in self.clearance_joints() if self.clearance_joint(n).corners)
 
     @property
@@ -348,7 +351,7 @@ class SceneTables(Table):
         return self._known_numbers
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]

@@ -193,7 +193,7 @@ def _in_unit(law: Law, found: Any, title: str, unit: str) -> Any:
 
 
 # ---- numbers --------------------------------------------------------------------------------------
-def check_numbers(law: Law, values: Mapping[str, Any]) -> None:
+def check_numbers(law: Law, values: Mapping[str, object]) -> None:
     """LawError unless the law is finite, of the right sign, and stores the energy it says, over depths, rates and speeds."""
     given = sample_numbers(law, {**TYPICAL, **values})
     for name in law.numbers:
@@ -274,7 +274,7 @@ def _check_stored(law: ContactLaw, given: Mapping[str, Any], at_rest: Any) -> No
         )
 
 
-def _check_friction(law: FrictionLaw, given: Mapping[str, Any]) -> None:
+def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
     varying = {
         "speed": SPEEDS,
         "force": np.ones_like(SPEEDS),
@@ -309,7 +309,7 @@ def _checked(law: Law, values: tuple[tuple[str, Any], ...]) -> None:
     check_numbers(law, dict(values))
 
 
-def check(law: Law, values: Mapping[str, Any]) -> None:
+def check(law: Law, values: Mapping[str, object]) -> None:
     """All of them, once for each law and values of its parameters.
 
     Raises

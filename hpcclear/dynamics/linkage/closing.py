@@ -11,6 +11,7 @@ from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vecto
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics, Point
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Aligned,
     ConstantSpeed,
     Drive,
     Fixed,
@@ -18,6 +19,7 @@ from hpcclear.dynamics.linkage.parts import (
     Revolute,
     RunUp,
     Slide,
+    Slot,
     split,
 )
 
@@ -50,6 +52,8 @@ class Closing:
             return self._pin(one)
         if isinstance(one, Slide):
             return self._guide(one)
+        if isinstance(one, Slot):
+            return self._guide(one)[:1]
         assert not isinstance(one, Fixed)
         return [self._driven(one)]
 
@@ -115,7 +119,7 @@ class Closing:
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
         return found
 
-    def _guide(self, joint: Slide) -> list[Row]:
+    def _guide(self, joint: Slide | Slot) -> list[Row]:
         """Across the line, and the angle of the body to it."""
         kin, write = self.kinematics, self.writer
         forest = kin.forest
@@ -164,7 +168,7 @@ class Closing:
             f"v_{joint.name}", speed
         )
 
-    def direction(self, joint: Slide) -> Vector:
+    def direction(self, joint: Aligned) -> Vector:
         """Unit vector of a guide's line, along the ground's axes."""
         carrier = split(joint.line)[0]
         forest, write = self.kinematics.forest, self.writer

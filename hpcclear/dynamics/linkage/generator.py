@@ -22,6 +22,7 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Acting,
+    Aligned,
     Contact,
     Drive,
     Force,
@@ -183,7 +184,8 @@ class _Generator:
         """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
         angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
-        if isinstance(contact.joint, Slide):
+        if contact.geometry.along_a_line:
+            assert isinstance(contact.joint, Aligned)
             across = self.closing.direction(contact.joint).across()
             found = [*(across if contact.side > 0.0 else -across)]
             return f"({', '.join(self.writer.text(term) for term in found)})"

@@ -19,10 +19,12 @@ from hpcclear.dynamics.linkage.parts import (
     Load,
     Loose,
     LooseSlide,
+    LooseSlot,
     Pair,
     Revolute,
     RunUp,
     Slide,
+    Slot,
     TableDrive,
     TorqueDrive,
     split,
@@ -99,7 +101,7 @@ class Mechanism:
         return next((drive for drive in self.drives if drive.body == body), None)
 
 
-def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
+def with_numbers(mechanism: Mechanism, **tables: object) -> Mechanism:
     """A mechanism with other numbers, arrays among them, which its checks are not made for."""
     made = object.__new__(Mechanism)
     for one in fields(Mechanism):
@@ -265,6 +267,7 @@ def _numbers(m: Mechanism) -> None:
     positive = {
         Clearance: ("clearance", "bearing_radius", "stiffness"),
         LooseSlide: ("clearance", "length", "height", "corner_radius", "stiffness"),
+        LooseSlot: ("clearance", "pin_radius", "stiffness"),
         Harmonic: ("frequency",),
     }
     for key, one in _records(m):
@@ -368,7 +371,7 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {Revolute: 2, Slide: 2, Fixed: 3, Clearance: 0, LooseSlide: 0}
+    taken = {Revolute: 2, Slide: 2, Slot: 1, Fixed: 3, Clearance: 0, LooseSlide: 0, LooseSlot: 0}
     ideal = sum(taken[type(joint)] for joint in m.joints)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 
@@ -389,6 +392,6 @@ def _sizes(m: Mechanism) -> None:
         )
     if len(m.contacts) > MOST_CONTACTS:
         raise InputError(
-            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints with clearance (four in each guide)",
+            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints (four in a guide, two in a slot)",
             "Make some of the joints ideal",
         )  # fmt: skip

@@ -12,10 +12,10 @@ from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Acting,
+    Aligned,
     ConstantSpeed,
     Force,
     Harmonic,
-    Slide,
     Spring,
     TableDrive,
     Torque,
@@ -37,7 +37,7 @@ def values(
         found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
     _bodies(trees, found)
     for joint in mechanism.joints:
-        if isinstance(joint, Slide):
+        if isinstance(joint, Aligned):
             angle = trees.offsets[split(joint.line)[0]] + joint.angle
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
         rubs = getattr(joint, "friction", None)

@@ -11,7 +11,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from hpcclear.base.outcome import CORNERS
+from hpcclear.base.outcome import CORNERS, WALLS
+from hpcclear.dynamics.contacts import pin_in_slot
 from hpcclear.dynamics.contacts.declared import Geometry
 from hpcclear.dynamics.contacts.guide import corner, gap_of
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
@@ -187,7 +188,7 @@ class LooseSlide(Slide):
         """What the constraints of a guide without clearance are at the start: offset, sine of the tilt."""
         return self.start_offset, np.sin(self.start_tilt)
 
-    def corners(self, middle: Any) -> dict[str, tuple[Any, Any]]:
+    def corners(self, middle: object) -> dict[str, tuple[Any, Any]]:
         """Points of the slider that are centres of its corners, `middle` its place in the slider's axes."""
         size = self.length, self.height
         return {
@@ -202,12 +203,54 @@ class LooseSlide(Slide):
 
 
 @dataclass(frozen=True)
+class Slot(Aligned):
+    """A pin in a slot: the point moves along the line, and its body turns freely."""
+
+
+@dataclass(frozen=True)
+class LooseSlot(Slot):
+    """A pin, its centre at the point, in a slot that is wider by twice the clearance; all in m.
+
+    At the start it is offset to the left of the line.
+    """
+
+    clearance: float = 0.0
+    pin_radius: float = 0.0
+    stiffness: float = 0.0
+    start_offset: float = 0.0
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:  # type: ignore[override]
+        """One a wall, in the order of `WALLS`."""
+        slot = GEOMETRIES["pin_in_slot"]
+        return tuple(
+            Contact(f"{self.name}.{word}", self, self.point, self.line, slot, side)
+            for word, side in WALLS.items()
+        )
+
+    @property
+    def gaps(self) -> tuple[Any, ...]:
+        """Of its contacts at the start, m, below 0 in flight."""
+        return tuple(pin_in_slot.gap_of(self, word, self.start_offset) for word in WALLS)
+
+    @property
+    def start_eccentricity(self) -> tuple[Any]:
+        """What the constraint of a slot without clearance is at the start: the offset."""
+        return (self.start_offset,)
+
+    @property
+    def without_clearance(self) -> Slot:
+        """The same without clearance."""
+        return Slot(self.name, self.point, self.line, self.angle)
+
+
+@dataclass(frozen=True)
 class Fixed(Aligned):
     """A body held on the ground: the point stays where the line begins."""
 
 
-Joint = Revolute | Clearance | Slide | LooseSlide | Fixed
-Loose = Clearance | LooseSlide
+Joint = Revolute | Clearance | Slide | LooseSlide | Slot | LooseSlot | Fixed
+Loose = Clearance | LooseSlide | LooseSlot
 
 
 @dataclass(frozen=True)
@@ -404,7 +447,7 @@ class Acting:
     """Whether it goes by the angle of a body, which must not go round with the revolutions."""
 
     @classmethod
-    def of(cls, table: Any) -> Self:
+    def of(cls, table: object) -> Self:
         """That of a table of the scene, whose entries have the names of the fields."""
         return cls(**{one.name: getattr(table, one.name) for one in fields(cls)})
 

@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import WORDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Slide, as_complex, split
+from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide, as_complex, split
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -58,7 +58,7 @@ class Poses:
             places = contact.journal, contact.bearing
             journal, bearing = (kin.position(kin.point(place)) for place in places)
             apart = journal - bearing
-            if isinstance(contact.joint, Slide):  # the part across the line
+            if isinstance(contact.joint, Aligned):  # the part across the line
                 across = Closing(kin, writer).direction(contact.joint).across()
                 apart = across.times(dot(apart, across))
             for axis, part in enumerate(apart):

@@ -15,7 +15,7 @@ from hpcclear.dynamics.linkage.closing import Closing, Row
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named, onto
 from hpcclear.dynamics.linkage.kinematics import Column
-from hpcclear.dynamics.linkage.parts import GROUND, Joint, Revolute, Slide, split
+from hpcclear.dynamics.linkage.parts import GROUND, Joint, Revolute, Slide, Slot, split
 
 PASSES = 4
 """Of the directions of reactions: errors are 1e-12 where mu r is a quarter of the lengths of the bars."""
@@ -230,12 +230,15 @@ class RubbingPin(Rubbing):
 
     def _held(self, closure: object) -> list[tuple[str, Vector]]:
         """By constraint of a joint that closes a loop: the force that it takes off what is beyond."""
-        if not isinstance(closure, Revolute):
-            return []  # what is left over of trees are pins
-        journal, bearing = (split(place)[0] in self.beyond for place in closure.places)
-        if journal == bearing:
+        if not isinstance(closure, (Revolute, Slot)):
+            return []  # what is left over of trees are pins and slots
+        first, second = (split(place)[0] in self.beyond for place in closure.places)
+        if first == second:
             return []
-        sign = -ONE if journal else ONE
+        sign = -ONE if first else ONE
+        if isinstance(closure, Slot):
+            across = self.of.closing.direction(closure).across()
+            return [(f"{closure.name}_across", across.times(sign))]
         axes = {"x": Vector(sign, ZERO), "y": Vector(ZERO, sign)}
         return [(f"{closure.name}_{axis}", one) for axis, one in axes.items()]
 

@@ -43,6 +43,7 @@ from hpcclear.scene.planar import (
     turns_of,
 )
 from hpcclear.scene.points import Points
+from hpcclear.scene.slots import PlanarSlot
 
 
 def mechanism_of(planar: Planar) -> Mechanism:
@@ -139,6 +140,8 @@ def _joint(joint: Any) -> parts.Joint:
         )  # fmt: skip
     if isinstance(joint, PlanarSlide) and joint.clearance is not None:
         return _loose_slide(joint)
+    if isinstance(joint, PlanarSlot):
+        return _slot(joint)
     if isinstance(joint, PlanarSlide):
         friction = _rubbing(joint.friction)
         return parts.Slide(joint.name, joint.point, joint.line, joint.angle, friction)
@@ -165,7 +168,16 @@ def _loose_slide(joint: Any) -> parts.LooseSlide:
     )  # fmt: skip
 
 
-def _drive(drive: Any) -> parts.Drive:
+def _slot(joint: Any) -> parts.Slot:
+    places = (joint.name, joint.point, joint.line, joint.angle)
+    if joint.clearance is None:
+        return parts.Slot(*places)
+    stiffness = sphere_stiffness(*_compliances(joint.materials), joint.pin_radius)
+    offset = 0.0 if joint.start_offset is None else joint.start_offset
+    return parts.LooseSlot(*places, joint.clearance, joint.pin_radius, stiffness, offset)
+
+
+def _drive(drive: object) -> parts.Drive:
     if isinstance(drive, PlanarSpeed):
         return parts.ConstantSpeed(drive.name, drive.body, drive.speed, drive.period, drive.turns)
     if isinstance(drive, PlanarHarmonic):

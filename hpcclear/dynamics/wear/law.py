@@ -35,7 +35,7 @@ class Joints:
     fading: Array
     """excess and fading: a - 1 and W0, J, of running in; 0 and 1 without."""
 
-    def __getitem__(self, life: Any) -> "Joints":
+    def __getitem__(self, life: object) -> "Joints":
         return Joints(*(array[life] for array in vars(self).values()))
 
     @property

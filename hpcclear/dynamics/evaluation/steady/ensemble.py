@@ -7,6 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
+from hpcclear.base.student import student
 from hpcclear.dynamics.evaluation.steady import judging
 from hpcclear.dynamics.evaluation.steady.copies import PERTURBATION
 from hpcclear.dynamics.evaluation.steady.effort import (
@@ -264,7 +265,7 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
         kept, between = strict, y[:, 1::2].var(axis=1, ddof=1)
         variance, freedom = judging.variance_of_mean([strict])
         error = np.sqrt(variance / strict.shape[1])
-    mean, limit = float(kept.mean()), float(judging.quantile(freedom, LEVEL) * error)
+    mean, limit = float(kept.mean()), float(student(LEVEL, freedom) * error)
     if not pooled:
         limit = float(np.hypot(limit, LEFT * np.sqrt(excess)))
     memory = LONG_MEMORY if sample.latched or sample.free else MEMORY
@@ -273,7 +274,7 @@ def _interval(copies: _Copies, sample: Sample) -> _Interval:
     apart = float(kept.mean(axis=0).var(ddof=1))
     coherent = len(kept) >= 3 and float(between[first:].mean()) < 0.3 * float(within)
     if coherent:  # copies have not parted: their mean scatters in time like one of them
-        limit = judging.student(kept.mean(axis=1))[2]
+        limit = judging.with_limit(kept.mean(axis=1))[2]
     several = bool(len(kept) > 1 and apart > 4.0 * within / len(kept))
     regime = Regime.SEVERAL if several else Regime.CHAOTIC
     if coherent or max(apart, within if np.isfinite(within) else 0.0) < (1e-5 * mean) ** 2:

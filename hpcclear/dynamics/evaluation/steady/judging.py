@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.student import student
 
 LEVEL = 0.97
 """Of intervals that are called 95 %: a mean is looked at until its interval is narrow enough, and each look is
@@ -110,18 +111,10 @@ def speed_settling(speeds: Array, tolerance: float) -> float:
     return remaining(float(steps[2]), float(steps[1]))
 
 
-def student(values: Array) -> tuple[float, float, float]:
+def with_limit(values: Array) -> tuple[float, float, float]:
     """Mean of independent values (n,), its standard error, and the half-width of its confidence interval."""
     error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    return float(np.mean(values)), error, quantile(len(values) - 1, LEVEL) * error
-
-
-def quantile(freedom: float, level: float) -> float:
-    """Of Student's distribution with so many degrees of freedom: half-width of an interval over the standard error."""
-    # here, as it is loaded for a quarter of a second that a first result need not wait
-    from scipy.special import stdtrit
-
-    return float(stdtrit(freedom, 0.5 + 0.5 * level))
+    return float(np.mean(values)), error, student(LEVEL, len(values) - 1) * error
 
 
 def variance_of_mean(groups: list[Array]) -> tuple[float, float]:

@@ -126,7 +126,7 @@ def _set_back(start: Start, shadow: Start, scale: Array) -> tuple[Array, Start]:
 def _exponent(logs: Array) -> tuple[float, float]:
     """Mean and half-width of its confidence interval, of logarithms (revolutions, copies) in four segments of each copy."""
     pieces = np.concatenate([piece.mean(axis=0) for piece in np.array_split(logs, 4)])
-    mean, _, limit = judging.student(pieces)
+    mean, _, limit = judging.with_limit(pieces)
     return mean, limit
 
 
@@ -142,7 +142,7 @@ def _judged(
     mean = float(objective(own.mean(axis=(0, 1))))
     period = judging.period_of(f, REPEATS * mean)
     means, scatter = _averages(own)
-    limit = judging.student(means)[2]
+    limit = judging.with_limit(means)[2]
     several = bool(np.ptp(means) > 2.0 * SAME * mean + 6.0 * scatter.max())
     chaotic = growth > growth_limit and period is None
     regime = Regime.CHAOTIC if chaotic else Regime.SEVERAL if several else Regime.REGULAR

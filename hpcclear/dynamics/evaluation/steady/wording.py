@@ -93,6 +93,6 @@ def in_short(scene: Scene, records: Records) -> str:
     if len(good) == 0:
         return "no sample finished"
     limit = np.nanmedian(good["objective_limit"] / good["objective"])
-    text = f"±{limit:.0e}, met by {1.0 - missed(good).mean():.0%}"
+    text = f"half-width {limit:.0e}, met by {1.0 - missed(good).mean():.0%}"
     chaotic = np.isin(good["regime"], (Regime.CHAOTIC, Regime.SEVERAL)).mean()
     return text + (f", {chaotic:.0%} chaotic" if chaotic else "")
