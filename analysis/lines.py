@@ -63,9 +63,9 @@ FEATURES = {
     "shapes of contact, roundness":
         "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
     "impact and noise, loads on bearings":
-        "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py dynamics/evaluation/recorded/spectral.py "
-        "statistics/spectra.py report/noise.py report/html/loads.py study/loads.py "
-        "scene/loads.py",
+        "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py "
+        "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/noise.py report/html/loads.py "
+        "study/loads.py scene/loads.py",
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
     "the compiler's text, cache and widths":
