@@ -40,7 +40,7 @@ FEATURES = {
         "scene/switches.py report/figures/effects.py statistics/random/paired.py",
     "the paper's study: its numbers and claims":
         "study/paper/* study/claims.py study/printed.py study/readings.py",
-    "rare failures, worst cases, verdicts on constraints":
+    "rare failures, worst cases, constraints tested":
         "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
