@@ -63,8 +63,9 @@ FEATURES = {
     "shapes of contact, roundness":
         "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
     "impact and noise, loads on bearings":
-        "dynamics/evaluation/recorded/impacts.py statistics/spectra.py report/noise.py report/html/loads.py study/loads.py "
-        "scene/loads.py",
+        "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py "
+        "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/noise.py report/html/loads.py "
+        "study/loads.py scene/loads.py",
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
     "the compiler's text, cache and widths":
@@ -93,7 +94,8 @@ FEATURES = {
     "contact and friction laws, built in":
         "dynamics/laws/normal/* dynamics/laws/friction/* dynamics/laws/hertz_contact.py scene/laws.py "
         "dynamics/physics/contact.py",
-    "linkages from points; templates": "scene/points_of_linkage.py scene/slider_crank.py",
+    "linkages from drawings, points and other programs; templates":
+        "scene/importers/* scene/points_of_linkage.py scene/slider_crank.py",
     "figures and animation":
         "report/figures/*",
     "the page and its gallery":
