@@ -64,7 +64,7 @@ def export(
     """Write a result file as a table: one row per design or instant, joints as columns.
 
     Headings are names with units. Quantities have the units that the scene file uses, otherwise SI units.
-    With --statistics, several samples stand side by side, such as those of several fits.
+    With --statistics, the table compares several samples, such as those of several fits.
 
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
