@@ -14,8 +14,8 @@ from hpcclear.base import host, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
-from hpcclear.dynamics.steady import wording
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
+from hpcclear.dynamics.evaluation.steady import wording
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone

@@ -43,7 +43,7 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
         title=f"{command}: {simulations} simulations on {counted(ranks)}", title_justify="left",
         box=box.SIMPLE_HEAD, pad_edge=False,
     )  # fmt: skip
-    for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
+    for name in ("error of f", "settings", "ms/sample", "core-s", "core-h", "wall time"):
         made.add_column(
             name,
             no_wrap=name != "settings",
@@ -53,11 +53,11 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     for one in plan.rows:
         total = plan.core_seconds(one, simulations, ranks)
         made.add_row(
-            "file" if one.error is None else f"{one.error:.0e}",
+            "as in file" if one.error is None else f"{one.error:.0e}",
             one.settings(),
             f"{1e3 * one.seconds:.3g}"
             + (f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""),
-            f"{total:.4g}",
+            f"{total:.3g}",
             f"{total / 3600:.2g}",
             duration(plan.wall_seconds(one, simulations, ranks)),
         )
@@ -74,7 +74,7 @@ def _needs(
     plan: Plan, row: Row, simulations: int, command: str, ranks: int
 ) -> list[tuple[str, str]]:
     rows = [
-        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.4g}"),
+        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.3g}"),
         ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
         ("start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"),
         (

@@ -128,7 +128,7 @@ def compare(
 
     The first column is time or crank_angle, the others are quantities as exported tables name them, such as
     "contact_force crank_rod [kN]". The averaged revolutions are repeated
-    periodically and compared with it.
+    periodically and compared with the measurement.
 
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """

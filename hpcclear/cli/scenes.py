@@ -73,7 +73,7 @@ def _copy_jobs(place: Path) -> None:
     from hpcclear.results import files
 
     with resources.as_file(resources.files(__package__).joinpath("jobs")) as source:
-        kinds = ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+        kinds = ("*.toml", "linkages/*.toml", "machines/*.toml", "*.slurm", "until_done.sh")
         found = sorted(path for kind in kinds for path in source.glob(kind))
         for path in found:
             target = place / path.relative_to(source)
@@ -139,14 +139,14 @@ def import_(source: Path, file: Path, unit: str, sketch: Path | None) -> int:
 def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
 
-    Exit code 1 if the file's own design cannot turn but its study varies the geometry; 2 if no design can.
-    Under mpiexec or srun it also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
+    If the design in the file cannot turn, the exit code is 1 if the study varies its geometry, and 2 otherwise.
+    Under mpiexec or srun the command also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
 
     def program(ranks: "Ranks") -> int:
-        from hpcclear.cli.printing import describe_scene
+        from hpcclear.cli.check import describe_scene
 
         scene = written.scene(warn=False)
         turns = describe_scene(scene, cost, ranks)
@@ -188,8 +188,8 @@ def simulate(written: Written, output: Path) -> int:
     lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
+    from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.dynamics.steady.wording import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
