@@ -62,7 +62,7 @@ def main() -> None:
     rows += [f"| {title} | all | {seconds:.0f} s |" for title, seconds in totals.items()]
     text = PAGE.read_text(encoding="utf-8")
     head, rest = text.split(BEGIN)
-    made = head + BEGIN + "\n".join(rows) + "\n" + END + rest.split(END)[1]
+    made = head + BEGIN + "\n" + "\n".join(rows) + "\n\n" + END + rest.split(END)[1]
     PAGE.write_text(made, encoding="utf-8")
 
 

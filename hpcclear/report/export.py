@@ -57,7 +57,7 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
 def statistics(
     paths: Sequence[str | Path], output: str | Path, thresholds: Sequence[str] = ()
 ) -> "DataFrame":
-    """Write the statistics of several samples to one table: a row for each statistic with its interval, a column for each file.
+    """Write the statistics of several samples: a row for each statistic with its interval, a column for each file.
 
     Parameters
     ----------
