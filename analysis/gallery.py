@@ -31,29 +31,68 @@ SHOWN = (
 """Lines of the answer that the page repeats."""
 
 
+LINES = {
+    "four_stroke": {"big_end": "24 mm", "small_end": "22 mm"},
+    "three_rrr": dict.fromkeys(("knee0", "knee1", "knee2"), "16 mm"),
+}
+"""Lengths of bearings in studies that leave the range of Hertz contact, which are repeated with line contact."""
+
+
+def run(name: str, place: Path, *sets: str) -> None:
+    """A study, unless it is there."""
+    if not (place / "verification.nc").exists():
+        file = ROOT / "jobs" / "linkages" / f"{name}.toml"
+        words = [word for one in sets for word in ("--set", one)]
+        subprocess.run(
+            [sys.executable, "-m", "hpcclear", "run", file, "-o", place, *words], check=True
+        )
+
+
+def lines_of(place: Path) -> dict[str, str]:
+    """What the answer of a study says, by its labels."""
+    found = {kind: dataset.read(place / f"{kind}.nc", kind) for kind in ("samples", "verification")}
+    return {line.label: line.text for line in answer(found, "") if line.label in SHOWN}
+
+
+def table_of(columns: dict[str, dict[str, str]]) -> str:
+    """Answers beside each other, by their headings."""
+    width = len(columns) + 1
+    rows = [("", *columns), ("---",) * width]
+    rows += [
+        (label, *(one.get(label, "") for one in columns.values()))
+        for label in SHOWN
+        if any(label in one for one in columns.values())
+    ]
+    return "\n".join(f"| {' | '.join(row)} |".replace("  ", " ") for row in rows)
+
+
 def main(results: Path) -> None:
     """Run what is missing, draw, write."""
     page = PAGE.read_text()
     for name in re.findall(r"run jobs/linkages/(\w+)\.toml", page):
-        file = ROOT / "jobs" / "linkages" / f"{name}.toml"
-        place = results / name
-        if not (place / "verification.nc").exists():
-            subprocess.run([sys.executable, "-m", "hpcclear", "run", file, "-o", place], check=True)
-        scene = load_scene(file)
+        run(name, results / name)
+        scene = load_scene(ROOT / "jobs" / "linkages" / f"{name}.toml")
         picture = PAGE.parent.parent / "images" / "gallery" / f"{name}.png"
         picture.parent.mkdir(exist_ok=True)
         save(sketch_figure(scene, poses_at_start(scene)), picture)
-        found = {
-            kind: dataset.read(place / f"{kind}.nc", kind) for kind in ("samples", "verification")
-        }
-        lines = [line for line in answer(found, "") if line.label in SHOWN]
-        table = "\n".join(
-            ["| | |", "| --- | --- |", *(f"| {line.label} | {line.text} |" for line in lines)]
-        )
-        command, _, rest = page.partition(f"results/gallery/{name}\n```\n")
-        after = rest[rest.find("\n## ") :] if "\n## " in rest else ""
-        page = f"{command}results/gallery/{name}\n```\n\n{table}\n{after}"
+        columns = {"": lines_of(results / name)}
+        if name in LINES:
+            place = results / f"{name}_line"
+            lengths = (
+                f"mechanism.joints.{joint}.length={length}" for joint, length in LINES[name].items()
+            )
+            run(name, place, "effects.contact.geometry=line", *lengths)
+            columns = {"contact of a sphere": columns[""], "line contact": lines_of(place)}
+        page = replaced(page, name, table_of(columns))
     PAGE.write_text(page)
+
+
+def replaced(page: str, name: str, table: str) -> str:
+    """The page with another table of a study, and what is written below it."""
+    command, _, rest = page.partition(f"results/gallery/{name}\n```\n")
+    after = re.split(r"^(?!\||\n)", rest, maxsplit=1, flags=re.MULTILINE)
+    below = f"\n{after[1]}" if len(after) > 1 else ""
+    return f"{command}results/gallery/{name}\n```\n\n{table}\n{below}"
 
 
 if __name__ == "__main__":

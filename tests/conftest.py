@@ -26,6 +26,26 @@ def shift() -> int:
     return 0
 
 
+@pytest.fixture(scope="module")
+def carried_out(tmp_path_factory):
+    """Carry out a study by formula, with entries of `formula` set by name: carried_out(scene, BIAS=...), to its directory."""
+
+    def run(scene, notify=lambda text: None, **entries):
+        import formula_study
+
+        from hpcclear.ranks.boundary import alone
+        from hpcclear.study import run_study
+
+        place = tmp_path_factory.mktemp("study") / "out"
+        with pytest.MonkeyPatch.context() as patch:
+            formula_study.formula.replace_dynamics(patch.setattr)
+            for name, value in entries.items():
+                patch.setattr(formula_study.formula, name, value)
+            return run_study(scene, place, alone(), progress_style="quiet", notify=notify)
+
+    return run
+
+
 @pytest.fixture
 def place_of_all():
     """A folder that other users may enter; pytest's own are closed whenever a session of it begins."""

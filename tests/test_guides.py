@@ -1,5 +1,6 @@
 """Guides with clearance: the published slider-crank, random linkages against the dense model, and what is refused."""
 
+import itertools
 import math
 from pathlib import Path
 
@@ -19,13 +20,15 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.compiled import module_text
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.ensemble.api import as_points
 from hpcclear.report.figures import guides, moving
 
 PUBLISHED = Path(__file__).parents[1] / "jobs" / "loose_slider.toml"
 ONE_TURN = {"numerics.averaged_revolutions": 1, "numerics.rtol": 1e-10}
 STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}
+SEPARATE, BLOCK = 0.7, 0.076 * (0.1**2 + 0.05**2) / 12
+"""A restitution, and the inertia of a solid block, kg m^2, with which impacts are separate."""
 CHI, MU, RAMP, GRAVITY = 0.4, 0.05, 0.02, 9.81
 
 
@@ -98,6 +101,40 @@ def test_impacts_converge_to_those_of_rigid_bodies(published, monkeypatch):
     assert [
         found.max() < most for found, most in zip(errors, (4e-4, 2e-4, 6e-5, 4e-6), strict=True)
     ] == [True] * 4
+
+
+def test_ten_separate_impacts_converge_to_those_of_rigid_bodies(published, monkeypatch):
+    """The published slider turns so easily that rigid impacts accumulate. With the inertia of a solid block of its size, a
+    restitution of 0.7 and a tilt of 10 mrad the first twelve are 0.15 ms apart or more: corners and crank angles with 1, 10
+    and 100 times the stiffness, whose errors fall like the stiffness to the power -0.4, and their limit.
+    """
+    damping = (1 - SEPARATE**2) / SEPARATE
+    monkeypatch.setattr(rigid, "RESTITUTION", restitution(damping))
+    monkeypatch.setattr(rigid, "TURNING", BLOCK)
+    expected = rigid.impacts(12, 1e-4, tilt=1e-2)
+    assert min(b.time - a.time for a, b in itertools.pairwise(expected)) > 1.5e-4
+    scene = published.with_(
+        {
+            "effects.contact.restitution": SEPARATE, "mechanism.slider.inertia": BLOCK,
+            "joints.guide.start_tilt": 1e-2,
+        }
+    )  # fmt: skip
+    late = []
+    for factor in (1.0, 10.0, 100.0):
+        seen = guides.touches(simulate(scene.with_({"effects.contact.force_at": factor * 20e3})))
+        assert [one.contact.removeprefix("guide.") for one in seen[:12]] == [
+            one.corner for one in expected
+        ]
+        late.append([a.turn * 2 * math.pi - b.crank for a, b in zip(seen, expected, strict=False)])
+    soft, stiff, stiffest = np.array(late)
+    assert np.abs(np.array(late)[:, 0]).max() < 1e-9  # nothing has touched before
+    for coarse, fine in ((soft, stiff), (stiff, stiffest)):
+        np.testing.assert_allclose(fine[1:] / coarse[1:], 10**-0.4, rtol=0.07)
+    most = [np.abs(one[:10]).max() for one in (soft, stiff, stiffest)]
+    np.testing.assert_array_less(most, (1.3e-2, 5.1e-3, 2.1e-3))
+    share = 10**-0.4
+    limit = (stiffest - share * stiff) / (1 - share)  # of stiffness without bounds
+    assert np.abs(limit[:10]).max() < 3e-5
 
 
 # ---- random linkages against the dense model ---------------------------------------------------------

@@ -4,6 +4,8 @@ Energy lost in impacts against the energy balance, counts against a dense series
 the bodies, third-octave levels against scipy.signal."""
 
 import inspect
+import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +14,16 @@ from scipy import signal
 from scipy.integrate import simpson
 
 from hpcclear import evaluate, load_scene, simulate
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import IMPACTS
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.problem import effects_of, problem_of
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
+from hpcclear.ensemble.simulate import content_of
+from hpcclear.results import dataset
 from hpcclear.statistics import spectra
 
+COMPRESSOR = Path(__file__).parents[1] / "jobs" / "compressor.toml"
 LOOSE = {"law": "hunt-crossley", "damping": 0.05}
 REPEATED = {"mechanism.slider.mass": [load_scene(SCENE).mechanism.slider.mass]}
 SLIPPERY = {"effects.friction": {"law": "none"}}
@@ -109,11 +115,11 @@ def test_the_force_on_the_frame_is_the_change_of_momentum(dense):
 def test_third_octave_levels_are_those_of_scipy_on_a_dense_series():
     """A motion that repeats itself, at 720 instants a revolution, against a periodogram of 16 times as many."""
     scene = scene_with({"effects.contact": HUNT_CROSSLEY, **SLIPPERY}, rtol=1e-9).with_(
-        {"numerics.transient_revolutions": 12, "numerics.averaged_revolutions": 4}
+        {"numerics.transient_revolutions": 12, "numerics.averaged_revolutions": 14}
     )
     found = simulate(scene)
     many = simulate(scene.with_({"output.instants_per_revolution": 16 * 720}))
-    rate = 16 * 720 * 4 / (many["time"].to_numpy()[-1] - many["time"].to_numpy()[12 * 16 * 720])
+    rate = 16 * 720 * 14 / (many["time"].to_numpy()[-1] - many["time"].to_numpy()[12 * 16 * 720])
     power = 0.0
     for axis in "xy":
         values = many[f"frame_force_{axis}"].to_numpy()[12 * 16 * 720 : -1]
@@ -133,6 +139,45 @@ def test_third_octave_levels_are_those_of_scipy_on_a_dense_series():
     assert float(found["rms_frame_force_limit"]) < 1e-6 * float(found["rms_frame_force"])
 
 
+def test_levels_of_a_motion_that_does_not_repeat_are_those_of_welch():
+    """A broad-band force and a tone between two orders, at bands from 3 to 100 orders; instants that fold nothing."""
+    rng = np.random.default_rng(3)
+    count, size = 400, 1024
+    t = np.arange(count * size) / size  # in revolutions
+    force = signal.lfilter([1.0], [1.0, -0.9], rng.normal(size=count * size))
+    force += 3.0 * np.sin(2 * np.pi * 50.4 * t)
+    turns = force.reshape(count, size, 1)
+    windows = np.stack([spectra.orders(turns[k : k + 3])[:, 0] for k in range(count - 2)])
+    centres = spectra.band_centres(3.0, 100.0)
+    found, lower, upper = spectra.levels(spectra.in_bands(windows, np.ones(len(windows)), centres))
+    frequencies, density = signal.welch(force, size, nperseg=16 * size)
+    inside = 0
+    for centre, level, low, high in zip(centres, found, lower, upper, strict=True):
+        edges = centre * 10.0**-0.05, centre * 10.0**0.05  # those of its orders
+        orders = np.arange(math.ceil(edges[0]), math.ceil(edges[1]))
+        if not len(orders):
+            continue
+        band = (frequencies >= orders[0] - 0.5) & (frequencies < orders[-1] + 0.5)
+        expected = 10 * np.log10(density[band].sum() / 16 / 1e-12)
+        assert abs(level - expected) < 0.25
+        inside += low - 0.1 <= expected <= high + 0.1
+    assert inside >= 12
+
+
+def test_levels_do_not_depend_on_the_instants_that_are_stored():
+    """A chaotic compressor with short impacts: what they have beyond half the rate of the stored instants is not folded."""
+    scene = load_scene(COMPRESSOR).with_({"numerics.averaged_revolutions": 3})
+    few, many = (
+        simulate(scene.with_({"output.instants_per_revolution": one})) for one in (360, 1440)
+    )
+    bands = few["band"].to_numpy()
+    for name in ("frame_force_level", "contact_force_level"):
+        one, other = few[name], many[name].sel(band=bands, method="nearest")
+        loud = one > one.max("band") - 40.0
+        assert abs(one - other).where(loud).max() < 0.1
+        assert loud.sum() > 12
+
+
 def test_half_widths_hold_as_often_as_they_say():
     """Of independent revolutions, fewer and more than there are batches; of too few there is none."""
     rng = np.random.default_rng(5)
@@ -143,6 +188,18 @@ def test_half_widths_hold_as_often_as_they_say():
         held = np.abs(values.mean(axis=0) - 1.0) <= spectra.half_width(values)
         assert 0.93 < held.mean() < 0.97
     assert np.isnan(spectra.half_width(np.ones((3, 2)))).all()
+
+
+def test_half_widths_of_levels_hold_as_often_as_they_say():
+    """Of white forces, whose windows of three revolutions overlap: an order's mean square is known."""
+    rng = np.random.default_rng(6)
+    held = []
+    for _ in range(60):
+        turns = rng.normal(size=(30, 16, 20))
+        windows = np.stack([spectra.orders(turns[k : k + 3]) for k in range(28)])
+        mean, reach = windows.mean(axis=0), spectra.half_width(windows, spectra.WINDOW)
+        held.append(np.abs(mean - 2.0 / 16) <= reach)
+    assert 0.91 < np.mean(held) < 0.97
 
 
 @pytest.mark.parametrize("name", ["impacts", "impact-energy", "rms-frame-force", "contact-loss"])
@@ -168,3 +225,109 @@ def test_what_is_not_asked_for_is_not_compiled():
     assert names.isdisjoint(at.measures_of(problem.effects))
     assert at.rules_of(problem.effects).impacts == 0
     assert set(IMPACTS).isdisjoint(evaluate(scene, ONE).data_vars)
+
+
+LEVELS = ("frame_force_level", "contact_force_level")
+"""Fields of the bands."""
+
+
+@pytest.fixture(scope="module")
+def heard():
+    """The compressor over eight revolutions in two bands, at two clearances, and its response at the first."""
+    clearance = "joints.crank_rod.clearance"
+    scene = load_scene(COMPRESSOR).with_(
+        {
+            "numerics.transient_revolutions": 2, "numerics.averaged_revolutions": 14,
+            "numerics.levels": [1000.0], "numerics.objective": "contact-force-level-at-2kHz", clearance: 3e-5,
+        }
+    )  # fmt: skip
+    return scene, evaluate(scene, {clearance: [3e-5, 6e-5]}), simulate(scene)
+
+
+def test_a_sample_has_the_levels_of_its_response(heard):
+    _, samples, response = heard
+    assert samples["band"].to_numpy() == pytest.approx([1000.0, 1000.0 * 10**0.3])
+    for name in LEVELS:
+        alone = response[name].sel(band=samples["band"], method="nearest").transpose(..., "band")
+        np.testing.assert_array_equal(samples[name][0], alone)
+        reach = (response[f"{name}_upper"] - response[name]).sel(
+            band=samples["band"], method="nearest"
+        )
+        np.testing.assert_allclose(
+            samples[f"{name}_limit"][0], reach.transpose(..., "band"), rtol=1e-9
+        )
+        assert (samples[f"{name}_limit"] > 0.0).all()
+    for name in IMPACTS:
+        np.testing.assert_allclose(samples[name][0], response[name], rtol=1e-9)
+        np.testing.assert_array_equal(samples[f"{name}_limit"][0], response[f"{name}_limit"])
+
+
+def test_a_level_is_an_objective(heard):
+    scene, samples, response = heard
+    loudest = samples["contact_force_level"].isel(band=1).max("joint")
+    np.testing.assert_array_equal(samples["objective"], loudest)
+    assert float(response["objective"]) == float(samples["objective"][0])
+    assert "at 2 kHz" in scene.objective.words
+    assert samples["objective"].attrs["units"] == "1"
+
+
+def test_a_file_with_levels_comes_back_as_its_records(heard):
+    _, samples, _ = heard
+    records = dataset.records(samples)
+    kept = samples.sizes["joint"], samples.sizes["band"]
+    levels = records["contact_force_level"][:, : kept[0], : kept[1]]
+    np.testing.assert_array_equal(levels, samples["contact_force_level"])
+    np.testing.assert_array_equal(records["band"][0, :2], samples["band"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"numerics.levels": [20.0]}, "no multiple of the frequency"),
+        ({"numerics.levels": [1e5], "drive.speed": 1.0}, "instants a revolution"),
+    ],
+)
+def test_bands_that_the_drive_does_not_reach_are_refused(changes, words):
+    with pytest.raises(InputError, match=words):
+        evaluate(load_scene(COMPRESSOR).with_(changes), ONE)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"numerics.levels": [100.0 * 2**k for k in range(5)]}, "4"),
+        ({"numerics.levels": [1e3], "numerics.target_error": 0.01}, "number of revolutions"),
+        ({"numerics.objective": "frame-force-level-at-1kHzz"}, "not a known objective"),
+    ],
+)
+def test_levels_that_cannot_be_recorded_are_refused(changes, words):
+    with pytest.raises(InputError, match=words):
+        load_scene(COMPRESSOR).with_(changes)
+
+
+def test_constraints_ask_for_the_measures_they_are_of(heard):
+    """Ranks get what the study requires of each sample, whatever its objective is."""
+    study = {
+        "objective": "mean-gap",
+        "variables": {
+            "m": {"range": [0.2, 0.3], "paths": ["mechanism.slider.mass"]},
+            "C": {"range": [3e-5, 6e-5], "paths": ["joints.crank_rod.clearance"]},
+        },
+        "random": {"C": {"distribution": "uniform", "range": [3e-5, 6e-5]}},
+        "cases": {
+            "quiet": {
+                "random": ["C"],
+                "objectives": ["mean"],
+                "constraints": [
+                    {"statistic": "mean", "of": "impact-energy", "most": "5 mJ"},
+                    {"statistic": "mean", "of": "frame-force-level-at-1.25kHz", "most": 150.0},
+                ],
+            }
+        },
+    }
+    scene = load_scene(COMPRESSOR).with_(
+        {"study": study, "numerics.impacts": False, "numerics.objective": None}
+    )
+    numerics = content_of(scene)["numerics"]
+    assert numerics["impacts"]
+    assert numerics["levels"] == pytest.approx([1000.0 * 10**0.1])

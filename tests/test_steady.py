@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady import ensemble, judging
-from hpcclear.dynamics.steady.copies import scales
-from hpcclear.dynamics.steady.effort import Effort, Mean, Sample
-from hpcclear.dynamics.steady.judging import objective
-from hpcclear.dynamics.steady.look import look
-from hpcclear.dynamics.steady.procedure import loosest
-from hpcclear.dynamics.views import Outcome, Parameters, Start
+from hpcclear.dynamics.evaluation.steady import ensemble, judging
+from hpcclear.dynamics.evaluation.steady.copies import scales
+from hpcclear.dynamics.evaluation.steady.effort import Effort, Mean, Sample
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.evaluation.steady.look import look
+from hpcclear.dynamics.evaluation.steady.procedure import loosest
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"

@@ -242,7 +242,7 @@ BEFORE = [
     "import hpcclear.ensemble.samples",
     "import hpcclear.scene",
 ]
-DURING = ["import hpcclear.dynamics.evaluator", "maker", "simulation"]
+DURING = ["import hpcclear.dynamics.evaluation.evaluator", "maker", "simulation"]
 NO_MORE_SAVES = [
     "call hpcclear.results.checkpoint:Checkpoint.flush 2",
     "call hpcclear.results.dataset:samples_dataset 2",

@@ -3,6 +3,7 @@
 Ours and a user's are declared alike. The kernel averages gaps, so a record that leaves it holds f of eq. 13; `asked` replaces
 it by the requested objective, on the rank that simulated it, and everybody after that reads ``objective``."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,15 +12,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Records
+from hpcclear.base.arrays import Array, Booleans, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import FIELDS, IMPACTS, OUTCOME, RESPONSES
+from hpcclear.base.outcome import FIELDS, IMPACTS, LEVELS, OUTCOME, RESPONSES, WIDEST
 
 Function = Callable[..., Any]
 
 RECORDED = {"objective": "m"} | {
     name: FIELDS[name].unit.removeprefix("1")
-    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS)
+    for name in ("mean_gap", "peak_contact_force", *RESPONSES, *IMPACTS, *WIDEST)
 }
 """Fields of a sample's record that `Objective.value` may require, with units; ``objective`` is f of eq. 13."""
 
@@ -86,6 +87,8 @@ class Objective:
     """Places in records of chosen joints; none for all that there are."""
     places: tuple[int, ...] = ()
     """Those of all joints with clearance."""
+    band: float = 0.0
+    """Middle of the third-octave band that it is a level of, Hz; 0 of what is none."""
 
     @property
     def asks(self) -> frozenset[str]:
@@ -126,7 +129,7 @@ class Objective:
     @property
     def needs_impacts(self) -> bool:
         """Whether samples have to record measures of impact and noise for it."""
-        return not self.asks.isdisjoint(IMPACTS)
+        return not self.asks.isdisjoint((*IMPACTS, *LEVELS))
 
     def made_of(self, mean: Array, peak: Array, period: Array) -> Array:
         """What is made of the rate, (m, joints): of its mean in time, of its square where that is what is made, its peak
@@ -156,6 +159,8 @@ class Objective:
         if name == "rate" and self.whole:
             return np.asarray(records[RATE][:, 0])
         found: Array = records[RATE if name == "rate" else name]
+        if self.band:
+            found = _in_band(found, records["band"] == self.band)
         places = self.joints or self.places
         return found[:, list(places)] if found.ndim > 1 and places else found
 
@@ -187,6 +192,14 @@ OURS = {
     "peak-contact-force": Objective(
         "peak contact force, of the joint where it is larger", "N",
         lambda peak_contact_force: peak_contact_force.max(),
+    ),
+    "peak-contact-pressure": Objective(
+        "peak contact pressure, of the joint where it is larger", "Pa",
+        lambda peak_contact_pressure: np.nanmax(peak_contact_pressure),
+    ),
+    "contact-half-angle": Objective(
+        "half angle of contact at the peak force, of the joint where it is larger", "rad",
+        lambda contact_half_angle: np.nanmax(contact_half_angle),
     ),
     "peak-crank-moment": Objective(
         "peak torque of the drive on the crank", "N m", lambda peak_crank_moment: peak_crank_moment
@@ -230,6 +243,45 @@ OURS = {
 }  # fmt: skip
 OURS = {name: replace(one, name=name) for name, one in OURS.items()}
 """Ours by their names."""
+
+
+def band_of(frequency: float) -> float:
+    """Middle of the third-octave band of a frequency, Hz (IEC 61260-1:2014, base ten)."""
+    return float(1000.0 * 10.0 ** (round(10.0 * np.log10(frequency / 1000.0)) / 10.0))
+
+
+LEVEL = re.compile(r"(frame|contact)-force-level-at-(\d+(?:\.\d+)?)-?(k?)Hz")
+"""Names of objectives that are a third-octave level: "frame-force-level-at-1.25kHz"."""
+
+
+def level_of(name: re.Match[str]) -> Objective:
+    """The third-octave level of a force, dB re 1e-6 N, of a name as `LEVEL` has it."""
+    return _level(name[0], name[1], float(name[2]), name[3])
+
+
+@cache
+def _level(name: str, force: str, number: float, kilo: str) -> Objective:
+    band = band_of(number * (1000.0 if kilo else 1.0))
+    at = f"at {number:g} {kilo}Hz, dB re 1e-6 N"
+    if force == "frame":
+        words = f"third-octave level of the force on the frame {at}"
+        return Objective(
+            words, "", lambda frame_force_level: frame_force_level, name=name, band=band
+        )
+    words = f"third-octave level of the contact force {at}, of the joint where it is larger"
+    return Objective(
+        words, "", lambda contact_force_level: contact_force_level.max(), name=name, band=band
+    )
+
+
+def _in_band(levels: Array, here: Booleans) -> Array:
+    """Of levels (n, ..., bands) those of the band that is `here` (n, bands); NaN of records without it."""
+    inner = tuple(range(1, levels.ndim - 1))
+    place = np.expand_dims(here.argmax(axis=1), (*inner, levels.ndim - 1))
+    found = np.take_along_axis(levels, place, axis=-1)[..., 0]
+    found[~here.any(axis=1)] = np.nan
+    return found
+
 
 ENDS = ("alpha", "beta", "gamma", "delta", "epsilon")
 """What the designs are called that have the least of the first, the second ... that a case makes small. There are as many as a

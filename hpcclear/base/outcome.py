@@ -12,13 +12,19 @@ JOINTS = ("crank_rod", "rod_slider")
 """Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
 
 MAX_JOINTS = 8
-"""Largest number of contacts of a record, one in each pin and four in each guide; datasets contain those of the scene."""
+"""Largest number of contacts of a record, one in a pin, two in a slot, four in a guide; datasets contain those of the scene."""
 
 CORNERS = {
     "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
     "back_right": (-1.0, -1.0), "back_left": (-1.0, 1.0),
 }  # fmt: skip
 """Contacts of a guide with clearance, the corners of its slider: before or behind its middle along the line, left or right."""
+
+MAX_BANDS = 4
+"""Largest number of third-octave bands whose levels a record has."""
+
+WALLS = {"left": 1.0, "right": -1.0}
+"""Contacts of a pin in a slot with clearance, the slot's walls on either side of its line."""
 
 WAVE_ROWS = 32
 """Largest number of profile coefficients of all joints."""
@@ -146,10 +152,10 @@ class Field(NamedTuple):
     kind: str = "f8"
     """As of numpy."""
     per: str = ""
-    """"joint" or "wave": what there is one for each of; "" for one a sample."""
+    """"joint", "wave", "band" or "joint band": what there is one for each of; "" for one a sample."""
     when: str = ""
     """What a scene has to require, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
-    "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
+    "level" (levels in some band), "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
     required: bool = False
     """Whether every file with the outcome of a simulation has it."""
 
@@ -175,11 +181,29 @@ FIELDS = {
     "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact"),
     "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact"),
     "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact"),
-    "rate_of_objective": Field("rate", "what is made of the objective's own rate", per="joint", when="request"),
+    "band": Field("Hz", "middle of the third-octave band", per="band", when="level"),
+    "frame_force_level": Field(
+        "1", "third-octave level of the force on the frame, dB re 1e-6 N", per="band", when="level"),
+    "contact_force_level": Field(
+        "1", "third-octave level of the contact force, dB re 1e-6 N", per="joint band", when="level"),
+    **{
+        f"{name}_limit": Field(
+            unit, f"half-width of the 95 % confidence interval of {name}", per=per, when="level")
+        for name, unit, per in (
+            ("frame_force_level", "1", "band"), ("contact_force_level", "1", "joint band"),
+            ("impacts", "1", "joint"), ("impact_energy", "J", "joint"), ("contact_impulse", "N s", "joint"),
+            ("contact_loss", "rad", "joint"), ("rms_contact_force", "N", "joint"), ("rms_frame_force", "N", ""),
+        )
+    },
+    "peak_contact_pressure": Field(
+        "Pa", "largest pressure at the peak contact force", per="joint", when="request"),
+    "contact_half_angle": Field(
+        "rad", "half of the angle of contact at the peak contact force", per="joint", when="request"),
+    "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="request"),
     "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
     "sliding_waves": Field(
         "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="request"),
-    "energy_error": Field("1", "residual of the energy balance, relative", when="request"),
+    "energy_error": Field("1", "energy residual over the larger of kinetic energy and driving work", when="request"),
     "objective_limit": Field(
         "objective", "half-width of the 95 % confidence interval of f as a steady mean", when="steady"),
     "lyapunov_exponent": Field("1", "largest Lyapunov exponent, per revolution", when="steady"),
@@ -207,7 +231,13 @@ RESPONSES = _fields("response")
 IMPACTS = _fields("impact")
 """Fields that measure impact and noise."""
 
-ON_REQUEST = _fields("response", "impact", "request")
+WIDEST = {"peak_contact_pressure": "pressure", "contact_half_angle": "half_angle"}
+"""Fields of the contact at its peak force, and what a geometry of contact calls them; not all geometries have a pressure."""
+
+LEVELS = _fields("level")
+"""Fields of recorded samples: force levels in third-octave bands, and half-widths."""
+
+ON_REQUEST = _fields("response", "impact", "level", "request")
 """Fields that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY, MAPPED = _fields("steady"), _fields("map")
@@ -216,8 +246,13 @@ STEADY, MAPPED = _fields("steady"), _fields("map")
 JUDGED = (*STEADY, *MAPPED, "regime")
 """All that stands in datasets only where a `regime` was judged."""
 
-_SHAPES = {"": (), "joint": (MAX_JOINTS,), "wave": (WAVE_ROWS,)}
-OUTCOME = np.dtype([(name, one.kind, _SHAPES[one.per]) for name, one in FIELDS.items()])
+_SIZES = {"joint": MAX_JOINTS, "wave": WAVE_ROWS, "band": MAX_BANDS}
+OUTCOME = np.dtype(
+    [
+        (name, one.kind, tuple(_SIZES[per] for per in one.per.split()))
+        for name, one in FIELDS.items()
+    ]
+)
 """The record of one finished sample, as it travels over ranks and into datasets."""
 
 NUMBERS = tuple(name for name, one in FIELDS.items() if one.kind == "f8")

@@ -6,19 +6,18 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import WIDEST
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.contacts.declared import Shape
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.laws import numbers
+from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import length_path
 
 Get = Callable[[str], Array]
-
-WIDEST = {"peak_contact_pressure": "pressure", "contact_half_angle": "half_angle"}
-"""Variables of a response, and what a `laws.declared.Geometry` calls them."""
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
@@ -79,7 +78,7 @@ def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
     p[:, at.BEARING_RADIUS] = shape.bearing_radius
     p[:, at.JOURNAL_RADIUS] = shape.journal_radius
     table: Any = scene.effects.contact
-    law = table.declared
+    law = with_constants(table.declared)
     given = {**joint, **_given(get, "contact", table)}
     rows = numbers.rows_of(law, given, len(p))
     p[:, at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + rows.shape[1]] = rows
@@ -96,38 +95,48 @@ def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
     if rubs.law == "none":
         return
     given = {**joint, **_given(get, "friction", rubs)}
-    rows = numbers.rows_of(rubs.declared, given, len(p))
+    friction = with_constants(rubs.declared)
+    rows = numbers.rows_of(friction, given, len(p))
     p[:, at.FRICTION_NUMBERS : at.FRICTION_NUMBERS + rows.shape[1]] = rows
-    found = numbers.sample_numbers(rubs.declared, given)
-    ramp, slope = numbers.steepness_of(rubs.declared, found, len(p))
+    found = numbers.sample_numbers(friction, given)
+    ramp, slope = numbers.steepness_of(friction, found, len(p))
     p[:, at.INVERSE_RAMP], p[:, at.STEEPNESS] = ramp, slope
 
 
 def swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
     """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
-    law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
+    law = with_constants(scene.effects.contact.declared)  # type: ignore[union-attr]
     found: Array = numbers.swing(law, force, _read(law, p, [place], 0))
     return found
 
 
-def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
-    """Largest pressure, Pa, and half angle of contact, rad, (joints,) each, at normal forces (joints,) of the scene's joints.
-
-    Empty where the geometry of contact has no pressure.
-    """
+def has_pressure(scene: Scene) -> bool:
+    """Whether the geometry of a scene's contacts has a pressure."""
     law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
-    if law is None or law.geometry is None or law.geometry.pressure is None:
+    return law is not None and law.geometry is not None and law.geometry.pressure is not None
+
+
+def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:
+    """Fields of `outcome.WIDEST`, (m, MAX_JOINTS) each, at normal forces (m, MAX_JOINTS) of samples; 0 without contact.
+
+    Empty where the geometry of contact has no pressure; NaN at places without a contact.
+    """
+    if not has_pressure(scene):
         return {}
-    found = {name: np.full(len(forces), np.nan) for name in WIDEST}
-    for k, label in enumerate(scene.joint_labels):
-        if label not in scene.contact_labels() or not forces[k] > 0.0:
-            continue
+    law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
+    functions = {name: getattr(law.geometry, attribute) for name, attribute in WIDEST.items()}
+    by_depth = any("depth" in law.arguments(one) for one in functions.values())
+    found = {name: np.full(forces.shape, np.nan) for name in WIDEST}
+    for place, label in zip(scene.open_places, scene.contact_labels(), strict=True):
         given = joint_numbers(scene, get, label)
         own = numbers.sample_numbers(law, given | _given(get, "contact", scene.effects.contact))
-        force = forces[k : k + 1]
-        state = {**own, "force": force, "depth": numbers.depth_at(law, force, own)}
-        for name, attribute in WIDEST.items():
-            found[name][k] = numbers.evaluate(getattr(law.geometry, attribute), state)[0]
+        force = forces[:, place]
+        state = {**own, "force": force}
+        if by_depth:
+            state["depth"] = numbers.depth_at(law, force, own)
+        for name, function in functions.items():
+            value = numbers.evaluate(function, state)
+            found[name][:, place] = np.where(force == 0.0, 0.0, value)
     return found
 
 
@@ -137,7 +146,7 @@ def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: 
     table = scene.effects.contact
     if table is None or not len(places):
         return np.zeros(len(gaps))
-    law: Any = table.declared
+    law = with_constants(table.declared)
     depth = np.maximum(gaps, 0.0)
     on = active if law.latched else np.ones_like(depth)
     each = on * numbers.stored(law, depth, _read(law, par, places))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.quantiles import Uniform
-from hpcclear.dynamics.evaluator import Evaluator
+from hpcclear.dynamics.evaluation.evaluator import Evaluator
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.ranks.progress import Style

@@ -4,7 +4,7 @@ A name in a scene file is one of ours (``"normal"``), that of an installed packa
 of the Python file ``module.py`` beside the scene file. See `Registry`, and docs/extending.md for what each kind has to offer.
 """
 
-from hpcclear.base.objectives import OURS
+from hpcclear.base.objectives import LEVEL, OURS, level_of
 from hpcclear.plugins.registry import Registry
 from hpcclear.plugins.sources import raised, run_source, trusting, using
 
@@ -32,6 +32,7 @@ SEARCHES = Registry("search", "hpcclear.searches")
 
 for _name, _objective in OURS.items():
     OBJECTIVES.add(_name, _objective)
+OBJECTIVES.add_family(LEVEL, level_of)
 SURROGATES.add("kriging", "hpcclear.statistics.surrogate.fitting:KrigingMethod")
 SEARCHES.add("swarm", "hpcclear.statistics.search.mopso:swarm")
 for _name in ("AGEMOEA", "AGEMOEA2", "GDE3", "NSGA2", "NSGA3", "RVEA", "SMSEMOA", "UNSGA3"):

@@ -1,7 +1,8 @@
 """What a name in a scene stands for: one of ours, an installed package's, or one from a file beside the scene."""
 
 import importlib
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
 
@@ -33,12 +34,21 @@ class Registry:
     def __init__(self, kind: str, group: str, needs: tuple[str, ...] = ()) -> None:
         self.kind, self.group, self.needs = kind, group, needs
         self._ours: dict[str, Any] = {}
+        self._families: list[tuple[re.Pattern[str], Callable[[re.Match[str]], Any]]] = []
         self._offered: dict[str, _Offered] = {}
 
     def add(self, name: str, target: object) -> None:
         """Offer one of ours: an object, or where to find it, "package.module:Name", which is imported at its first use."""
         assert name not in self._ours, f"two {self.kind}s are called {name}"
         self._ours[name] = target
+
+    def add_family(self, names: re.Pattern[str], maker: Callable[[re.Match[str]], Any]) -> None:
+        """Offer ours that a number in their name makes: a pattern of their names, and what makes one of a match."""
+        self._families.append((names, maker))
+
+    def is_ours(self, name: str) -> bool:
+        """Whether a name needs nothing else to be installed, those of families included."""
+        return name in self._ours or any(names.fullmatch(name) for names, _ in self._families)
 
     def ours(self) -> tuple[str, ...]:
         """Names that need nothing else to be installed."""
@@ -66,6 +76,9 @@ class Registry:
         """
         if name in self._ours:
             return self._of_ours(name)
+        for names, maker in self._families:
+            if matched := names.fullmatch(name):
+                return maker(matched)
         found = REFERENCE.fullmatch(name)
         if found is None:
             value = self._installed(name)
@@ -80,7 +93,7 @@ class Registry:
 
     def origin(self, name: str, texts: Mapping[str, str] | None = None) -> str:
         """Where a plug-in that was taken comes from, in words; "" for one of ours."""
-        if name in self._ours:
+        if self.is_ours(name):
             return ""
         if name in self._offered:
             return f"{self._offered[name].package} {self._offered[name].version}"

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import (
+    FIELDS,
     JOINTS,
     JUDGED,
     MAPPED,
@@ -239,14 +240,17 @@ def samples_dataset(
     asked = {n for n in (*ON_REQUEST, *STEADY, *MAPPED) if np.isfinite(records[n]).any()}
     if records["regime"].any():  # no period anywhere is an answer as well
         asked |= {*STEADY, "regime"}
-    left_out = {"sample", *ON_REQUEST, *JUDGED} - asked
+    left_out = {"sample", "band", *({*ON_REQUEST, *JUDGED} - asked)}
     kept = [name for name in OUTCOME.names or () if name not in left_out]
-    data |= {name: at_joints(records[name], joints) for name in kept}
+    bands = _bands_of(records)
+    data |= {name: _there(name, records[name], joints, len(bands)) for name in kept}
     if len(labels):
         data["label"] = np.array(labels, dtype=str)[order]
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
     if "sliding_waves" in kept:
         coords["wave"] = np.arange(WAVE_ROWS)
+    if len(bands):
+        coords["band"] = bands
     attrs = {**(attributes or {}), **_checked(data)}
     return dataset("samples", coords, data, attrs, units, objective, words)
 
@@ -265,6 +269,19 @@ def at_joints(values: np.ndarray, joints: Sized) -> np.ndarray:
     return values[:, : len(joints)] if of_joints else values
 
 
+def _bands_of(records: np.ndarray) -> np.ndarray:
+    """Middles of the bands that records have levels of, Hz, shape (bands,)."""
+    known = records["band"][np.isfinite(records["band"]).any(axis=1)]
+    return known[0][np.isfinite(known[0])] if len(known) else np.zeros(0)
+
+
+def _there(name: str, values: np.ndarray, joints: Sized, bands: int) -> np.ndarray:
+    """A field of records at the joints and bands there are, a view."""
+    per = FIELDS[name].per.split()
+    values = values[:, : len(joints)] if "joint" in per else values
+    return values[..., :bands] if "band" in per else values
+
+
 def records(samples: xr.Dataset) -> np.ndarray:
     """The outcome records in a dataset of kind ``samples``, shape (n,) of `OUTCOME`."""
     found = np.zeros(samples.sizes["sample"], OUTCOME)
@@ -275,10 +292,13 @@ def records(samples: xr.Dataset) -> np.ndarray:
             found[name] = nothing
         else:
             values = samples[name].to_numpy()
-            if values.ndim > 1:  # places that no joint has are as in a fresh record
+            if values.ndim == 2:  # places that no joint has are as in a fresh record
                 failed = np.isnan(values).all(axis=1) if values.dtype.kind == "f" else False
                 found[name] = np.where(failed, nothing, 0)[..., None]
-            at_joints(found[name], samples["joint"].to_numpy())[:] = values
+            if "band" in FIELDS[name].per:
+                found[name] = nothing
+            bands = samples.sizes.get("band", 0)
+            _there(name, found[name], samples["joint"].to_numpy(), bands)[...] = values
     return found
 
 

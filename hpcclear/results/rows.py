@@ -61,22 +61,20 @@ def text(dims: Dims, long_name: str, *, required: bool = False) -> Column:
 def outcome(*per_sample: str) -> Columns:
     """What one simulation comes to, in a file with these dimensions."""
     return {
-        name: Column((*per_sample, one.per) if one.per else per_sample, one.unit, one.words, one.kind, one.required)
+        name: Column((*per_sample, *one.per.split()), one.unit, one.words, one.kind, one.required)
         for name, one in FIELDS.items()
-        if name != "sample" and (per_sample or one.per != "wave")
+        if name not in ("sample", "band") and (per_sample or not {"wave", "band"} & {*one.per.split()})
     }  # fmt: skip
 
 
 def by_revolution() -> Columns:
-    """Measures of impact and noise of each averaged revolution, and half-widths of their means."""
+    """Measures of impact and noise of each averaged revolution."""
     found = {}
     means = outcome()
     for name in IMPACTS:
         row = means[name]
         dims = ("revolution", *row.dims)
         found[f"{name}_by_revolution"] = number(dims, row.units, f"{row.long_name}: of each")
-        words = f"half-width of the 95 % confidence interval of {name}"
-        found[f"{name}_limit"] = number(row.dims, row.units, words)
     return found
 
 
@@ -99,10 +97,17 @@ def fit(*dims: str) -> Columns:
     return {
         "r2": number(dims, "1", "1 - SSE/SST on test points", required=True),
         "rmae": number(
-            dims, "1", "largest test error over their standard deviation", required=True
+            dims,
+            "1",
+            "largest test error / standard deviation of test values",
+            required=True,
         ),
         "r2_explained": number(dims, "1", "explained variance ratio, eq. 26 as printed"),
-        "rmae_mean": number(dims, "1", "largest test error over their mean, eq. 27 as printed"),
+        "rmae_mean": number(
+            dims,
+            "1",
+            "largest test error / mean of test values, eq. 27 as printed",
+        ),
         "rmse": number(dims, "objective", "root mean square error on test points"),
         "points": count(dims, "number of points fitted"),
     }

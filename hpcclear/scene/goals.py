@@ -28,7 +28,7 @@ class ObjectiveName(PluginName):
         found = self.registry.get(name)
         if not isinstance(found, Objective):
             raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
-        if name not in self.registry.ours():
+        if not self.registry.is_ours(name):
             check_objective(found)
         return name
 
@@ -37,16 +37,17 @@ class Goal(Table):
     """A statistic of f over the random inputs of a case, or a formula of its design variables."""
 
     statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
-    """Of f: its mean, its standard deviation, the value that a share `level` of all machines stays below, or the share of them
-    beyond `limit`. "cost": what the study variables say that the design costs."""
+    """Statistic of f: "mean", "deviation" (standard deviation), "quantile" (value that a fraction `level` of all
+    machines stays below) or "exceedance" (fraction of machines above `limit`). "cost": sum of the costs of the study
+    variables."""
     of: str | None = None
-    """Another response than the objective of the study that the statistic is of, by its name: "peak-contact-force", say."""
+    """Response that the statistic refers to, such as "peak-contact-force"; default: the objective of the study."""
     formula: str | None = None
-    """In place of a statistic: numbers, design variables (SI, as designed) and + - * / **, such as "m2 + m3"."""
+    """Instead of a statistic: a formula of numbers and nominal design variables (SI) with + - * / **, such as "m2 + m3"."""
     level: Level | None = None
-    """Of "quantile": the share that stays below; default 0.95."""
+    """For "quantile": fraction of machines below the value; default 0.95."""
     limit: float | None = None
-    """Of "exceedance": the value of f, SI."""
+    """For "exceedance": threshold of f, SI."""
 
     @model_validator(mode="after")
     def _complete(self) -> "Goal":
@@ -136,10 +137,10 @@ class Goal(Table):
 
 
 class Constraint(Goal):
-    """What a design must keep to."""
+    """A constraint on the designs of a case."""
 
     most: float
-    """The largest value that is allowed, SI; a share for "exceedance"."""
+    """Largest allowed value, SI; for "exceedance" a probability."""
 
 
 MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")

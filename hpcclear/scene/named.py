@@ -130,7 +130,7 @@ class NamedInput(Table):
 
     name: str
     paths: tuple[str, ...]
-    """Scene entries that all get its value."""
+    """Scene entries that are set to its value."""
 
     @model_validator(mode="before")
     @classmethod

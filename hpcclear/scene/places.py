@@ -27,9 +27,9 @@ class Place(PairTable):
     """A place or an offset; ``[x, y]`` is the same."""
 
     x: Length
-    """m."""
+    """x coordinate, m."""
     y: Length
-    """m."""
+    """y coordinate, m."""
 
 
 class NamedPlace(Place):

@@ -19,11 +19,11 @@ class UntrustedSource(InputError):
 
 
 class PluginFile(Table):
-    """A Python file beside the scene file, whose text goes wherever the scene goes."""
+    """A Python file beside the scene file. Its text is stored and sent with the scene."""
 
     name: str
     source: str
-    """The whole text of the file."""
+    """Complete text of the file."""
 
 
 class PluginPackage(Table):
@@ -31,16 +31,16 @@ class PluginPackage(Table):
 
     name: str
     version: str
-    """The one that was installed."""
+    """Version of the installed package."""
 
 
 class Plugins(Table):
-    """Where plug-ins of this scene come from. The program fills it: results carry it, a scene file need not have it."""
+    """Origin of the plug-ins of this scene. The program adds this table to results; a scene file does not need it."""
 
     files: Annotated[tuple[PluginFile, ...], NamedRows()] = ()
-    """Python files beside the scene file that it names, as "module:Name"."""
+    """Python files beside the scene file, named in it as "module:Name"."""
     packages: Annotated[tuple[PluginPackage, ...], NamedRows()] = ()
-    """Packages whose plug-ins it names."""
+    """Packages whose plug-ins the scene names."""
 
 
 @dataclass(frozen=True)

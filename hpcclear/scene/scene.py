@@ -11,21 +11,21 @@ from hpcclear.base.errors import InputError, unboxed
 from hpcclear.plugins.sources import using
 from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.choices import input_entry
+from hpcclear.scene.consistency import ConsistentTables
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
 from hpcclear.scene.plugged import texts_of
-from hpcclear.scene.tables import SceneTables, plain
+from hpcclear.scene.tables import plain
 from hpcclear.scene.units import noting
 from hpcclear.scene.validation import check_path, validated
 from hpcclear.scene.variables import Variable
 
 
-class Scene(SceneTables):
-    """A scene file, validated: SI numbers, frozen, equal when its content is equal.
-
-    Make one with `load_scene`; change one with `with_`, which validates anew.
+class Scene(ConsistentTables):
+    """A validated scene file with SI numbers. It is immutable; scenes with equal content are equal. `load_scene` reads
+    one, and `with_` returns a changed copy, validated again.
     """
 
     _text: str = PrivateAttr("")

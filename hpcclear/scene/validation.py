@@ -22,7 +22,7 @@ _KINDS = {
     "drive": '"constant-speed" or "torque"',
     "joints.crank_rod": '"clearance" or "ideal"',
     "joints.rod_slider": '"clearance" or "ideal"',
-    "joints": '"revolute", "clearance", "slide" or "fixed"',
+    "joints": '"revolute", "clearance", "slide", "slot" or "fixed"',
     "drives": '"constant-speed", "harmonic" or "torque"',
     "loads": '"force", "torque" or "spring"',
 }

@@ -86,7 +86,7 @@ def sample_numbers(law: Law, given: Mapping[str, object]) -> dict[str, Any]:
     """All numbers of samples, (m,) each: the joint's, the parameters, and what the law works out once."""
     found = dict(given)
     for one in law.worked_out():
-        found |= evaluate(one, given)
+        found |= evaluate(one, found)
     return found
 
 

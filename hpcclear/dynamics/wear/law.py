@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.parameters import Numbers
+from hpcclear.dynamics.setup.parameters import Numbers
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 

@@ -16,6 +16,7 @@ from hpcclear.report.figures import (
     identified,
     maps,
     motion,
+    noise,
     portraits,
     response,
     samples,
@@ -159,6 +160,7 @@ RESPONSE: tuple[Entry, ...] = (
     Entry("phase", "response", portraits.phase_figure, "phase portraits"),
     Entry("poincare", "response", section_figure, "Poincaré section, once a revolution"),
     Entry("spectrum", "response", response.spectrum_figure, "spectra"),
+    Entry("noise", "response", noise.noise_figure, "force levels and orders", "band"),
     Entry("energy", "response", response.energy_figure, "energy balance"),
     Entry("tables", "response", curves.tables_figure, "tables of the scene, as they are simulated"),
 )

@@ -1,0 +1,84 @@
+"""Force levels of one response: third octaves with their confidence intervals, and orders."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels, style
+from hpcclear.report.noise import band_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FALL = 80.0
+"""Levels that are further below the highest are not shown, dB."""
+
+
+@style.drawn
+def noise_figure(response: xr.Dataset) -> "Figure":
+    """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
+    squares of their orders.
+
+    Raises
+    ------
+    InputError
+        If the response has no levels.
+    """
+    if "band" not in response:
+        raise InputError(
+            "noise", "", "this response has no force levels",
+            "Give a joint clearance, and store 64 instants a revolution or more",
+        )  # fmt: skip
+    figure, axes = style.grid(2, 1, 110.0)
+    forces = _forces(response)
+    highest = max(float(level.max()) for level, *_ in forces.values())
+    for row, (name, (level, lower, upper, orders)) in enumerate(forces.items()):
+        colour = style.CYCLE[row % 7]
+        _levels(axes[0, 0], (level, lower, upper), name, colour)
+        unit = labels.scale("N", [float(one.max()) for *_, one in forces.values()])
+        axes[1, 0].loglog(
+            orders["order"], orders.to_numpy() * unit.factor, color=colour, lw=0.7, label=name
+        )
+    axes[0, 0].set_xscale("log")
+    axes[0, 0].set_ylim(bottom=highest - FALL)
+    bands = response["band"].to_numpy()[::3]
+    axes[0, 0].set_xticks(bands, [band_name(one) for one in bands], rotation=45.0)
+    axes[0, 0].minorticks_off()
+    axes[0, 0].set_ylabel("level (dB re 1 µN)")
+    axes[0, 0].set_title("third octaves")
+    axes[0, 0].legend(loc="lower right")
+    axes[1, 0].set_title("orders")
+    axes[1, 0].set_ylabel(unit.label("RMS of the order"))
+    axes[1, 0].set_xlabel("order (multiples of the crank frequency)")
+    style.settle(axes)
+    return figure
+
+
+def _levels(
+    panel: "Axes", ends: tuple[xr.DataArray, xr.DataArray, xr.DataArray], name: str, colour: str
+) -> None:
+    """A line with its interval; an end at nothing is at the bottom."""
+    level, lower, upper = ends
+    there = np.isfinite(level.to_numpy())
+    band = level["band"].to_numpy()[there]
+    panel.plot(band, level.to_numpy()[there], "o-", ms=2.5, lw=0.8, color=colour, label=name)
+    least = np.nan_to_num(lower.to_numpy()[there], nan=np.nan, neginf=-1e3)
+    panel.fill_between(band, least, upper.to_numpy()[there], color=colour, alpha=0.25, lw=0.0)
+
+
+def _forces(
+    response: xr.Dataset,
+) -> dict[str, tuple[xr.DataArray, xr.DataArray, xr.DataArray, xr.DataArray]]:
+    """Level, ends of its interval, and orders, of the force on the frame and of each contact force that is not 0."""
+    ends = ("level", "level_lower", "level_upper", "orders")
+    found = {}
+    if "frame_force_level" in response:
+        found["force on the frame"] = tuple(response[f"frame_force_{end}"] for end in ends)
+    for joint in map(str, response["joint"].to_numpy()):
+        own = tuple(response[f"contact_force_{end}"].sel(joint=joint) for end in ends)
+        if float(own[-1].max()) > 0.0:
+            found[joint.replace("_", " ")] = own
+    return found  # type: ignore[return-value]
