@@ -1,6 +1,7 @@
 """Every command in a Python that lacks what native Windows lacks: modules, functions, signals, flags of files.
 
-    python tests/native_windows.py      prints a table: command, exit code, its last line
+    python tests/native_windows.py            prints a table: command, exit code, its last line
+    python tests/native_windows.py --page     writes the table of docs/checks.md
 
 Each command is a fork of one process in which these names are missing. What Windows has and Linux lacks is not imitated,
 nor are its file system and compiler.
@@ -36,6 +37,32 @@ SIGNALS = (
     "ITIMER_REAL",
     "alarm",
 )
+
+WORKS = (
+    "init", "check", "simulate", "sample", "report", "reproduce", "crate", "schema", "laws", "export", "compare", "plot",
+    "plan", "cite", "import",
+)  # fmt: skip
+"""End with exit code 0."""
+
+STOPS = ("bifurcation", "map", "wear", "effects", "identify", "run", "accuracy")
+"""Work until the time limit that the test sets, and end with exit code 3."""
+
+REFUSED = ("merge",)
+"""End with exit code 2 and a sentence: of the words here nothing else is there to merge, wherever they run."""
+
+PAGE = ROOT / "docs" / "checks.md"
+BEGIN, END = "<!-- native windows: begin -->", "<!-- native windows: end -->"
+
+
+def table() -> str:
+    """What becomes of every command, as a table of the page."""
+    rows = [
+        (WORKS, "works"),
+        (STOPS, "works until the time limit that the test sets, and keeps what is finished"),
+        (REFUSED, "exit code 2 and a message: the test has no parts to merge"),
+    ]
+    lines = [f"| {', '.join(f'`{name}`' for name in names)} | {what} |" for names, what in rows]
+    return "\n".join([BEGIN, "", "| commands | result |", "| --- | --- |", *lines, "", END])
 
 
 class Missing(importlib.abc.MetaPathFinder):
@@ -93,11 +120,13 @@ def commands(scene: str) -> dict[str, list[str]]:
         "run": ["run", scene, "-o", "study", *short],
         "accuracy": ["accuracy", scene, "-o", "accuracy", "--quick", *short],
         "plan": ["plan", scene, "--ranks", "1"],
+        "cite": ["cite"],
+        "import": ["import", "points.csv", "imported.toml"],
     }
 
 
 def outcomes(place: Path, scene: str) -> dict[str, tuple[int, str]]:
-    """Exit code and output of every command of the package; of those that `commands` does not know, of their help."""
+    """Exit code and output of every command of the package."""
     fork, wait = os.fork, os.waitpid
     for library in LIBRARIES:
         importlib.import_module(library)
@@ -108,9 +137,13 @@ def outcomes(place: Path, scene: str) -> dict[str, tuple[int, str]]:
 
     plan.FILE_SECONDS, plan.TARGETS = 0.1, ()  # only the settings of the file, in short
 
+    Path("points.csv").write_text(
+        "name,x [mm],y [mm],bodies\nA,0,0,ground crank\nB,50,0,crank rod\nC,60,120,rod rocker\nD,150,0,rocker ground\n"
+    )
     known = commands(scene)
+    assert set(known) == set(cli.cli.commands), "name the words of every command"
     found = {}
-    for name in [*known, *(one for one in cli.cli.commands if one not in known)]:
+    for name in known:
         said = place / f"{name}.txt"
         child = fork()
         if child == 0:
@@ -119,7 +152,7 @@ def outcomes(place: Path, scene: str) -> dict[str, tuple[int, str]]:
             os.dup2(descriptor, 2)
             code = 70
             try:
-                cli.main(known.get(name, [name, "--help"]))
+                cli.main(known[name])
             except SystemExit as error:
                 code = int(error.code or 0)
             except BaseException:  # noqa: BLE001 - shown, and judged by the test
@@ -135,6 +168,11 @@ def outcomes(place: Path, scene: str) -> dict[str, tuple[int, str]]:
 
 
 def main() -> None:
+    if sys.argv[1:] == ["--page"]:
+        text = PAGE.read_text(encoding="utf-8")
+        before, after = text.partition(BEGIN)[0], text.partition(END)[2]
+        PAGE.write_text(before + table() + after, encoding="utf-8")
+        return
     scene = str(ROOT / "jobs" / "quickstart.toml")
     with tempfile.TemporaryDirectory() as place:
         for name, (code, said) in outcomes(Path(place), scene).items():

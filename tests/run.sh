@@ -2,7 +2,7 @@
 # Set-up and all checks; every step runs whatever became of the others, and one table ends it. Exit 1 if a test failed.
 #   bash tests/run.sh           short profile: what a change must pass before it lands (.ci/run)
 #   bash tests/run.sh --quick   for the loop while developing, under 3 minutes once the kernel is compiled
-#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, release, kills, generated scenes
+#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, examples, release, kills, fuzz, compiled code
 #   bash tests/run.sh --full    everything, and the job scripts on a real Slurm where it is installed
 #   bash tests/run.sh --strict  exit 1 for lint, format, types and layers too; types for every locked Python (.ci/run)
 # --latest and --lowest choose other versions (jobs/environment.sh). All other words go to pytest:

@@ -139,6 +139,7 @@ FOREIGN |= {
     "--tests",
     "--tagged",
     "--changes",
+    "--only",
     "--shm-size",
     "--latest",
     "--lowest",

@@ -56,7 +56,7 @@ class Method:
 
 def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Scene:
     """The scene for one revolution from the start, all of it averaged."""
-    changes: dict[str, Any] = {
+    changes: dict[str, object] = {
         "transient_revolutions": 0,
         "averaged_revolutions": 1,
         "target_error": None,

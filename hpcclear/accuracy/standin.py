@@ -33,7 +33,7 @@ def with_case(scene: Scene) -> tuple[Scene, str, str]:
         for row in scene.study.variables
         if row.range is not None and row.name in names
     }
-    random: dict[str, Any] = {
+    random: dict[str, object] = {
         name: {"distribution": "uniform", "half_width": width} for name, width in widths.items()
     }
     changes = {"study.random": random, "study.cases": {CASE: list(random)}}

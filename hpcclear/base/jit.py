@@ -77,7 +77,7 @@ def written_kind(function: object) -> str | None:
     return _written.get(function) if isinstance(function, Hashable) else None
 
 
-def lane_function(function: Callable[..., Any]) -> Any:
+def lane_function(function: Callable[..., object]) -> Any:
     """Compile what runs inside a loop over lanes: inlined, branch-free, vectorised there."""
     compiled = njit(forceinline=True, error_model="numpy", fastmath=FASTMATH)(function)
     _written[compiled] = "lane"
@@ -100,7 +100,7 @@ def apart(compiled: object) -> Any:
     return compiled
 
 
-def scalar_function(function: Callable[..., Any]) -> Any:
+def scalar_function(function: Callable[..., object]) -> Any:
     """Compile what runs for one lane or one point at a time."""
     compiled = cached(function)
     _written[compiled] = "scalar"

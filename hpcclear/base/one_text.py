@@ -81,7 +81,7 @@ def one_text(function: Any, label: str, **known: Any) -> Callable[..., Any]:
     plain = getattr(function, "py_func", function)
     asked = f"{plain.__module__}.{plain.__qualname__} {sorted(known.items())!r}"
     name = f"{label}_{hashlib.sha256(asked.encode()).hexdigest()[:12]}"
-    return getattr(module_of(name, lambda: text_of(function, name, known)), name)  # type: ignore[no-any-return]
+    return getattr(module_of(name, lambda: text_of(function, name, known)), name)
 
 
 def module_of(name: str, write: Callable[[], str]) -> ModuleType:

@@ -8,7 +8,6 @@ import contextlib
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -106,7 +105,7 @@ def of_lives(scene: Scene) -> Scene:
     """The scene without inputs that its lives are to notify: their clearances are new ones, with what scatter these have."""
     if scene.study is None or not scene.study.worn:
         return scene
-    changes: dict[str, Any] = {"study.cases": {}}
+    changes: dict[str, object] = {"study.cases": {}}
     for row in scene.study.worn:
         new = {"distribution": "uniform", "half_width": row.half_width, "paths": list(row.paths)}
         changes[f"study.random.{row.name}"] = new if row.half_width is not None else None

@@ -138,7 +138,9 @@ def _mat(table: "DataFrame") -> Written:
         while name in names.values():
             name, k = f"{identifier(str(heading))[:59]}_{k}", k + 1
         names[str(heading)] = name
-    content: dict[str, Any] = {names[str(h)]: _column(table[h].to_numpy()) for h in table.columns}
+    content: dict[str, object] = {
+        names[str(h)]: _column(table[h].to_numpy()) for h in table.columns
+    }
     content |= {names[h]: table.attrs[h] for h in names if h in table.attrs}
     for key in ("units", "long_names"):
         content[key] = {names[h]: text for h, text in table.attrs[key].items() if h in names}

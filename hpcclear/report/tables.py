@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -108,7 +108,7 @@ class _Table:
         self.shape = tuple(content.sizes[dim] for dim in rows)
         self.columns: dict[str, np.ndarray] = {}
         self.keys: set[str] = set()
-        self.single: dict[str, Any] = {}
+        self.single: dict[str, object] = {}
         self.units: dict[str, str] = {}
         self.words: dict[str, str] = {}
         self.left_out: list[str] = []

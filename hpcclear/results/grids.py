@@ -1,7 +1,5 @@
 """Maps: files of kind ``samples`` whose samples are the cells of a grid."""
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
@@ -27,7 +25,7 @@ def grid(content: xr.Dataset) -> xr.Dataset:
     names = [
         str(v.name) for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"
     ]
-    coords: dict[str, Any] = {}
+    coords: dict[str, object] = {}
     for k, name in enumerate(names):
         values = np.moveaxis(content[name].to_numpy().reshape(shape), k, 0).reshape(shape[k], -1)
         coords[name] = (name, values[:, 0], content[name].attrs)

@@ -295,7 +295,7 @@ def _decode_values(source: h5py.Dataset) -> np.ndarray:
 
 
 def _decode_attributes(source: h5py.Dataset | h5py.File) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for name in source.attrs:
         if name in _HIDDEN:
             continue

@@ -40,7 +40,7 @@ class Row(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _gathered(cls, data: object) -> Any:
+    def _gathered(cls, data: object) -> object:
         """Paths beside the name, as a file has them, as `entries` in SI."""
         if not isinstance(data, Mapping) or "entries" in data:
             return data

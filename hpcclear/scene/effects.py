@@ -105,7 +105,7 @@ class Effects(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _none_is_off(cls, data: object) -> Any:
+    def _none_is_off(cls, data: object) -> object:
         if not isinstance(data, Mapping):
             return data
         for key in ("friction", "guide_friction"):

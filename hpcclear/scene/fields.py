@@ -60,7 +60,7 @@ class Table(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> Any:
+    def _known_keys(cls, data: Any) -> object:
         if isinstance(data, Table):
             return data
         check_table(data)
@@ -159,7 +159,7 @@ class Quantity(Converted):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        number: dict[str, Any] = {"type": "number"}
+        number: dict[str, object] = {"type": "number"}
         for name, bound in (
             ("exclusiveMinimum", self.above),
             ("exclusiveMaximum", self.below),
@@ -331,7 +331,7 @@ class NamedRows:
     def rows(self, value: object) -> Any:
         """``{name: {...}}`` as ``[{"name": name, ...}]``."""
         if isinstance(value, Mapping):
-            rows: list[Any] = []
+            rows: list[object] = []
             for name, row in value.items():
                 if not isinstance(row, Mapping):
                     raise invalid(

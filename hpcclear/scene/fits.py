@@ -40,7 +40,7 @@ class Tolerance(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _in_metres(cls, data: object) -> Any:
+    def _in_metres(cls, data: object) -> object:
         if not isinstance(data, Mapping) or "range" not in data:
             return data
         ends = data["range"]

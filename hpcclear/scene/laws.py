@@ -164,7 +164,7 @@ class LawTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> Any:
+    def _known_keys(cls, data: Any) -> object:
         """The entries of the law, converted; overrides what a table without a law does."""
         if isinstance(data, Table):
             return data

@@ -51,7 +51,7 @@ def with_values(content: Mapping[str, object], folder: Path) -> tuple[Mapping[st
             raise InputError(
                 f"{key}.file", file, "the name of a table is expected here", "Write it in quotes"
             )
-        made: Any
+        made: object
         if key.startswith("study.random."):
             made, shown = _with_values(row, key, folder)
         else:

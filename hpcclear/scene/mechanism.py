@@ -223,7 +223,7 @@ class IdealJoint(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _no_dimensions(cls, data: object) -> Any:
+    def _no_dimensions(cls, data: object) -> object:
         # What a clearance joint needs may stay in the file, so that `--set
         # joints.crank_rod.kind=ideal` is enough to switch one off; it is dropped here, so that it
         # cannot make two equal scenes look different.

@@ -68,7 +68,7 @@ class Moving:
         """
         if not self.moves(row):
             return row.law
-        entries: dict[str, Any] = {}
+        entries: dict[str, object] = {}
         for one in self._drivers[row.name]:
             if one.name in design:
                 for path, value in one.drives(float(design[one.name])).items():

@@ -134,7 +134,7 @@ class NamedInput(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _resolve(cls, data: object) -> Any:
+    def _resolve(cls, data: object) -> object:
         if not isinstance(data, Mapping):
             return data
         data = cls._without_numbers(data)

@@ -1,6 +1,6 @@
 """How a scene is integrated and what is written, as in the scene file."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
@@ -73,7 +73,7 @@ class Numerics(Table):
 
     @field_validator("method", mode="before")
     @classmethod
-    def _method_that_was(cls, value: object) -> Any:
+    def _method_that_was(cls, value: object) -> object:
         """One version long: collocation has gone, and what stands in its place is as tight."""
         if value != "lobatto":
             return value

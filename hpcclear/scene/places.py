@@ -15,7 +15,7 @@ class PairTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _from_pair(cls, data: object) -> Any:
+    def _from_pair(cls, data: object) -> object:
         if not isinstance(data, (list, tuple)):
             return data
         if len(data) != 2:

@@ -272,7 +272,7 @@ class Planar(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _alike(cls, data: object) -> Any:
+    def _alike(cls, data: object) -> object:
         """Entries of a body or joint that is ``like`` another, written out; tables among them, such as materials, take over
         what they do not say, points are a body's own."""
         if not isinstance(data, Mapping):

@@ -77,7 +77,7 @@ def as_invalid(key: str = "") -> Iterator[None]:
 
 def texts_of(content: Mapping[str, object]) -> dict[str, str]:
     """Source texts that the content of a scene carries, by module; whatever else stands there."""
-    table: Any = content.get("plugins")
+    table: object = content.get("plugins")
     rows = table.get("files") if isinstance(table, Mapping) else None
     if not isinstance(rows, Mapping):
         return {}

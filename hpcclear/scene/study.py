@@ -71,7 +71,7 @@ class Study(Moving, Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, data: object) -> Any:
+    def _fill_in(cls, data: object) -> object:
         """Cases as plain lists of names, random inputs with the paths of the variable of that name,
         and the sensitivity's parameter."""
         if not isinstance(data, Mapping):

@@ -106,7 +106,7 @@ def neighbours(
     InputError
         Too few designs that did not fail for a model.
     """
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     names = run.study.design_variables(case.name)
     bounds, rng = _bounds(run, case), run.rng("edge", case.name, str(len(coordinates)))

@@ -297,7 +297,7 @@ def carry_out(run: StudyRun, extent: Extent) -> None:
     extent : function
         How much the effect screening simulates (`hpcclear.study.extent.certificate_extent`).
     """
-    results: dict[str, Any] = {"scene": run.scene, "extent": extent}
+    results: dict[str, object] = {"scene": run.scene, "extent": extent}
     for stage in stages_of(run.scene):
         arguments = [results.get(name) for name in stage.needs]
         results[stage.name] = stage.run(results.get("wear", run), *arguments)

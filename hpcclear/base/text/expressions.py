@@ -115,14 +115,14 @@ class Expressions:
 
     def expression(self, node: ast.expr, scope: Scope) -> Value:
         """What an expression stands for."""
-        return getattr(self, f"_on_{type(node).__name__}")(node, scope)  # type: ignore[no-any-return]
+        return getattr(self, f"_on_{type(node).__name__}")(node, scope)
 
     def _on_Constant(self, node: ast.Constant, scope: Scope) -> Value:
         return Known(node.value)
 
     def _on_Name(self, node: ast.Name, scope: Scope) -> Value:
         if node.id in scope.values:
-            return scope.values[node.id]  # type: ignore[no-any-return]
+            return scope.values[node.id]
         if node.id in scope.names:
             return Known(scope.names[node.id], (scope.module, node.id))
         return Known(getattr(builtins, node.id), ("builtins", node.id))
@@ -135,19 +135,19 @@ class Expressions:
             return Known(getattr(owner.value, node.attr), source)
         if isinstance(owner, Parts):
             assert owner.maker is not None
-            return owner.items[owner.maker.value._fields.index(node.attr)]  # type: ignore[no-any-return]
+            return owner.items[owner.maker.value._fields.index(node.attr)]
         return ast.Attribute(self.text(owner), node.attr, ast.Load())
 
     def _on_Subscript(self, node: ast.Subscript, scope: Scope) -> Value:
         owner = self.expression(node.value, scope)
         if isinstance(owner, dict):
-            return owner[self.expression(node.slice, scope).value]  # type: ignore[union-attr, no-any-return]
+            return owner[self.expression(node.slice, scope).value]  # type: ignore[union-attr]
         index = self.expression(node.slice, scope)
         if isinstance(index, Known):
             if isinstance(owner, Known):
                 return Known(owner.value[index.value])
             if isinstance(owner, Parts):
-                return owner.items[index.value]  # type: ignore[no-any-return]
+                return owner.items[index.value]
         return ast.Subscript(self.text(owner), self.text(index), ast.Load())
 
     def _on_Slice(self, node: ast.Slice, scope: Scope) -> Value:

@@ -34,7 +34,7 @@ class Writer(Expressions):
         guarded, self.guarded = self.guarded, 0
         emitted, value = self.inside(lambda: self.write_out(function, arguments, named))
         self.guarded = guarded
-        return None if emitted else value  # type: ignore[no-any-return]
+        return None if emitted else value
 
     def beside(self, function: Any, arguments: list[Value], named: dict[str, Value]) -> ast.expr:
         """Call a function of the other kind, or with returns inside loops: written down beside this one, once for each set of

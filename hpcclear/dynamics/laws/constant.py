@@ -159,7 +159,7 @@ class _Short(ast.NodeTransformer):
                     free = {one.id for one in ast.walk(value) if isinstance(one, ast.Name)} - {*own}
                     if all(self.around.get(k) is called.__globals__.get(k) for k in free):
                         given = dict(zip(own, node.args, strict=True))
-                        return _Named(given).visit(value)  # type: ignore[no-any-return]
+                        return _Named(given).visit(value)
         self.generic_visit(node)
         return node
 

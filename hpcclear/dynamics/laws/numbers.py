@@ -25,12 +25,12 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 def with_words(
-    function: Callable[..., Any], words: Mapping[str, object], own: Mapping[str, object]
+    function: Callable[..., object], words: Mapping[str, object], own: Mapping[str, object]
 ) -> Any:
     """The same function, and those of its module that it calls, with other functions for those of `math` and of Python."""
     if not isinstance(function, FunctionType):
         return function
-    made: dict[str, Any] = {}
+    made: dict[str, object] = {}
     names = dict(function.__globals__)
     code = function.__code__
     for name in code.co_names:
@@ -54,7 +54,7 @@ def with_words(
     return result
 
 
-def evaluate(function: Callable[..., Any], given: Mapping[str, object]) -> Any:
+def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> Any:
     """A function of arrays that broadcast, of any shape: an array, or a dict of such."""
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     values = [given[name] for name in names]
@@ -65,7 +65,7 @@ def evaluate(function: Callable[..., Any], given: Mapping[str, object]) -> Any:
             return _one_by_one(function, values)
 
 
-def _one_by_one(function: Callable[..., Any], values: list[Any]) -> Any:
+def _one_by_one(function: Callable[..., object], values: list[Any]) -> Any:
     shape = np.broadcast_shapes(*(np.shape(one) for one in values))
     flat = [np.broadcast_to(np.asarray(one, float), shape).ravel() for one in values]
     rows = [_safely(function, [float(one) for one in row]) for row in zip(*flat, strict=True)]
@@ -74,7 +74,7 @@ def _one_by_one(function: Callable[..., Any], values: list[Any]) -> Any:
     return np.array(rows, float).reshape(shape)
 
 
-def _safely(function: Callable[..., Any], row: list[float]) -> Any:
+def _safely(function: Callable[..., object], row: list[float]) -> Any:
     """A value; NaN where Python's own arithmetic gives none."""
     try:
         return function(*row)

@@ -113,7 +113,7 @@ def _check_rate(objective: Objective) -> None:
     """LawError unless the rate is finite, in flight as well, and what is made of it has its unit."""
     between = np.linspace(0.0, 1.0, 7)
     shares = np.array(np.meshgrid(between, between)).reshape(2, -1)
-    given: dict[str, Any] = dict(TYPICAL)
+    given: dict[str, object] = dict(TYPICAL)
     for k, (name, (low, high)) in enumerate(_RANGES.items()):
         given[name] = low + (high - low) * shares[k % 2]
     assert objective.rate is not None
@@ -152,7 +152,7 @@ def _check_value(objective: Objective, numbers: Mapping[str, object]) -> None:
         _fits(made, objective.unit, "its value")
 
 
-def _with_unit(function: Callable[..., Any], given: Mapping[str, object], title: str) -> Any:
+def _with_unit(function: Callable[..., object], given: Mapping[str, object], title: str) -> Any:
     """A function of quantities; None where it is no arithmetic of these."""
     import pint
 

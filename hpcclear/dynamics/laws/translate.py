@@ -35,7 +35,7 @@ class LawError(ValueError):
         super().__init__(reason)
 
 
-def definition_of(function: Callable[..., Any]) -> ast.FunctionDef:
+def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
     """The syntax tree of a function."""
     try:
         tree = ast.parse(textwrap.dedent(_source(function))).body[0]
@@ -48,9 +48,9 @@ def definition_of(function: Callable[..., Any]) -> ast.FunctionDef:
     return tree
 
 
-def _source(function: Callable[..., Any]) -> str:
+def _source(function: Callable[..., object]) -> str:
     """The lines of a function; of a text that stands in no file, from its module's loader."""
-    loader: Any = getattr(sys.modules.get(function.__module__), "__loader__", None)
+    loader: object = getattr(sys.modules.get(function.__module__), "__loader__", None)
     path = function.__code__.co_filename
     if path.startswith("<") and hasattr(loader, "get_source"):
         lines = loader.get_source(function.__module__).splitlines(keepends=True)
@@ -58,7 +58,7 @@ def _source(function: Callable[..., Any]) -> str:
     return inspect.getsource(function)
 
 
-def written(function: Callable[..., Any], name: str, title: str) -> list[str]:
+def written(function: Callable[..., object], name: str, title: str) -> list[str]:
     """Texts of a function, called `name`, and of those it calls, which come first.
 
     Raises
@@ -78,7 +78,7 @@ class _Writer:
         self.helpers: list[str] = []
         self.names: dict[Any, str] = {}
 
-    def function(self, function: Callable[..., Any], name: str) -> list[str]:
+    def function(self, function: Callable[..., object], name: str) -> list[str]:
         """Its text and those before it."""
         if self.depth > 8:
             raise LawError(f"{self.title} calls itself, or too deeply")
@@ -248,7 +248,7 @@ class _Writer:
     def power(self, base: ast.expr, power: ast.expr) -> str:
         inside = self.text(base)
         negative = isinstance(power, ast.UnaryOp) and isinstance(power.op, ast.USub)
-        number: Any = power.operand if negative else power  # type: ignore[attr-defined]
+        number: object = power.operand if negative else power  # type: ignore[attr-defined]
         if isinstance(number, ast.Name) and number.id not in self.known:
             number = ast.Constant(self.globals.get(number.id))
         if isinstance(number, ast.BinOp) and all(

@@ -236,7 +236,7 @@ def numbers(bar: Bar, modes: int) -> dict[str, Any]:
     share = uniform_share(bar.mass, bar.inertia, bar.length, bar.center)
     length, c = bar.length, bar.center
     density = share / length
-    found: dict[str, Any] = {"mass": 0.5 * share, "inverse_mass": 2.0 / share}
+    found: dict[str, object] = {"mass": 0.5 * share, "inverse_mass": 2.0 / share}
     found["most"] = SHORTEST * length
     wave = {i: i * np.pi / length for i in range(1, modes + 1)}
     for i, a in wave.items():

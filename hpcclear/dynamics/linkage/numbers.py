@@ -32,7 +32,7 @@ def values(
     """Base parameters by name, SI; `feedback`: alpha and beta in 1/s (paper eq. 11)."""
     trees = forest(mechanism, cartesian)
     alpha, beta = feedback
-    found: dict[str, Any] = {"gravity": gravity, "alpha2": 2.0 * alpha, "beta2": beta * beta}
+    found: dict[str, object] = {"gravity": gravity, "alpha2": 2.0 * alpha, "beta2": beta * beta}
     for name, (x, y) in mechanism.ground.items():
         found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
     _bodies(trees, found)

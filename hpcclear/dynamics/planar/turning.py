@@ -6,7 +6,7 @@ ideal joints alone depend on one another there.
 """
 
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -206,7 +206,7 @@ def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) ->
 def _clear(loops: Loops, samples: Made) -> Booleans:
     """Which samples (m,) are certain to turn."""
     sample = samples.numbers
-    tables: dict[str, Any] = {
+    tables: dict[str, object] = {
         "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,
         "ground": sample.ground, "loads": (),
     }  # fmt: skip

@@ -89,7 +89,7 @@ def _running_in(scene: Scene, get: Numbers, joint: str) -> tuple[Array, Array]:
 
 def _coefficient(scene: Scene, get: Numbers, joint: str, surface: str) -> Array:
     """k of a surface for each point, m2/N; 0 of one that does not wear."""
-    wear: Any = scene.clearance_joint(joint).wear
+    wear: object = scene.clearance_joint(joint).wear
     table, key = getattr(wear, surface), f"{scene.joint_key(joint)}.wear.{surface}"
     if table is None:
         return np.zeros(get.size)

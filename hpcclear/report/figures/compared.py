@@ -1,6 +1,6 @@
 """A simulated response over measured series (`hpcclear.report.compare`)."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def overlay_figure(comparison: "Comparison") -> "Figure":
     x = comparison.x[order] * across.factor
     for panel, one in zip(axes[:, 0], comparison.quantities, strict=True):
         unit = scale(one.shown, one.unit)
-        dots: dict[str, Any] = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
+        dots: dict[str, object] = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
         panel.plot(x, one.measured[order] * unit.factor, ".", label="measured", **dots)
         line = one.simulated[order] * unit.factor
         panel.plot(x, line, color=style.PALETTE["blue"], label="simulated")

@@ -113,7 +113,7 @@ def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
     for k, run in enumerate(one["run"].to_numpy()):
         row = one.sel(run=run)
         points = [row[goal.searched].to_numpy() * goal.scale.factor for goal in (x, y)]
-        options: dict[str, Any] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
+        options: dict[str, object] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
         panel.plot(*points, style.MARKERS[k % 7], label=f"run {run}", **options)
 
 
@@ -141,7 +141,7 @@ def _verified(
         if marker != "o" and not all_designs:
             continue
         at = [float(one[f"{goal.verified}_true"]) * goal.scale.factor for goal in (x, y)]
-        options: dict[str, Any] = {
+        options: dict[str, object] = {
             "fmt": marker,
             "ms": 3.4,
             "mfc": "white",

@@ -67,7 +67,12 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
         radius = shown["contact_force"].sel(joint=joint).to_numpy() * force.factor
         contact = radius > 0.0
         colour = np.mod(turn, 1.0)[contact] * 360.0
-        options: dict[str, Any] = {"cmap": _cyclic(), "vmin": 0.0, "vmax": 360.0, "linewidths": 0}
+        options: dict[str, object] = {
+            "cmap": _cyclic(),
+            "vmin": 0.0,
+            "vmax": 360.0,
+            "linewidths": 0,
+        }
         drawn = panel.scatter(
             np.arctan2(y, x)[contact], radius[contact], c=colour, s=3.0, **options
         )

@@ -194,7 +194,7 @@ def _laid_out(figure: "Figure", dpi: int) -> Iterator[None]:
 
 def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
     """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes."""
-    stamp: Any = {
+    stamp: object = {
         "png": {"Software": "hpcclear"},
         "svg": {"Date": None, "Creator": "hpcclear"},
         "pdf": {"CreationDate": None, "Creator": "hpcclear", "Producer": None},

@@ -89,7 +89,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
         for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
             for k, interval in enumerate(intervals):
                 values = sensitivity[name].sel(surface=surface).isel(interval=k).to_numpy()
-                options: dict[str, Any] = {"marker": style.MARKERS[k % 7], "ms": 2.2, "lw": 0.7}
+                options: dict[str, object] = {"marker": style.MARKERS[k % 7], "ms": 2.2, "lw": 0.7}
                 panel.plot(clearance, values, color=colours[k], label=f"{interval:.0%}", **options)
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")

@@ -89,7 +89,7 @@ def made(maker: Callable[[Task], Any], name: str, task: Task) -> Search:
     if missing:
         remedy = "Give it ask() and tell(designs, objectives, constraints)"
         raise InputError(KEY, name, f"has no {' and no '.join(missing)}", remedy)
-    return search  # type: ignore[no-any-return]
+    return search
 
 
 def minimise(search: Search, function: Function, task: Task, size: int, name: str = "") -> Front:

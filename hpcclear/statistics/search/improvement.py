@@ -179,7 +179,7 @@ def proposals(known: Known, space: Space, count: int, rng: np.random.Generator) 
     InputError
         Too few designs for a model.
     """
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1, user_api="blas"):  # the same bits, and faster
         beliefs = Beliefs(known, space, rng)

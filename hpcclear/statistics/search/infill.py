@@ -102,7 +102,7 @@ def proposals(
     InputError
         Too few designs for a model.
     """
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1, user_api="blas"):  # as in the fit: the same bits, and faster
         table = values if excess is None else np.column_stack([values, excess])

@@ -125,7 +125,7 @@ def _maximise_likelihood(
     noise: tuple[float, float],
 ) -> dict[str, Any]:
     """What `Kriging` calls so: length scales, variances and alpha, of normalised data in the unit cube."""
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     dims = unit.shape[1]
     start = np.array([1.0, *np.full(dims, min(0.5, lengths[1])), np.clip(1e-3, *noise)])

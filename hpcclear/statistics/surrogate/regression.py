@@ -280,7 +280,7 @@ def _called(source: object, label: str, seed: int) -> Any:
 
 def _ask(model: object, label: str, what: str, *arguments: Array) -> Any:
     """What a method of the regressor returns, with one thread: more would change last bits."""
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     try:
         with threadpool_limits(limits=1):

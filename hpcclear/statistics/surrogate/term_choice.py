@@ -54,7 +54,7 @@ def choose_terms(z: Array, values: Array, order: int) -> tuple[Integers, float]:
     InputError
         Too few points to choose by.
     """
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     count, dims = z.shape
     least = least_points(dims)

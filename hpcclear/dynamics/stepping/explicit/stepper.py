@@ -114,7 +114,7 @@ def make_stepper(W: int, *, implicit: bool = False) -> Any:
     `columns.new_columns`); and the budget: how many block steps to take at most. It returns True while lanes are running. A
     response and an ensemble call the same machine code; ensembles want at least twice the vector length.
     """
-    known: dict[str, Any] = {"W": W}
+    known: dict[str, object] = {"W": W}
     if not implicit:
         known["memory"] = None
     text = one_text(advance, f"stepper_{W}", **known)
