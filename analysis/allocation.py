@@ -1,11 +1,13 @@
 """Are tolerances ranked rightly, and allocated for the least cost? Both against brute force on mechanisms.
 
     python analysis/allocation.py ranks         # ten designs: halving each tolerance, by simulation; a few minutes
+    python analysis/allocation.py ranks --seed 101
     python analysis/allocation.py mechanism     # widths of three inputs of a slider-crank on a grid of costs; some minutes
 
 `ranks`: of each design the fall of the standard deviation of f with half the scatter of each input, as a study prints it from
-the samples that verify the design, beside the fall that simulations with half the scatter show. Inputs whose falls do not
-differ by more than three standard errors count as tied.
+the samples that verify the design, beside the fall that simulations with half the scatter show. The criterion: a design is
+right if each two inputs whose simulated falls differ by more than three standard errors are predicted in the same order. It was
+fixed on seed 1; other seeds judge it.
 
 `mechanism`: a study minimises the cost of three widths while the standard deviation of f stays below a threshold. All widths
 of a grid that keep it are simulated beside it.
@@ -57,7 +59,7 @@ DESIGNS = [
 ]  # fmt: skip
 
 
-def scene_of(design: dict, widths: dict[str, float] | None = None) -> Scene:
+def scene_of(design: dict, widths: dict[str, float] | None = None, seed: int = 1) -> Scene:
     """The slider-crank of jobs/slider_crank.toml at a design, its inputs uniform within their half-widths."""
     content = tomllib.loads((ROOT / "jobs" / "slider_crank.toml").read_text())
     content.pop("study", None)
@@ -67,7 +69,7 @@ def scene_of(design: dict, widths: dict[str, float] | None = None) -> Scene:
         width = (widths or {}).get(name, share * scene.number(path))
         rows[name] = {"path": path, "distribution": "uniform", "half_width": width}
     variables = {"I3": {"path": "mechanism.crank.mass", "range": [0.29, 0.31]}}
-    study = {"seed": 1, "variables": variables, "random": rows}
+    study = {"seed": seed, "variables": variables, "random": rows}
     return load_scene(scene.resolved() | {"study": study})
 
 
@@ -87,11 +89,11 @@ def scattered(scene: Scene, factors: dict[str, float]) -> tuple[np.ndarray, np.n
     return np.array(inputs), f.reshape(REPLICATES, LENGTH)
 
 
-def ranks() -> None:
+def ranks(seed: int) -> None:
     """Compare predicted falls with simulated ones."""
     right = 0
     for number, design in enumerate(DESIGNS):
-        scene = scene_of(design)
+        scene = scene_of(design, seed=seed)
         inputs, f = scattered(scene, {})
         found = contributions(inputs, f, range(len(INPUTS)))
         whole = moments(f)[1]
@@ -114,7 +116,12 @@ def ranks() -> None:
             f"{n} {p:.1%} ({s:.1%} ± {e:.1%})"
             for n, p, s, e in zip(names, found.halved, simulated, 2 * error, strict=True)
         )
-        print(f"{number + 1}: {'right' if not wrong else f'wrong {wrong}'}: {said}", flush=True)
+        whole_share = found.share.sum() + found.rest
+        print(
+            f"{number + 1}: {'right' if not wrong else f'wrong {wrong}'}: {said}; "
+            f"contributions and remainder {whole_share:.1%}",
+            flush=True,
+        )
     print(f"rank order right in {right} of {len(DESIGNS)}")
 
 
@@ -194,4 +201,6 @@ def deviation(scene: Scene, widths: dict[str, float]) -> float:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=["ranks", "mechanism"])
-    {"ranks": ranks, "mechanism": mechanism}[parser.parse_args().what]()
+    parser.add_argument("--seed", type=int, default=1, help="of the simulations of ranks")
+    words = parser.parse_args()
+    ranks(words.seed) if words.what == "ranks" else mechanism()

@@ -12,7 +12,7 @@ from hpcclear.base.one_text import one_text
 from hpcclear.dynamics.layout import Effects
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.rhs import SIGNATURE
-from hpcclear.dynamics.problem import Problem
+from hpcclear.dynamics.stepping.problem import Problem
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
 _X86 = re.compile(

@@ -25,9 +25,9 @@ from scenes import Setup, ensemble, scene
 
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.linkage.rhs import run_motion
-from hpcclear.dynamics.views import Outcome
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.provenance import provenance
 
 WIDTHS = (1, 16, 32)

@@ -33,9 +33,9 @@ from scenes import JOB, Setup, single
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.layout.views import Parameters, Start
 from hpcclear.dynamics.stepping import record as rec
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import load_scene
 

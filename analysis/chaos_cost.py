@@ -21,12 +21,12 @@ from target_error import random_scene
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.copies import perturbed, scales
-from hpcclear.dynamics.steady.judging import objective
+from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 

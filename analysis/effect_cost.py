@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hpcclear.dynamics.lanes import Lanes
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.tables import mechanism_of
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
 from hpcclear.results.provenance import provenance

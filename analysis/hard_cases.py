@@ -26,14 +26,14 @@ from hpcclear import __version__
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import PERTURBATIONS, outcome_records
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS, outcome_records
 from hpcclear.dynamics.planar.energy import energies
-from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.rows import Columns, number
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points

@@ -1,24 +1,31 @@
 """Made machines identified from made signals: do 95 % intervals hold, and is what the model lacks noticed?
 
-    nice -n 15 python analysis/identify_machines.py OUT [--machines 200] [--members 256]
-    python analysis/identify_machines.py OUT --summary
+    nice -n 15 python analysis/identify_machines.py OUT [--machines 200] [--seed 1] [--rows ROWS.json]
+    python analysis/identify_machines.py --table ROWS.json
+    python analysis/identify_machines.py OUT --advise
     python analysis/identify_machines.py OUT --raw
 
 Three mechanisms, one and two unknown clearances, random masses, friction and restitution, noise of 2, 10 and 30 %. All signals
 are made at another integration tolerance than the ensemble's; in a third of the machines there is an effect that the model
-lacks. Machine k follows from its number alone. Ensembles and groups of machines are kept in OUT as they finish: the same
-command goes on. `--raw` fits the raw signal by least squares for comparison.
+lacks. Each mechanism, number of unknowns and noise has the same share of these. A machine follows from the seed and its number.
+
+One ensemble serves all machines of a mechanism and number of unknowns, and one calibration those that also share signal and
+noise: each machine costs one simulated signal and one posterior. Ensembles, signals and groups are kept in OUT as they finish:
+the same command continues. `--advise` compares signals for two unknowns. `--raw` fits the raw signal by least squares.
 """
 
 import argparse
 import json
 import tempfile
+import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hpcclear import load_scene, simulate
+from hpcclear.dynamics.response import simulate_together
+from hpcclear.identify.advice import advice
 from hpcclear.identify.features import Layout
 from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.judgement import features_of, judged, prepare
@@ -31,6 +38,8 @@ from hpcclear.ranks.boundary import alone
 JOBS = Path(__file__).resolve().parent.parent / "jobs"
 NOISE = (0.02, 0.1, 0.3)
 SIGNALS = ("crank_moment", "frame_force_x")
+SHORT = {"crank_moment": "torque", "frame_force_x": "frame force"}
+MECHANISMS = ("slider-crank", "crank-rocker", "press")
 SOFT = {"youngs_modulus": 1e9, "poisson_ratio": 0.38}  # polymer bushes: fewer steps than bronze
 
 
@@ -96,13 +105,12 @@ def mechanisms() -> dict[str, dict[str, Any]]:
     }  # fmt: skip
 
 
-def group_of(k: int) -> tuple[str, int, str, float]:
+def group_of(seed: int, k: int) -> tuple[str, int, str, float]:
     """Mechanism, number of unknowns, signal and noise of machine k."""
-    rng = np.random.default_rng([k, 0])
-    name = ("slider-crank", "crank-rocker", "press")[k % 3]
+    rng = np.random.default_rng([seed, k, 0])
     count = 1 + (k // 3) % 2
     signal = SIGNALS[0] if count == 2 else SIGNALS[int(rng.random() < 0.33)]
-    return name, count, signal, NOISE[(k // 6) % 3]
+    return MECHANISMS[k % 3], count, signal, NOISE[(k // 6) % 3]
 
 
 def model_of(name: str, count: int) -> tuple[Any, Inputs]:
@@ -129,53 +137,77 @@ def ensemble_of(folder: Path, name: str, count: int, members: int) -> Ensemble:
     return Ensemble(inputs, found["places"], SIGNALS, found["spectra"], revolutions, int(found["failed"]))  # fmt: skip
 
 
-def machine(folder: Path, k: int) -> tuple[dict[str, Any], Path]:
-    """What machine k is, and its measured table, made on the way."""
-    name, count, signal, noise = group_of(k)
+class Machine(NamedTuple):
+    """A machine: its scene, with the effect that the model lacks, its clearances, and its measurement."""
+
+    scene: Any
+    truth: list[float]
+    lacks: list[str]
+    revolutions: int
+
+
+def machine(seed: int, k: int) -> Machine:
+    """Return machine k."""
+    name, count, _, _ = group_of(seed, k)
     scene, inputs = model_of(name, count)
-    rng = np.random.default_rng([k, 1])
+    rng = np.random.default_rng([seed, k, 1])
     place = rng.random((1, inputs.size))
-    lacks = mechanisms()[name]["lacks"] if k % 9 in (0, 4, 8) else []
-    effect = lacks[(k // 9) % len(lacks)] if lacks else {}
-    table = folder / f"machine-{k:04d}.csv"
-    if not table.exists():
-        real = prepared_scene(scene).with_(inputs.variants(place)[0])
-        real = real.with_({**effect, "numerics.rtol": scene.numerics.rtol * 1e-2})
-        revolutions = int(rng.integers(15, 41))
-        write_made(real, table, [signal], noise=noise, revolutions=revolutions, seed=k)
-    truth = inputs.values(place)[0, :count].tolist()
-    facts = {"machine": k, "group": [name, count, signal, noise], "truth": truth}
-    return facts | {"lacks": list(effect)}, table
+    effects = mechanisms()[name]["lacks"]
+    effect = effects[rng.integers(len(effects))] if (k + k // 18) % 3 == 0 else {}
+    revolutions = int(rng.integers(15, 41))
+    real = prepared_scene(scene).with_(inputs.variants(place)[0])
+    real = real.with_({**effect, "numerics.rtol": scene.numerics.rtol * 1e-2})
+    truth = [float(f"{v:.6g}") for v in inputs.values(place)[0, :count]]
+    return Machine(real, truth, list(effect), revolutions)
 
 
-def run_group(folder: Path, numbers: list[int], members: int) -> None:
+def tables_of(folder: Path, seed: int, numbers: list[int]) -> list[Path]:
+    """Measured tables of machines of one group, simulated eight at a time where they are not there yet."""
+    tables = [folder / f"machine-{seed}-{k:04d}.csv" for k in numbers]
+    missing = [i for i, table in enumerate(tables) if not table.exists()]
+    for begin in range(0, len(missing), 8):
+        own = missing[begin : begin + 8]
+        made = [machine(seed, numbers[i]) for i in own]
+        most = {"numerics.averaged_revolutions": max(one.revolutions for one in made) + 1}
+        for j, response in simulate_together([one.scene.with_(most) for one in made]):
+            _, _, signal, noise = group_of(seed, numbers[own[j]])
+            write_made(
+                made[j].scene, tables[own[j]], [signal], noise=noise, revolutions=made[j].revolutions,
+                seed=seed + numbers[own[j]], response=response,
+            )  # fmt: skip
+    return tables
+
+
+def run_group(folder: Path, seed: int, numbers: list[int], members: int) -> None:
     """Identify the machines of one group, by one preparation at the largest noise of theirs."""
-    name, count, signal, _ = group_of(numbers[0])
-    place = folder / f"group-{numbers[0]:04d}-{len(numbers)}-{members}.json"
+    name, count, signal, noise = group_of(seed, numbers[0])
+    place = folder / f"group-{seed}-{name}-{count}-{signal}-{noise:g}.json"
     if place.exists():
         return
     ensemble = ensemble_of(folder, name, count, members)
     plain = prepared_scene(model_of(name, count)[0])
     unit = units_of(plain, [signal])[0]
     frequency = float(frequency_of(plain))
-    made = [machine(folder, k) for k in numbers]
-    read = [read_measured(table, signal, unit, frequency) for _, table in made]
+    read = [read_measured(one, signal, unit, frequency) for one in tables_of(folder, seed, numbers)]
     layout = Layout.of(min(read, key=lambda one: one.highest), Sensor())
     pairs = [features_of([one], [layout]) for one in read]
     variance = np.max([own for _, own in pairs], axis=0)
-    prepared = prepare(ensemble, [layout], Sensor(), frequency, variance, 1, 64)
+    prepared = prepare(ensemble, [layout], Sensor(), frequency, variance, 1)
     rows = []
-    for (facts, _), (values, _) in zip(made, pairs, strict=True):
-        verdict = judged(prepared, values, 1)
+    for k, (values, _) in zip(numbers, pairs, strict=True):
+        verdict, one = judged(prepared, values, 1), machine(seed, k)
         rows.append(
-            facts | {
-                "interval": verdict.interval.T.tolist(), "explained": verdict.explained,
-                "doubt": verdict.doubt.tolist(), "worst": prepared.labels[verdict.worst],
-                "widening": prepared.calibration.widening.tolist(),
+            {
+                "machine": k, "group": [name, count, signal, noise], "truth": one.truth,
+                "revolutions": one.revolutions, "lacks": one.lacks,
+                "interval": [[float(f"{v:.5g}") for v in ends] for ends in verdict.interval.T.tolist()],
+                "explained": verdict.explained, "doubt": [round(v, 3) for v in verdict.doubt.tolist()],
+                "worst": prepared.labels[verdict.worst],
+                "widening": [round(v, 3) for v in prepared.calibration.widening.tolist()],
             }
         )  # fmt: skip
     place.write_text(json.dumps(rows))
-    print(f"{place.name}: {name}, {count} unknown, {signal}", flush=True)
+    print(f"{place.name}: {time.process_time():.0f} s of processor time so far", flush=True)
 
 
 def frequency_of(scene: Any) -> float:
@@ -184,46 +216,67 @@ def frequency_of(scene: Any) -> float:
     return 1.0 / float(response["time"][-1])
 
 
-def rows_of(folder: Path) -> list[dict[str, Any]]:
-    found = [row for path in sorted(folder.glob("group-*.json")) for row in json.loads(path.read_text())]  # fmt: skip
-    return sorted(found, key=lambda row: row["machine"])
-
-
 def held(row: dict[str, Any]) -> list[bool]:
     return [low <= t <= high for (low, _, high), t in zip(row["interval"], row["truth"], strict=True)]  # fmt: skip
 
 
-def share(hits: list[bool]) -> str:
-    return f"{sum(hits)} of {len(hits)} ({sum(hits) / max(len(hits), 1):.1%})"
+def counted(rows: list[dict[str, Any]]) -> list[str]:
+    """Cells of a table: machines of right models and intervals that hold, other machines, refused, and neither."""
+    right, other = ([row for row in rows if bool(row["lacks"]) is lacks] for lacks in (False, True))
+    hits = [hit for row in right for hit in held(row)]
+    refused = [row for row in other if not row["explained"]]
+    lost = [row for row in other if row["explained"] and not all(held(row))]
+    wrongly = sum(not row["explained"] for row in right)
+    return [
+        f"{len(right)}", f"{sum(hits)} of {len(hits)}", f"{wrongly}", f"{len(other)}", f"{len(refused)}",
+        f"{len(other) - len(refused) - len(lost)}", f"{len(lost)}",
+    ]  # fmt: skip
 
 
-def summary(folder: Path) -> None:
-    """Print the figures of all machines that are finished."""
-    rows = rows_of(folder)
+def error(rows: list[dict[str, Any]]) -> list[str]:
+    """Cells of a table: machines of right models, median error and median half-width over the clearance."""
     right = [row for row in rows if not row["lacks"]]
-    other = [row for row in rows if row["lacks"]]
-    print(f"machines: {len(rows)}, of these {len(other)} with an effect that the model lacks")
-    print(f"right model: intervals hold {share([h for r in right for h in held(r)])}")
-    print(f"right model: refused {share([not r['explained'] for r in right])}")
-    fine = [not r["explained"] or all(held(r)) for r in other]
-    print(f"other machines: hold or are refused {share(fine)}")
-    print(f"other machines: refused {share([not r['explained'] for r in other])}")
-    for name in sorted({r["group"][0] for r in rows}):
-        own = [r for r in right if r["group"][0] == name]
-        lost = [not r["explained"] or all(held(r)) for r in other if r["group"][0] == name]
-        print(f"  {name}: hold {share([h for r in own for h in held(r)])}; others {share(lost)}")
-    for group in sorted({tuple(r["group"][1:]) for r in right}):
-        own = [r for r in right if tuple(r["group"][1:]) == group]
-        ends = [(*i, t) for r in own for i, t in zip(r["interval"], r["truth"], strict=True)]
-        error = np.median([abs(middle - t) / t for _, middle, _, t in ends])
-        width = np.median([(high - low) / 2 / t for low, _, high, t in ends])
-        print(
-            f"  {group[0]} unknown, {group[1]}, noise {group[2]:.0%}: {len(own)} machines, median error {error:.1%}, "
-            f"median half-width {width:.1%}"
-        )
-    for row in other:
-        if row["explained"] and not all(held(row)):
-            print("  lost:", row)
+    ends = [(*i, t) for row in right for i, t in zip(row["interval"], row["truth"], strict=True)]
+    off = np.median([abs(middle - t) / t for _, middle, _, t in ends])
+    width = np.median([(high - low) / 2 / t for low, _, high, t in ends])
+    return [f"{len(right)}", f"{off:.1%}", f"{width:.0%}"]
+
+
+def table_of(rows: list[dict[str, Any]]) -> str:
+    """The tables of the page on `identify`, as Markdown."""
+    found = [
+        "| unknowns | mechanism | right model | intervals hold | refused | model lacks an effect | refused | hold | neither |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for count in (1, 2):
+        for name in MECHANISMS:
+            own = [row for row in rows if row["group"][:2] == [name, count]]
+            found.append(" | ".join([f"| {count}", name, *counted(own)]) + " |")
+    found.append(" | ".join(["| all", "", *counted(rows)]) + " |")
+    found += ["", "| signal | unknowns | noise | machines | median error | median half-width |"]
+    found.append("| --- | --- | --- | --- | --- | --- |")
+    for signal, count in ((SIGNALS[0], 1), (SIGNALS[0], 2), (SIGNALS[1], 1)):
+        for noise in NOISE:
+            own = [row for row in rows if row["group"][1:] == [count, signal, noise]]
+            cells = [signal.replace("crank_moment", "torque").replace("_x", "").replace("_", " ")]
+            found.append(
+                " | ".join([f"| {cells[0]}", f"{count}", f"{noise:.0%}", *error(own)]) + " |"
+            )
+    return "\n".join(found)
+
+
+def advised(folder: Path, members: int) -> None:
+    """Print the half-widths to expect of two unknowns from 20 revolutions with 10 % noise, by signal, as Markdown."""
+    print("| mechanism | signal | first clearance | second clearance | correlation of errors |")
+    print("| --- | --- | --- | --- | --- |")
+    for name in MECHANISMS:
+        ensemble = ensemble_of(folder, name, 2, members)
+        frequency = frequency_of(prepared_scene(model_of(name, 2)[0]))
+        found = advice(ensemble, SIGNALS, Sensor(), frequency, 0.1, 1)
+        for k, signal in enumerate(found.names):
+            first, second = (f"± {1e6 * width:.0f} µm" for width in found.half_width[k, 1])
+            related = f"{found.correlation[k, 1]:.2f}"
+            print(f"| {name} | {SHORT[signal]} | {first} | {second} | {related} |")
 
 
 def raw(folder: Path, members: int) -> None:
@@ -277,23 +330,38 @@ def raw(folder: Path, members: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("results/machines"))
     parser.add_argument("--machines", type=int, default=200)
     parser.add_argument("--members", type=int, default=256)
-    parser.add_argument("--summary", action="store_true")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rows", type=Path, help="file of all rows")
+    parser.add_argument("--table", type=Path, help="print the table of such a file")
+    parser.add_argument("--advise", action="store_true", help="half-widths to expect, by signal")
     parser.add_argument("--raw", action="store_true")
     words = parser.parse_args()
-    words.folder.mkdir(exist_ok=True)
-    if words.raw:
-        raw(words.folder, words.members)
-    elif not words.summary:
-        groups: dict[tuple[str, int, str, float], list[int]] = {}
-        for k in range(words.machines):
-            groups.setdefault(group_of(k), []).append(k)
-        for _, numbers in sorted(groups.items(), key=lambda one: (one[0][1], one[0][0])):
-            run_group(words.folder, numbers, words.members)
-    if not words.raw:
-        summary(words.folder)
+    if words.table:
+        print(table_of(json.loads(words.table.read_text())))
+        return
+    words.folder.mkdir(exist_ok=True, parents=True)
+    if words.raw or words.advise:
+        (raw if words.raw else advised)(words.folder, words.members)
+        return
+    groups: dict[tuple[str, int, str, float], list[int]] = {}
+    for k in range(words.machines):
+        groups.setdefault(group_of(words.seed, k), []).append(k)
+    for _, numbers in sorted(groups.items()):
+        run_group(words.folder, words.seed, numbers, words.members)
+    files = sorted(words.folder.glob(f"group-{words.seed}-*.json"))
+    rows = sorted(
+        (row for one in files for row in json.loads(one.read_text())),
+        key=lambda row: row["machine"],
+    )
+    if words.rows:
+        words.rows.write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
+    print(table_of(rows))
+    for row in rows:
+        if (not row["lacks"] and not all(held(row))) or (row["explained"] and not all(held(row))):
+            print("missed:", row)
 
 
 if __name__ == "__main__":

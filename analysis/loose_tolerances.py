@@ -17,7 +17,7 @@ from effects_kept import Simulated, scene_of
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.problem import implicit_method
+from hpcclear.dynamics.setup.problem import implicit_method
 from hpcclear.ensemble.certificate import Asked
 from hpcclear.ensemble.trial import Trial
 from hpcclear.scene import Scene

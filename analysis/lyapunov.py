@@ -15,8 +15,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from oracle import SliderCrank
 
-from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
-from hpcclear.dynamics.steady.mapping import mapped
+from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
+from hpcclear.dynamics.evaluation.steady.mapping import mapped
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 

@@ -26,6 +26,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
@@ -192,6 +193,17 @@ def scene_of(name: str) -> Scene:
     table["drive"] = DRIVES.get(name, table.get("drive"))
     table = {key: its for key, its in table.items() if its is not None}
     return load_scene(table)
+
+
+def choice_at(scene: Scene, unit: list[float]) -> Choice:
+    """The design of the first case at a place in its box, which is the unit cube."""
+    case = scene.required_study.cases[0].name
+    names = scene.required_study.design_variables(case)
+    region = box(scene, names)
+    row = to_physical(
+        scene, names, (region.lower + np.array(unit) * (region.upper - region.lower))[None]
+    )[0]
+    return Choice("", case, dict(zip(names, row.tolist(), strict=True)))
 
 
 def main() -> None:

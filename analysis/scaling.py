@@ -154,7 +154,7 @@ def start_up() -> float:
     program = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "from scenes import scene\nfrom hpcclear import evaluate\n"
-        "from hpcclear.dynamics.evaluator import Evaluator\nfrom hpcclear.scene.points import Points\n"
+        "from hpcclear.dynamics.evaluation.evaluator import Evaluator\nfrom hpcclear.scene.points import Points\n"
         "import numpy as np\n"
         "e = Evaluator(scene('lankarani-nikravesh', 1e-6, 0, 1), Points(('m3',), np.empty((0, 1)), "
         "(('mechanism.slider.mass',),)))\n"

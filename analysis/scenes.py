@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Start
+from hpcclear.dynamics.layout.views import Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import latin_hypercube

@@ -21,13 +21,13 @@ from scenes import JOB
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.copies import perturbed, scales
-from hpcclear.dynamics.steady.judging import objective
-from hpcclear.dynamics.views import Start
+from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.layout.views import Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 

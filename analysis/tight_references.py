@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 

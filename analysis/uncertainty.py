@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import PERTURBATIONS
+from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube
 

@@ -21,8 +21,12 @@ from scenes import JOB, LAWS, ensemble
 
 from hpcclear import load_scene
 from hpcclear.base.objectives import Objective, asked
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, outcome_records, responses_reported
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.evaluation.evaluator import (
+    DEFAULT_LANES,
+    outcome_records,
+    responses_reported,
+)
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 
 SOURCE = """
@@ -110,10 +114,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=256, help="designs of an ensemble")
     parser.add_argument("--rounds", type=int, default=9, help="how often each pair is measured")
+    parser.add_argument("--only", default="", help="pairs with this in their names")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         pairs = scenes(Path(place))
         for name, pair in pairs.items():
+            if given.only not in name:
+                continue
             tasks = [task(scene, given.samples) for scene in pair]
             found = [one() for one in tasks]  # compiles
             ratios = []

@@ -18,11 +18,17 @@ STATIONS = {
     "scene/mechanism.py": "check_journal",
     "scene/points.py": "check_points",
     "dynamics/joint_laws.py": "fill",
-    "dynamics/lanes.py": "step",
-    "dynamics/evaluator.py": "outcome_records",
+    "dynamics/stepping/lanes.py": "step",
+    "dynamics/evaluation/evaluator.py": "outcome_records",
     "results/netcdf.py": "save",
 }
 """Calls by their files: a clearance becomes a gap, a gap a record, a record a row of a file."""
+
+ELSEWHERE = {
+    "scene/units.py": "scene/random_inputs.py",  # bounds of the distribution, not the clearance
+    "dynamics/joint_laws.py": "dynamics/setup/problem.py",  # the scene's own design, by which a method is chosen
+}
+"""Calls that are about other numbers where this file is on the stack."""
 
 
 def files_on(frame: FrameType | None) -> list[str]:
@@ -47,7 +53,8 @@ def main() -> None:
             return
         name = str(path.relative_to(ROOT))
         if STATIONS.get(name) == frame.f_code.co_name:
-            for one in files_on(frame):
+            files = files_on(frame)
+            for one in files if ELSEWHERE.get(name) not in files else ():
                 passed.setdefault(one, name)
 
     from hpcclear.cli import main as command

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Outcome, Start
+from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Plan, Seen, life
 from hpcclear.ensemble.wear import States, inputs_of, waiting_longer

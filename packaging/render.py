@@ -1,15 +1,17 @@
 """Recipes with the version, the checksum and the dependencies of a source distribution.
 
-python packaging/render.py DIST     writes DIST/packaging
+python packaging/render.py DIST     writes DIST/packaging, and checks that the Spack package can be read and names all
 """
 
 import hashlib
 import re
+import runpy
 import shutil
 import sys
 import tarfile
 import tomllib
 from pathlib import Path
+from types import ModuleType
 
 HERE = Path(__file__).resolve().parent
 
@@ -75,6 +77,32 @@ def main(dist: Path) -> None:
         path.unlink()
         path.with_name(path.name.removesuffix(".in")).write_text(text, encoding="utf-8")
         print(path)
+    read = spack_package(place / "spack/packages/py-hpcclear/package.py")
+    wanted = {f"py-{parts(one)[0].lower()}" for one in build + run} | {"mpi", "python"}
+    if read != ({version}, wanted):
+        raise SystemExit(f"the Spack package says {read}, not version {version} with {wanted}")
+    print(f"the Spack package depends on {len(wanted)} others, as pyproject.toml")
+
+
+def spack_package(path: Path) -> tuple[set[str], set[str]]:
+    """Versions and names of dependencies that a Spack package declares, read as Spack reads it."""
+    versions: set[str] = set()
+    names: set[str] = set()
+
+    def version(number: str, *, sha256: str) -> None:
+        assert re.fullmatch(r"[0-9a-f]{64}", sha256)
+        versions.add(number)
+
+    def depends_on(spec: str, type: str | tuple[str, ...] = ("build", "link")) -> None:
+        assert ({type} if isinstance(type, str) else set(type)) <= {"build", "link", "run"}
+        names.add(spec.partition("@")[0])
+
+    module = ModuleType("spack.package")
+    words = {"PythonPackage": type("PythonPackage", (), {}), "license": lambda name: None}
+    vars(module).update(words, version=version, depends_on=depends_on)
+    sys.modules |= {"spack": ModuleType("spack"), "spack.package": module}
+    runpy.run_path(str(path))
+    return versions, names
 
 
 if __name__ == "__main__":

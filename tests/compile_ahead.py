@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.scene import load_scene
 from hpcclear.scene.points import Points
 

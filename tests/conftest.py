@@ -1,5 +1,6 @@
 """One thread for BLAS and Numba before numpy loads, and other seeds for the statistical tests."""
 
+import gc
 import os
 import tempfile
 from pathlib import Path
@@ -25,6 +26,26 @@ def shift() -> int:
     return 0
 
 
+@pytest.fixture(scope="module")
+def carried_out(tmp_path_factory):
+    """Carry out a study by formula, with entries of `formula` set by name: carried_out(scene, BIAS=...), to its directory."""
+
+    def run(scene, notify=lambda text: None, **entries):
+        import formula_study
+
+        from hpcclear.ranks.boundary import alone
+        from hpcclear.study import run_study
+
+        place = tmp_path_factory.mktemp("study") / "out"
+        with pytest.MonkeyPatch.context() as patch:
+            formula_study.formula.replace_dynamics(patch.setattr)
+            for name, value in entries.items():
+                patch.setattr(formula_study.formula, name, value)
+            return run_study(scene, place, alone(), progress_style="quiet", notify=notify)
+
+    return run
+
+
 @pytest.fixture
 def place_of_all():
     """A folder that other users may enter; pytest's own are closed whenever a session of it begins."""
@@ -48,11 +69,11 @@ def pytest_generate_tests(metafunc):
 
 
 LONGEST = (
-    "survival", "docs", "accuracy", "release", "limits", "stiff", "tight", "linkage_scenes", "further_responses",
-    "effects", "certificate", "cli", "reference", "jacobian", "llvm", "fuzz", "hard_cases", "ideal", "motion", "run",
-    "baumgarte", "comm", "study",
+    "survival", "docs", "release", "native_windows", "random_scenes", "linkage_scenes", "limits", "accuracy", "certificate",
+    "effects", "cli", "statistics", "fuzz", "bending", "cluster", "goals", "reference", "guides", "hostile", "tight",
+    "further_responses", "stiff", "jacobian", "llvm", "hard_cases", "ideal", "motion", "run", "comm", "study",
 )  # fmt: skip
-"""Files that take a minute or more, the longest first: one that begins last keeps a single worker busy at the end."""
+"""Files that take longest first: one that begins last keeps a single worker busy at the end."""
 
 
 def _turn(item):
@@ -64,6 +85,16 @@ def pytest_collection_modifyitems(config, items):
     items.sort(key=_turn)
     if config.getoption("--other-seeds"):
         items[:] = [item for item in items if "shift" in item.fixturenames]
+
+
+def pytest_collection_finish():
+    """Leave what is loaded, hundreds of thousands of objects that stay, out of every further search for unreachable ones.
+
+    The compiler makes so many objects that these searches took a seventh of its time.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
 
 
 @pytest.hookimpl(wrapper=True)

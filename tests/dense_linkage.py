@@ -87,6 +87,7 @@ class Dense:
     alpha: float = 0.0
     beta: float = 0.0
     curve: float = 1.0  # what tables of loads and torques say
+    curves: dict = field(default_factory=dict)  # or by name, functions of what they go by
     seen: dict = field(default_factory=dict)
 
     def __post_init__(self):
@@ -109,6 +110,13 @@ class Dense:
     def driven(self, drive, t):
         if isinstance(drive, m.ConstantSpeed):
             return self.mechanism.body(drive.body).start_angle + drive.speed * t
+        if isinstance(drive, m.RunUp):
+            start, speed = self.mechanism.body(drive.body).start_angle, self.curves[drive.name]
+            if not isinstance(t, Jet):
+                return start + speed.antiderivative()(t)
+            now, rate, _ = t.parts
+            parts = speed.antiderivative()(now), speed(now) * rate, speed(now, 1) * rate**2
+            return Jet(start + parts[0], *parts[1:])
         return drive.mean + drive.amplitude * sine(2 * math.pi * drive.frequency * t + drive.phase)
 
     def constraints(self, q, t):
@@ -122,11 +130,13 @@ class Dense:
             tilt = self.angle(q, joint.line) + joint.angle
             dx, dy = turned((1.0, 0.0), tilt)
             rows[joint.name, "across"] = dx * (y - by) - dy * (x - bx)
+            if isinstance(joint, m.Slot):
+                continue
             rows[joint.name, "angle"] = self.angle(q, joint.point) - tilt
             if isinstance(joint, m.Fixed):
                 rows[joint.name, "along"] = dx * (x - bx) + dy * (y - by)
         for drive in self.mechanism.drives:
-            if drive.prescribed:
+            if drive.prescribed or isinstance(drive, m.RunUp):
                 rows[drive.name, "drive"] = q[self.first[drive.body] + 2] - self.driven(drive, t)
         return rows
 
@@ -168,9 +178,17 @@ class Dense:
             return
         middle, on_line = (np.array(self.place(q, place), float) for place in joint.places)
         line = self.angle(q, joint.line) + joint.angle
-        r, face = joint.corner_radius, 0.5 * joint.height + joint.clearance
-        for name, (ahead, left) in CORNERS.items():
-            arm = (ahead * (0.5 * joint.length - r), left * (0.5 * joint.height - r))
+        if isinstance(joint, m.LooseSlot):
+            r, face = joint.pin_radius, joint.pin_radius + joint.clearance
+            arms = {"left": (1, (0.0, 0.0)), "right": (-1, (0.0, 0.0))}
+        else:
+            r, face = joint.corner_radius, 0.5 * joint.height + joint.clearance
+            half = 0.5 * joint.length - r, 0.5 * joint.height - r
+            arms = {
+                name: (left, (ahead * half[0], left * half[1]))
+                for name, (ahead, left) in CORNERS.items()
+            }
+        for name, (left, arm) in arms.items():
             corner = middle + np.array(turned(arm, self.angle(q, joint.point)))
             n = left * np.array(turned((0.0, 1.0), line))  # towards the face
             gap = (corner - on_line) @ n + r - face
@@ -199,7 +217,14 @@ class Dense:
         }  # fmt: skip
         return (on_b - on_j).T @ force
 
-    def loads(self, q, v):
+    def looked_up(self, load, q, t):
+        """What the table of a load says."""
+        if load.name not in self.curves:
+            return self.curve
+        by = load.by or m.By(self.mechanism.period.body)
+        return self.curves[load.name](t if by.seconds else q[self.first[by.body] + 2])
+
+    def loads(self, q, v, t=0.0):
         Q, power = np.zeros(self.n), 0.0
         for load in self.mechanism.loads:
             own = np.zeros(self.n)
@@ -243,7 +268,7 @@ class Dense:
                         pull = 0.0
                 own = (Jb - Ja).T @ (n * pull)
             if getattr(load, "table", False):
-                own = own * self.curve
+                own = own * self.looked_up(load, q, t)
             Q, power = Q + own, power + own @ v
         self.seen["load_power"] = power
         return Q
@@ -261,10 +286,10 @@ class Dense:
     def accelerations(self, q, v, t=0.0):
         """Accelerations; forces, powers and multipliers stay in `seen`."""
         M, self.seen = np.diag(self.masses()), {}
-        Q = self.loads(q, v)
+        Q = self.loads(q, v, t)
         Q[1::3] -= self.masses()[1::3] * self.gravity
         for drive in self.mechanism.drives:
-            if not drive.prescribed:
+            if not (drive.prescribed or isinstance(drive, m.RunUp)):
                 k = self.first[drive.body] + 2
                 torque = drive.torque * (self.curve if drive.table else 1.0)
                 if drive.by_speed is not None:
@@ -277,7 +302,9 @@ class Dense:
         c, dc, turning = self.along(q, v, t)
         right = -turning - 2 * self.alpha * dc - self.beta**2 * c
         names = list(self.constraints(q, t))
-        guides = [j for j in self.mechanism.joints if getattr(j, "friction", None)]
+        rubbed = [j for j in self.mechanism.joints if getattr(j, "friction", None)]
+        guides = [j for j in rubbed if isinstance(j, m.Slide)]
+        pins = [j for j in rubbed if not isinstance(j, m.Slide)]
         for signs in itertools.product((1.0, -1.0), repeat=len(guides)):
             K = np.block([[M, -J.T], [J, np.zeros((len(c), len(c)))]])
             loss, ok = 0.0, True
@@ -294,15 +321,42 @@ class Dense:
                 k = self.n + names.index((joint.name, "across"))
                 K[: self.n, k] += sign * ratio * influence
                 rubbing.append((k, sign, ratio * speed))
-            solution = np.linalg.solve(K, np.concatenate([Q, right]))
+            solution, pin_loss = self.with_pins(pins, names, K, Q, right, v)
             ok = all(sign * solution[k] >= 0.0 for k, sign, _ in rubbing)
             loss = sum(power * abs(solution[k]) for k, _, power in rubbing)
             if ok:
                 break
         assert ok
         self.seen["multipliers"] = dict(zip(names, solution[self.n :], strict=True))
-        self.seen["guide_loss"] = loss
+        self.seen["guide_loss"] = loss + pin_loss
         return solution[: self.n]
+
+    def with_pins(self, pins, names, K, Q, right, v):
+        """The solution with moments mu r |reaction| of pins, by going round, and the power that they lose."""
+        sizes = np.zeros(len(pins))
+        for _ in range(100):
+            given, loss = np.concatenate([Q, right]), 0.0
+            for joint, size in zip(pins, sizes, strict=True):
+                signs = np.zeros(self.n)
+                for place, sign in zip(joint.places, (1.0, -1.0), strict=True):
+                    if m.split(place)[0] != m.GROUND:
+                        signs[self.first[m.split(place)[0]] + 2] = sign
+                rubs, turning = joint.friction, signs @ v
+                x = turning * rubs.radius / rubs.ramp_speed
+                moment = rubs.coefficient * rubs.radius * size * min(max(x, -1.0), 1.0)
+                given[: self.n] -= moment * signs
+                loss += moment * turning
+            solution = np.linalg.solve(K, given)
+            before = sizes
+            sizes = np.array(
+                [
+                    np.hypot(*(solution[self.n + names.index((joint.name, k))] for k in "xy"))
+                    for joint in pins
+                ]
+            )
+            if np.abs(sizes - before).max(initial=0.0) <= 1e-14 * sizes.max(initial=0.0):
+                return solution, loss
+        raise AssertionError("reactions and friction of pins do not settle")
 
 
 def loose(dense, joint):
@@ -316,7 +370,7 @@ def loose(dense, joint):
     def tilt(q):
         return dense.angle(q, joint.point) - dense.angle(q, joint.line) - joint.angle
 
-    return offset, tilt
+    return (offset,) if isinstance(joint, m.LooseSlot) else (offset, tilt)
 
 
 def assembled(dense, guess, t, eccentricities):
@@ -336,7 +390,7 @@ def assembled(dense, guess, t, eccentricities):
                 jacobians.append(Ja - Jb)
                 continue
             # across and tilt, by differences small enough for Newton's method
-            for row, asked in zip(loose(dense, joint), e, strict=True):
+            for row, asked in zip(loose(dense, joint), e, strict=False):
                 rows.append([row(q) - asked])
                 slopes = [(row(q + h) - row(q - h)) / 2e-6 for h in 1e-6 * np.eye(dense.n)]
                 jacobians.append([slopes])

@@ -40,7 +40,8 @@ class Block:
     @property
     def runs(self) -> bool:
         """Whether it is there to be run, and can be run here."""
-        return self.language not in READ_ONLY and self.no_run is None and not self.quoted
+        read = self.language in READ_ONLY and self.title is None
+        return not read and self.no_run is None and not self.quoted
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"
@@ -138,6 +139,9 @@ def replaced(scene: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
         if isinstance(value, dict) and isinstance(made.get(key), dict):
             whole = made[key] if key != "drive" else {}  # a drive is of one kind
             made[key] = {**whole, **value}
+            for name in ("bodies", "joints", "drives"):  # of a linkage: some of those that it has
+                if name in value and set(value[name]) < set(whole.get(name, ())):
+                    made[key][name] = {**whole[name], **value[name]}
             if key == "joints":
                 for name, joint in value.items():
                     made[key][name] = {**({} if "kind" in joint else whole[name]), **joint}

@@ -4,6 +4,7 @@
 #   bash tests/elsewhere.sh --table                     results so far, into CONTRIBUTING.md
 # Settings: debian12 debian13 python314 lowest latest bits256 bits512 no-fma load8 user umlaut home-read-only. All but debian12,
 # lowest (Python 3.11) and python314 (Debian 14, testing) are on Debian 13. Several at once are joined: debian12+lowest+umlaut.
+# container: in place of both commands the steps of packaging/Dockerfile, and a command of its image on two ranks.
 # Roots are kept in ELSEWHERE (/var/tmp/hpcclear-elsewhere), results in results/elsewhere. The system underneath is this
 # machine's; so are PIP_* and *SSL*, *CERT* variables and certificates.
 set -euo pipefail
@@ -74,6 +75,7 @@ PYTHON
 
 run_setting() {
     local setting=$1 release=trixie user=root home=/root above=/opt inner="" option="" load=0 settings=() words="$run_words" part
+    local commands=()
     for part in ${setting//+/ }; do
         case $part in
         debian13) ;;
@@ -95,6 +97,15 @@ run_setting() {
         user) user=somebody above=/home/somebody home=/home/somebody ;;
         umlaut) inner="/eigene Prüfung" ;;
         home-read-only) user=somebody above=/srv home=/home/read-only ;;
+        container)
+            above=/srv
+            commands=(
+                "rm -rf /opt/image /opt/hpcclear; userdel -rf user; python3 -m venv /opt/image && PATH=/opt/image/bin:\$PATH &&
+                    cp -r . /opt/hpcclear && $(sed -n 's/^RUN //p' packaging/Dockerfile)"
+                "PATH=/opt/image/bin:\$PATH && cd \$(mktemp -d) && hpcclear --version && hpcclear init engine.toml &&
+                    mpiexec -n 2 hpcclear check engine.toml --no-cost"
+            )
+            ;;
         esac
     done
     local folder=$above$inner/hpcclear
@@ -122,7 +133,8 @@ run_setting() {
     done
     local times=() codes=() command start
     : >"$log"
-    for command in "bash jobs/quickstart.sh $option" "bash tests/run.sh $option $words"; do
+    [ ${#commands[@]} -gt 0 ] || commands=("bash jobs/quickstart.sh $option" "bash tests/run.sh $option $words")
+    for command in "${commands[@]}"; do
         start=$SECONDS code=0
         echo "== $setting: $command" | tee -a "$log"
         # Mounts live in a namespace of their own and are gone with it, whatever happens.
@@ -166,7 +178,7 @@ while [ $# -gt 0 ]; do
     *)
         for part in ${1//+/ }; do
             case $part in
-            debian12 | debian13 | python314 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only) ;;
+            debian12 | debian13 | python314 | lowest | latest | bits256 | bits512 | no-fma | load8 | user | umlaut | home-read-only | container) ;;
             *) refuse "there is no setting $part" ;;
             esac
         done

@@ -5,6 +5,7 @@ import io
 import math
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -95,6 +96,24 @@ def _title(sheet):
 
 def _formula(sheet):
     sheet["B3"] = "=0.5/2"
+
+
+def _computed(data: bytes) -> bytes:
+    """The workbook as a spreadsheet program saves it: with the value of its formula."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(made, "w") as new:
+        for name in old.namelist():
+            part = (
+                old.read(name).replace(b"<v></v>", b"<v>0.25</v>").replace(b"<v/>", b"<v>0.25</v>")
+            )
+            new.writestr(name, part.replace(b"<v />", b"<v>0.25</v>"))
+    return made.getvalue()
+
+
+def _gaps(sheet):
+    sheet.insert_rows(3, 2)
+    sheet.insert_cols(1)
+    sheet["H9"] = " "
 
 
 def _dates(sheet):
@@ -235,6 +254,12 @@ def _workbooks() -> list[Kind]:
             book(rows, _formula),
             "cell B3",
         ),
+        (
+            "Excel workbook with a formula and its stored value",
+            _computed(book(rows, _formula)),
+            IN_SI,
+        ),
+        ("Excel workbook with empty rows and columns", book(rows, _gaps), IN_SI),
         ("Excel workbook in which a number became a date", book(rows, _dates), "is a date"),
         ("Excel workbook with two sheets", book(rows, more=("Notes",)), "2 sheets"),
         ("Excel workbook, damaged", book(rows)[:900], "no Excel workbook that can be read"),

@@ -14,8 +14,11 @@ from hpcclear.dynamics.linkage.parts import (
     GuideFriction,
     Harmonic,
     LooseSlide,
+    LooseSlot,
+    PinFriction,
     Revolute,
     Slide,
+    Slot,
     Spring,
     Torque,
     TorqueDrive,
@@ -143,6 +146,16 @@ def quick_return(*open_pins, friction=None):
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.0, -0.1)}, loads)
 
 
+def slotted_lever(*open_pins, clearance=None):
+    """A crank pin in the slot of a rocking lever."""
+    base = quick_return(*open_pins)
+    bodies = tuple(body for body in base.bodies if body.name != "block")
+    joints = [joint for joint in base.joints if joint.name in ("o1", "o3")]
+    places = ("slot", "crank.b", "lever.a", 0.1)
+    slot = Slot(*places) if clearance is None else LooseSlot(*places, clearance, 0.006, 2e9)
+    return Mechanism(bodies, (*joints, slot), base.drives, base.ground, base.loads)
+
+
 def three_rrr(*open_pins):
     """A platform on three legs, each with a harmonic drive."""
     radius, corner = 0.25, 0.08
@@ -200,7 +213,7 @@ def two_stage(*open_pins):
     return Mechanism(bodies, joints, base.drives, {**base.ground, "r": (0.22, -0.05)}, base.loads)
 
 
-def turning_slide(*open_pins):
+def turning_slide(*open_pins, friction=None):
     """A block on a driven arm, pulled along it by a link: the guide turns with the drive."""
     bodies = (
         Body("crank", 0.4, 1e-3, (0.02, 0.01), {"a": (0.0, 0.0), "c": (0.01, 0.0)}, 0.3),
@@ -214,7 +227,7 @@ def turning_slide(*open_pins):
             ("o2", "block.pin", "link.b"),
             ("o3", "link.a", "ground.p"),
         ),
-        Slide("arm", "block.pin", "crank.c", 0.25),
+        Slide("arm", "block.pin", "crank.c", 0.25, friction),
     )
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.06, 0.01)})
 
@@ -253,6 +266,17 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
         bodies.append(replace(body, points=points, inertia=inertia))
     joints = tuple(loose.get(j.name, j) for j in mechanism.joints)
     return replace(mechanism, bodies=tuple(bodies), joints=joints)
+
+
+def rubbing(mechanism, *names, coefficient=0.2, radius=0.008):
+    """A mechanism with friction in its named pins, all without clearance by default."""
+    joints = tuple(
+        replace(j, friction=PinFriction(coefficient, radius * (1.0 + 0.2 * k), 0.3))
+        if type(j) is Revolute and (not names or j.name in names)
+        else j
+        for k, j in enumerate(mechanism.joints)
+    )
+    return replace(mechanism, joints=joints)
 
 
 RUB = GuideFriction(0.15, 0.1)
@@ -300,5 +324,22 @@ LINKAGES = {
     "slider-crank, loose guide": loosened(slider_crank("o23", tilt=0.4, offset=0.01, off=0.003), "guide"),
     "quick-return, loose slot": loosened(quick_return(), "slot"),
     "two stages, both loose": loosened(two_stage(), "guide", "feed"),
+    "slider-crank, rubbing pins": rubbing(slider_crank(off=0.003, friction=RUB, loads=PUSH)),
+    "slider-crank, rubbing, torque": rubbing(slider_crank(drive=ENGINE, friction=RUB, loads=PUSH, off=0.002)),
+    "slider-crank, one loose, rubbing": rubbing(slider_crank("o12", friction=RUB, tilt=0.3, offset=0.01)),
+    "four-bar, rubbing pins": rubbing(four_bar(drive=BLOWER, off=0.004, loads=MOVED)),
+    "four-bar, rubbing, driven": rubbing(four_bar(loads=HELD)),
+    "v-twin, rubbing": rubbing(v_twin("big_left", drive=ENGINE, friction=RUB)),
+    "six-bar, rubbing": rubbing(six_bar("o5", friction=RUB)),
+    "quick-return, rubbing": rubbing(quick_return(friction=RUB)),
+    "chain, rubbing": rubbing(pendulum_chain()),
+    "two stages, rubbing": rubbing(two_stage("o23")),
+    "turning slide, rubbing": rubbing(turning_slide(friction=RUB)),
+    "3-RRR, rubbing": rubbing(three_rrr("tip0", "tip1", "tip2")),
+    "held frame, rubbing": rubbing(held_frame("o2")),
+    "slotted lever": rubbing(slotted_lever()),
+    "slotted lever, torque": rubbing(replace(slotted_lever(), drives=(ENGINE,))),
+    "slotted lever, loose": rubbing(slotted_lever(clearance=2e-4)),
+    "slotted lever, all loose": replace(slotted_lever("o1", "o3", clearance=2e-4), drives=(ENGINE,)),
     "turning slide, loose": loosened(turning_slide("o2"), "arm"),
 }  # fmt: skip

@@ -15,7 +15,7 @@ from hpcclear.dynamics.contacts import guide, pin_in_bearing
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import GROUND, split
+from hpcclear.dynamics.linkage.parts import GROUND, Slide, split
 from hpcclear.dynamics.physics import angles, friction
 
 CHI, MU, RAMP = 0.5, 0.1, 0.3
@@ -83,17 +83,7 @@ class Lane:
             "sincos": plain(angles.sincos),
             "saturated": plain(friction.saturated),
         }
-        for name in (
-            "spring_force",
-            "one_sided",
-            "along",
-            "hinge",
-            "drag",
-            "held_inverse",
-            "harmonic",
-            "sign_of",
-        ):
-            names[name] = plain(getattr(elements, name))
+        names |= {name: plain(getattr(elements, name)) for name in elements.functions()}
         exec(self.text.source, names)
         self.run = names["lane"]
         base = values(
@@ -182,7 +172,7 @@ def sliding(dense, q, v, a):
     jets = [Jet(*parts) for parts in zip(q, v, a, strict=True)]
     found = {}
     for joint in dense.mechanism.ideal:
-        if hasattr(joint, "friction"):
+        if isinstance(joint, Slide):
             (x, y), (bx, by) = (dense.place(jets, p) for p in joint.places)
             dx, dy = turned((1.0, 0.0), dense.angle(jets, joint.line) + joint.angle)
             s = dx * (x - bx) + dy * (y - by)

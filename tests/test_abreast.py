@@ -7,17 +7,17 @@ import pytest
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.columns import new_columns
-from hpcclear.dynamics.implicit.inverses import invert_complex, invert_real
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.layout import RATES, START, START_CONTACTS
+from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Outcome
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.implicit import memory as mem
+from hpcclear.dynamics.stepping.implicit.columns import new_columns
+from hpcclear.dynamics.stepping.implicit.inverses import invert_complex, invert_real
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.sampling import latin_hypercube
 

@@ -16,7 +16,7 @@ from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
 from hpcclear.cli.accuracy import advice, describe, resolution
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import style

@@ -68,7 +68,7 @@ def stack(column):
 
 
 def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
-    """Widths t of a linear stack-up with costs c/t at a standard deviation: t ~ (c/a^2)^(1/3); cost within 1 %."""
+    """Widths t of a linear stack-up with costs c/t at a standard deviation: t ~ (c/a^2)^(1/3); cost and widths within 1 %."""
     objective(stack)
     variables, random = {}, {}
     for (name, (path, middle)), cost in zip(MIDDLES.items(), COSTS, strict=True):
@@ -82,12 +82,13 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     exact *= most / np.sqrt((slopes**2 * exact**2).sum() / 3)
     constraint = {"statistic": "deviation", "most": most}
     case = {"random": list(MIDDLES), "objectives": ["cost"], "constraints": [constraint]}
-    found = verified(scene_with(variables, random, case), tmp_path / "a")
+    many = {**SMALL["verification"], "infill_samples": 1024}  # slopes are as exact as f's moments
+    found = verified(scene_with(variables, random, case, verification=many), tmp_path / "a")
     best = found.sel(design="a alpha")
     widths = np.array([float(best[f"t_{name}"]) for name in MIDDLES])
     least = float((costs / exact).sum())
     assert least * 0.995 < float(best["first_true"]) < 1.01 * least
-    assert widths == pytest.approx(exact, rel=0.1)  # the cost is flat there
+    assert widths == pytest.approx(exact, rel=0.01)
     assert str(best["constraints"].item()).endswith(": kept")
     assert np.sqrt((slopes**2 * widths**2).sum() / 3) <= most
     parts = {"verification": found, "contributions": dataset.read(tmp_path / "a/contributions.nc")}
@@ -213,6 +214,7 @@ def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
     assert "fit = 40 H7/" in values or "fit = 40 H6/" in values
 
 
+@pytest.mark.nightly
 def test_the_same_bytes_on_two_ranks(results, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(all_kinds().text)

@@ -14,7 +14,7 @@ from hpcclear import report
 from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import COVERAGE, COVERAGE_ALONE, PERTURBATIONS
+from hpcclear.dynamics.evaluation.evaluator import COVERAGE, COVERAGE_ALONE, PERTURBATIONS
 from hpcclear.ensemble.api import as_points
 
 ROOT = Path(__file__).parents[1]

@@ -12,6 +12,7 @@ from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluation.steady.copies import scales
 from hpcclear.dynamics.linkage.bending import uniform_share
 from hpcclear.dynamics.linkage.elements import held_inverse, sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
@@ -26,8 +27,7 @@ from hpcclear.dynamics.linkage.parts import (
     Slide,
     TorqueDrive,
 )
-from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
-from hpcclear.dynamics.steady.copies import scales
+from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.tables import plain
 

@@ -7,9 +7,9 @@ import pytest
 from running import scene_with
 
 from hpcclear.base import beside, cores
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.stepping.lanes import Lanes
 
 PROGRAM = """
 import sys
@@ -49,7 +49,7 @@ def test_an_interrupted_compilation_is_taken_up_again(monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("hpcclear.dynamics.lanes.explicit_code", interrupted)
+        patch.setattr("hpcclear.dynamics.stepping.lanes.explicit_code", interrupted)
         with pytest.raises(KeyboardInterrupt):
             lanes.step(1)
     assert not lanes.step(1)  # compiled now; nothing is queued

@@ -9,8 +9,9 @@ from running import HUNT_CROSSLEY, scene_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics import recorded, response
-from hpcclear.dynamics.recorded import Steps, pieces
+from hpcclear.dynamics import response
+from hpcclear.dynamics.evaluation.recorded import steps as recorded
+from hpcclear.dynamics.evaluation.recorded.steps import Steps, pieces
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import load_scene

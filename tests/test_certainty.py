@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.student import student
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, Verification
-from hpcclear.statistics.random.replicates import limits, moments, quantile, student, surely_less
+from hpcclear.statistics.random.replicates import limits, moments, quantile, surely_less
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.search.infill import NEAR, TwoScales, believed_ends, proposals

@@ -698,6 +698,7 @@ def test_figure_and_page(certified):
     page_numbers.check(place)
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_ranks_and_a_kill_change_no_byte(certified, tmp_path):
     place, _ = certified

@@ -23,7 +23,8 @@ from patience import crowded
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import OUTCOME, Status, failed
 from hpcclear.results import dataset, files, netcdf
-from hpcclear.results.checkpoint import Checkpoint, check_key, discard, key_attribute, unfinished
+from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
+from hpcclear.results.keys import check_key, key_attribute
 from hpcclear.results.lock import Holder, Lock
 from hpcclear.results.places import fresh_sibling
 from hpcclear.results.provenance import provenance

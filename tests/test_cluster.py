@@ -191,6 +191,7 @@ def contents(output: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in (output, *raw.glob("*.nc"))}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("box", [2, pytest.param(4, marks=FULL)], indirect=True)
 def test_leaders_of_nodes_share_out_what_one_process_makes(box, tmp_path):
     here, there = (tmp_path / name / "sums.nc" for name in ("here", "there"))

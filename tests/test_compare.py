@@ -112,3 +112,12 @@ def test_the_command_prints_norms_in_the_units_of_the_measurement_and_draws(resp
         compare(response, path, names={"gauge 1": "contact_force crank_rod"})
     ).axes[0]
     assert "kN" in panel.get_ylabel()
+
+
+def test_a_column_without_a_quantity_is_pointed_to_those_of_its_unit(response, tmp_path):
+    path = tmp_path / "m.csv"
+    path.write_text("time [s],motor [Nm]\n0,1\n1,2\n2,3\n")
+    with pytest.raises(InputError) as error:
+        compare(response, path)
+    assert "Use one of: crank_moment" in str(error.value)
+    assert "--name COLUMN=QUANTITY" in str(error.value)

@@ -96,8 +96,10 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     best = xr.Dataset(coords={"design": "case alpha"})
     shares, tolerances, first = scatter.lines({"contributions": content}, best)
     assert first.label == "tighten first"
-    listed = "C 55% ± 2.0%, m2+m3 (correlated) 30% ± 3.9%, u2 below 0.8%. The cubic fit does not explain 15%"
+    listed = (
+        "C 55% ± 2%, m2+m3 (correlated) 30% ± 4%, u2 below 0.8%. The cubic fit does not explain 15%"
+    )
     assert listed in shares.text
-    assert "C 25% ± 2.0%, m2 10% ± 2.0%, m3 2% ± 1.0%, u2 below 0.2%" in tolerances.text
+    assert "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%" in tolerances.text
     assert "other" not in shares.text + tolerances.text
     assert list(scatter.lines({}, best)) == []

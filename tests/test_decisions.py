@@ -1,28 +1,19 @@
 """Constraints are decided honestly: verdicts over looks and designs, what an answer says of them, what a decision costs."""
 
-import sys
-import tomllib
-from pathlib import Path
-
 import numpy as np
 import pytest
+from formula_study import scene_of
 from margins import most
 from scipy import stats
 
-from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
-from hpcclear.scene import load_scene
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy, Verification
-from hpcclear.study import goals, run_study, verdicts
+from hpcclear.study import goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.verdicts import Standing
 from hpcclear.study.verification import _nearest
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-
-import formula
 
 # -- verdicts ---------------------------------------------------------------------------------------
 
@@ -142,36 +133,17 @@ def test_a_design_that_surely_satisfies_them_is_recommended():
 # -- a study ----------------------------------------------------------------------------------------
 
 STUDY = """
-[study]
-seed = 3
-samples = 20
-test_samples = 8
-[study.variables]
-m2 = { range = [0.105, 0.42] }
-C = { range = ["0.3 mm", "1 mm"] }
-[study.random]
+[random]
 C = { distribution = "uniform", range = ["0.4 mm", "0.9 mm"] }
-[study.cases.light]
+[cases.light]
 random = ["C"]
 objectives = [{ formula = "m2" }, "mean"]
 constraints = [{ statistic = "exceedance", limit = "0.47 mm", most = "0.1 %" }]
-[study.sensitivity]
-groups = []
-[study.surrogate]
-r2 = 0.5
-restarts = 0
-[study.swarm]
-particles = 10
-iterations = 5
-runs = 1
-archive = 8
-[study.verification]
+[verification]
 designs = 2
 most_samples = 8192
 infill_rounds = 2
 infill_designs = 4
-response_windows = 2
-response_copies = 2
 """
 
 
@@ -183,16 +155,8 @@ def share_above(m2: float, limit: float = 0.47e-3) -> float:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    place = tmp_path_factory.mktemp("decided") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        formula.replace_dynamics(patch.setattr)
-        run_study(
-            load_scene(tomllib.loads(formula.PHYSICS + STUDY)),
-            place,
-            alone(),
-            progress_style="quiet",
-        )
+def done(carried_out):
+    place = carried_out(scene_of(STUDY))
     kinds = ("verification", "contributions")
     return {kind: dataset.read(place / f"{kind}.nc", kind) for kind in kinds}
 
@@ -225,7 +189,7 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
 
 
 def test_check_states_what_a_rare_failure_costs():
-    study = load_scene(tomllib.loads(formula.PHYSICS + STUDY)).required_study
+    study = scene_of(STUDY).required_study
     (text,) = verdicts.costs(study, "m")
     assert (
         "share with f above 0.00047 m at most 0.001: 3687 simulations of a design without" in text

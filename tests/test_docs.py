@@ -50,9 +50,8 @@ def follow(todo: list[Block], place: Path, monkeypatch: pytest.MonkeyPatch) -> N
     plt.close("all")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if n == "README.md" else pytest.mark.nightly) for n in RUN]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", RUN)
 def test_blocks_of_a_page_run_in_their_order(name, tmp_path, monkeypatch):
     todo = [block for block in BLOCKS[name] if block.runs and not block.slow]
     follow(todo, tmp_path / "checkout", monkeypatch)

@@ -8,7 +8,7 @@ from some_laws import effects_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.problem import effects_of
+from hpcclear.dynamics.setup.problem import effects_of
 from hpcclear.scene import load_scene
 
 TORQUE_CURVE = [[0.0, 2.0], [1.0, 9.0], [3.0, 4.0], [5.0, -1.0]]

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.explicit.tableau import PRINCE_DORMAND, TSITOURAS, Tableau
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.stepping.events import absolute_integral, hermite, root
+from hpcclear.dynamics.stepping.explicit.tableau import PRINCE_DORMAND, TSITOURAS, Tableau
+from hpcclear.dynamics.stepping.lanes import Lanes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 

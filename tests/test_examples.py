@@ -11,6 +11,7 @@ from patience import crowded
 SCRIPTS = sorted((ROOT / "examples").glob("*.py"))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
 def test_examples_run_and_print_finite_numbers(path, tmp_path):
     done = subprocess.run(

@@ -13,6 +13,7 @@ from scipy.io import loadmat
 import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
+from hpcclear.report import spread
 from hpcclear.report.export import FORMATS, export
 from hpcclear.report.tables import ROWS, to_table
 from hpcclear.results import dataset
@@ -175,3 +176,25 @@ def test_a_command_that_is_to_write_a_table_names_export(command):
     done = CliRunner().invoke(cli, [command, "jobs/quickstart.toml", "-o", "x.xlsx"])
     assert done.exit_code == 2
     assert "hpcclear export x.nc -o x.xlsx" in " ".join(done.output.split())
+
+
+def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
+    for name, failed in (("H7g6", 1), ("H7f7", 3)):
+        made = data.samples(200, failed).assign_attrs(sampling="monte-carlo")
+        dataset.write(made, tmp_path / f"{name}.nc")
+    dataset.write(data.timing(), tmp_path / "H7g6.timing.nc")  # fits/*.nc names it too
+    files = [str(path) for path in sorted(tmp_path.glob("*.nc"))]
+    words = ["--statistics", "--beyond", "0.3 mm", "-o", str(tmp_path / "fits.xlsx")]
+    done = CliRunner().invoke(cli, ["export", *files, *words])
+    assert done.exit_code == 0, done.output
+    table = pd.read_excel(tmp_path / "fits.xlsx", index_col=0)
+    assert list(table.columns) == ["H7f7", "H7g6"]
+    assert table.loc["samples"].tolist() == ["200", "200"]
+    assert table.loc["failed", "H7f7"].startswith("3 of 200")
+    assert table.loc["failed", "H7g6"].startswith("1 of 200")
+    for name in table.columns:
+        lines = dict(spread.statistics(dataset.read(tmp_path / f"{name}.nc")))
+        assert lines.items() <= table[name].to_dict().items()
+        assert "of the samples (" in table.loc["f > 0.3 mm", name]
+    refused = CliRunner().invoke(cli, ["export", *files, "-o", str(tmp_path / "all.csv")])
+    assert "Add --statistics" in str(refused.exception)

@@ -8,9 +8,9 @@ from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import implicit_method
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import implicit_method
 from hpcclear.scene import load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.switches import Off, switches

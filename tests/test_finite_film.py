@@ -91,7 +91,7 @@ def test_beyond_what_is_fitted_a_film_still_pushes(ratio):
             assert (np.diff(pushes) > 0.0).all()
 
 
-@pytest.mark.parametrize("length", [0.01, 0.04])
+@pytest.mark.parametrize("length", [pytest.param(0.01, marks=pytest.mark.nightly), 0.04])
 def test_a_journal_settles_where_the_solution_carries_the_load(length):
     """Force as large as the load, against it; of a pure wedge w points across the eccentricity."""
     load, speed = 200.0, 150.0

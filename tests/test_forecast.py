@@ -1,55 +1,29 @@
 """What a study is expected to simulate, from a pilot over the box, against what it does."""
 
-import sys
-import tomllib
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
+from formula_study import formula, scene_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
-from hpcclear.scene import load_scene
-from hpcclear.study import extent, forecast, run_study, simulations
-
-sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
-
-import formula
+from hpcclear.study import extent, forecast, simulations
 
 STUDY = """
-[study]
-seed = 3
-samples = 20
-test_samples = 8
-[study.variables]
-m2 = { range = [0.105, 0.42] }
+[variables]
 m3 = { range = [0.07, 0.28] }
-C = { range = ["0.3 mm", "1 mm"] }
-[study.random]
-C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
+[random]
 m2 = { distribution = "normal", deviation = 0.01 }
-[study.cases.robust]
+[cases.robust]
 random = ["C", "m2"]
 objectives = ["mean", "deviation"]
-[study.sensitivity]
-groups = []
-[study.surrogate]
-r2 = 0.5
-restarts = 0
-[study.swarm]
-particles = 10
-iterations = 5
-runs = 1
-archive = 8
-[study.verification]
+[verification]
 designs = 4
 infill_rounds = 2
 infill_designs = 6
 infill_samples = 64
-response_windows = 2
-response_copies = 2
 """
 KINDS = {
     "usual": [],
@@ -68,10 +42,10 @@ KINDS = {
         pytest.param("percentile", marks=pytest.mark.full),
     ],
 )
-def test_a_study_takes_what_its_forecast_says(kind, tmp_path, monkeypatch):
+def test_a_study_takes_what_its_forecast_says(kind, monkeypatch, carried_out):
     """Within a factor of 1.5; all of them: ``python -m pytest tests/test_forecast.py -m ""``."""
     formula.replace_dynamics(monkeypatch.setattr)
-    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY), KINDS[kind])
+    scene = scene_of(STUDY, *KINDS[kind])
     said, seconds = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)
     assert seconds > 0.0
     counted = []
@@ -81,14 +55,14 @@ def test_a_study_takes_what_its_forecast_says(kind, tmp_path, monkeypatch):
         return sample_points(scene, points, *arguments, **named)
 
     monkeypatch.setattr(simulations, "sample_points", counting)
-    run_study(scene, tmp_path / "it", alone(), progress_style="quiet")
+    carried_out(scene)
     assert said == pytest.approx(sum(counted), rel=0.5), (said, sum(counted))
     assert sum(counted) < 1.5 * said
 
 
 def test_without_a_pilot_the_most_is_said():
     """Where it would take long, or its designs make no mechanism."""
-    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY))
+    scene = scene_of(STUDY)
     most = sum(extent.samples_of(scene).values())
 
     def refused(points):

@@ -7,7 +7,7 @@ from running import HUNT_CROSSLEY, LATCHED, scene_with
 from hpcclear.base.objectives import RATE, asked
 from hpcclear.base.outcome import ON_REQUEST, RESPONSES
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone

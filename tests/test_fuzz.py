@@ -19,11 +19,12 @@ from hpcclear.results.names import designs_in
 from hpcclear.scene import load_scene
 from hpcclear.scene.paths import flatten
 
+pytestmark = pytest.mark.nightly
+
 NOBODY = 65534
 TEXT = SCENE.read_text()
 ROBUST = SCENE.with_name("robust_slider_crank.toml").read_text()
 FULL = pytest.mark.full
-NIGHTLY = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")
@@ -165,9 +166,7 @@ def makes_sense(path: Path) -> bool:
     )
 
 
-@pytest.mark.parametrize(
-    "count", [pytest.param(150, marks=NIGHTLY), pytest.param(10_000, marks=FULL)]
-)
+@pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=FULL)])
 @pytest.mark.timeout(7200)
 def test_any_scene_file_is_checked_or_refused(hpcclear, tmp_path, count):
     dice, codes = random.Random(count), Counter()
@@ -383,9 +382,7 @@ def damaged(content: bytes, other: bytes, dice: random.Random) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.parametrize(
-    "count", [pytest.param(100, marks=NIGHTLY), pytest.param(2000, marks=FULL)]
-)
+@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=FULL)])
 @pytest.mark.timeout(1800)
 def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     _, output = result
@@ -421,7 +418,7 @@ def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     assert second.exists()
 
 
-@pytest.mark.parametrize("count", [pytest.param(5, marks=NIGHTLY), pytest.param(200, marks=FULL)])
+@pytest.mark.parametrize("count", [5, pytest.param(200, marks=FULL)])
 @pytest.mark.timeout(1800)
 def test_commands_refuse_damaged_results(hpcclear, result, count):
     words, output = result

@@ -334,6 +334,7 @@ def test_the_page_tells_what_was_asked_for(study: tuple[Path, str]) -> None:
     assert "probability of f above 0.0004 m" in page
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_ranks_change_no_byte(study: tuple[Path, str], tmp_path: Path) -> None:
     folder = tmp_path / "two"

@@ -20,7 +20,7 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.compiled import module_text
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.ensemble.api import as_points
 from hpcclear.report.figures import guides, moving
 
@@ -72,6 +72,7 @@ def restitution(damping):
     )  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_impacts_converge_to_those_of_rigid_bodies(published, monkeypatch):
     """A slider tilted by 5 mrad, so that corners hit one by one: corners and crank angles, with 1, 10, 100 times the stiffness,
     and the first ten with 1e5 times.

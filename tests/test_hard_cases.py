@@ -14,11 +14,11 @@ from hard_case_runs import hard_cases, long_run
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.layout.views import Parameters, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points, check_points
 

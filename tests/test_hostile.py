@@ -95,6 +95,7 @@ def test_devices_and_pipes_are_refused(tmp_path):
     assert stat.S_ISFIFO(pipe.lstat().st_mode)
 
 
+@pytest.mark.nightly
 def test_figures_and_pages_replace_only_figures_and_pages_of_ours(tmp_path):
     def drawn(place: Path) -> Result:
         return CliRunner().invoke(cli, ["check", str(SCENE), "--no-cost", "--sketch", str(place)])
@@ -166,6 +167,7 @@ def test_too_little_address_space_ends_in_a_message(tmp_path, megabytes):
     assert code == 0 or (code == 1 and "memory" in output), output
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("ranks", "megabytes"),
     [
@@ -258,6 +260,7 @@ def test_a_rank_that_alone_gets_a_bad_option_does_not_leave_the_others_waiting(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 @pytest.mark.parametrize("megabytes", [200, LEAST_ADDRESS_SPACE])
 @pytest.mark.parametrize("alone", [0, 1])
@@ -380,6 +383,7 @@ def test_forged_results_are_refused_or_left_out(study, tmp_path, file, name, val
     assert "</html>" in write_report(tmp_path).read_text()
 
 
+@pytest.mark.nightly
 def test_an_honest_page_lacks_nothing_and_a_panel_that_fails_is_said(study, monkeypatch):
     assert "was left out" not in write_report(study).read_text()
     path = study / "responses" / "robust_alpha.nc"

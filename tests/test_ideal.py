@@ -11,14 +11,14 @@ from test_motion import scene_of as scene_of_effects
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.lanes import PrescribedSamples
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.curves import curve_at, periodic_cells
 from hpcclear.dynamics.planar.tables import mechanism_of
-from hpcclear.dynamics.problem import problem_of
 from hpcclear.dynamics.response import simulate
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import PrescribedSamples
 from hpcclear.report.figures import motion, moving
 from hpcclear.scene.points import Points
 

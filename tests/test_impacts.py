@@ -18,7 +18,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import IMPACTS
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.problem import effects_of, problem_of
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.ensemble.simulate import content_of
 from hpcclear.results import dataset
 from hpcclear.statistics import spectra

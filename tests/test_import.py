@@ -8,7 +8,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report.figures.linkage_sketch import Placed
 from hpcclear.scene import load_scene
-from hpcclear.scene.points_of_linkage import linkage_of, text_of
+from hpcclear.scene.importers import linkage_of, text_of
 
 FOUR_BAR = """name;x [mm];y [mm];bodies
 A0;0;0;ground crank

@@ -1,28 +1,16 @@
 """Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
 
-import subprocess
-import sys
-import tomllib
-from pathlib import Path
-
 import moocore
 import numpy as np
 import pytest
-from commands import warm
-from patience import crowded
+from formula_study import contents, formula, on_two_ranks, scene_of
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
-from hpcclear.scene import load_scene
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known, Space
-from hpcclear.study import extent, refinement, run_study
-
-PROGRAMS = Path(__file__).parent / "mpi_programs"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
+from hpcclear.study import extent, refinement
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -122,57 +110,29 @@ def test_too_few_designs_for_a_model_are_refused():
 # -- a study ----------------------------------------------------------------------------------------
 
 STUDY = """
-[study]
-seed = 3
-samples = 20
-test_samples = 8
-[study.variables]
-m2 = { range = [0.105, 0.42] }
+[variables]
 m3 = { range = [0.07, 0.28] }
-C = { range = ["0.3 mm", "1 mm"] }
-[study.random]
-C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
-[study.cases.robust]
+[cases.robust]
 random = ["C"]
 objectives = [{ statistic = "quantile", level = 0.9 }, { formula = "0 - m2 - m3" }]
-[study.sensitivity]
-groups = []
-[study.surrogate]
+[surrogate]
 of = "statistics"
-r2 = 0.5
-restarts = 0
-[study.swarm]
-particles = 10
-iterations = 5
-runs = 1
-archive = 8
-[study.verification]
+[verification]
 designs = 4
 infill_rounds = 1
 infill_designs = 6
 infill_samples = 64
 most_samples = 512
-response_windows = 2
-response_copies = 2
 """
 
 
 def study():
-    return load_scene(tomllib.loads(formula.PHYSICS + STUDY))
-
-
-def contents(place: Path) -> dict[str, bytes]:
-    paths = [path for path in sorted(place.rglob("*.nc")) if path.name != "timing.nc"]
-    return {str(path.relative_to(place)): path.read_bytes() for path in paths}
+    return scene_of(STUDY)
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    place = tmp_path_factory.mktemp("improved") / "whole"
-    with pytest.MonkeyPatch.context() as patch:
-        formula.replace_dynamics(patch.setattr)
-        run_study(study(), place, alone(), progress_style="quiet")
-    return place
+def done(carried_out):
+    return carried_out(study())
 
 
 def test_statistics_are_searched_by_name_or_where_f_is_rough():
@@ -206,12 +166,4 @@ def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, t
 @pytest.mark.mpi
 def test_a_search_by_statistics_has_the_same_bytes_on_two_ranks(done, tmp_path):
     """``python -m pytest tests/test_improvement.py -m full``"""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(study().text)
-    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
-    made = subprocess.run(
-        [str(Path(sys.executable).parent / "mpiexec"), "-n", "2", *program],
-        capture_output=True, text=True, timeout=crowded(120), check=False,
-    )  # fmt: skip
-    assert made.returncode == 0, made.stderr
-    assert contents(tmp_path / "out") == contents(done)
+    assert contents(on_two_ranks(study(), tmp_path)) == contents(done)

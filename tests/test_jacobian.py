@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.implicit import memory as mem
-from hpcclear.dynamics.implicit.columns import new_columns
-from hpcclear.dynamics.implicit.control import fit_to_ramp
-from hpcclear.dynamics.implicit.memory import COLUMNS, Moved, N
-from hpcclear.dynamics.implicit.newton import evaluate_stages, new_jacobian
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.implicit import memory as mem
+from hpcclear.dynamics.stepping.implicit.columns import new_columns
+from hpcclear.dynamics.stepping.implicit.control import fit_to_ramp
+from hpcclear.dynamics.stepping.implicit.memory import COLUMNS, Moved, N
+from hpcclear.dynamics.stepping.implicit.newton import evaluate_stages, new_jacobian
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import load_scene
 
 JOB = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

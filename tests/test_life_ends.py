@@ -208,9 +208,9 @@ def test_progress_of_lives_goes_over_all_designs_and_forecasts():
     progress.lives(2, 2, [])
     progress.finish()
     assert log.getvalue().splitlines() == [
-        "wear: 0/2 lives over (25 %), 8 simulations, about 30 s left",
-        "wear: 1/2 lives over (75 %), 16 simulations, about 7 s left",
-        "wear: 2/2 lives over (100 %), 16 simulations in 20 s",
+        "wear: 0/2 service lives finished (25 %), 8 simulations, about 30 s left",
+        "wear: 1/2 service lives finished (75 %), 16 simulations, about 7 s left",
+        "wear: 2/2 service lives finished (100 %), 16 simulations in 20 s",
     ]
 
 
@@ -304,7 +304,7 @@ def test_the_command_and_the_page_say_when_and_why_lives_ended(written):
     folder, output = written
     told = " ".join(output.split())
     assert "4 at wear.limit.clearance" in told
-    assert "4/4 lives over (100 %)" in told
+    assert "4/4 service lives finished (100 %)" in told
     assert "life in hours" in told
     assert "120 µm" in told or "0.12 mm" in told
     page = write_report(folder / "results").read_text(encoding="utf-8")

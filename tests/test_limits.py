@@ -17,6 +17,7 @@ from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.results import dataset
 
 pytestmark = pytest.mark.mpi
+TWO_RANKS = pytest.param(2, marks=pytest.mark.nightly)
 OPTIONS = ("--checkpoint-interval", "0.2", "--progress", "quiet")
 
 
@@ -43,7 +44,7 @@ def small_disk(tmp_path) -> Iterator[Path]:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a file system")
-@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize("ranks", [0, TWO_RANKS])
 def test_a_full_disk_ends_in_a_message_and_keeps_what_is_there(small_disk, compiled, ranks):
     earlier = small_disk / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
@@ -103,7 +104,7 @@ def test_a_limit_on_file_sizes_ends_in_a_message(tmp_path, compiled):
 # -- memory -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize("ranks", [0, TWO_RANKS])
 def test_a_design_that_does_not_fit_into_memory_ends_in_a_message(tmp_path, compiled, ranks):
     earlier = tmp_path / "earlier.nc"
     earlier.write_bytes(compiled.read_bytes())
@@ -145,6 +146,7 @@ def test_a_second_run_on_one_output_is_refused(tmp_path):
     assert commands.finish(job)[0] == 3
 
 
+@pytest.mark.nightly
 def test_the_lock_of_a_killed_run_is_recognised(tmp_path):
     words = commands.sample(tmp_path / "samples.nc", 3000, *OPTIONS)
     job = commands.start(words)

@@ -14,7 +14,7 @@ from test_user_laws import FORMULA, NO_FRICTION, POWER, ROOT, file_with, oracle_
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.laws import laws, numbers
 from hpcclear.dynamics.laws.hertz_contact import dundurs
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.scene import load_scene
 from hpcclear.scene.switches import switches
 

@@ -15,14 +15,14 @@ from scipy.integrate import solve_ivp
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.cli.printing import describe_scene
+from hpcclear.cli.check import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start, put_together
 from hpcclear.dynamics.planar.tables import mechanism_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.ensemble.api import as_points, evaluate
 from hpcclear.report.figures.linkage_sketch import key
 from hpcclear.scene import Scene
@@ -436,5 +436,5 @@ def test_the_angle_of_a_body_that_is_held_is_told():
     """By the joint that holds it: it has no coordinate of its own."""
     examples = LINKAGES.parents[1] / "docs" / "mkdocs" / "examples"
     told = put_together(mechanism_of(load_scene(examples / "linkage.toml").linkage)).report()
-    assert "frame: 90 deg (estimate 0)" in told
-    assert "crank: 25 deg (estimate 25)" in told
+    assert "frame: 90 deg (start_angle 0 deg)" in told
+    assert "crank: 25 deg (start_angle 25 deg)" in told

@@ -298,6 +298,7 @@ def test_a_linkage_wears_as_the_closed_form_says(tmp_path):
     assert float(grown) == pytest.approx(truth - 1e-4, rel=1e-5)
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_ranks_and_a_kill_change_no_byte(tmp_path):
     files = []

@@ -31,6 +31,8 @@ from hpcclear.dynamics.linkage.parts import (
 )
 from hpcclear.dynamics.physics.angles import sincos
 
+pytestmark = pytest.mark.nightly
+
 FLAT = types.float64[::1]
 BARE = {"crank_rod", "rod_slider"}
 PER_TURN = f"0x{struct.unpack('>Q', struct.pack('>d', 0.5 / math.pi))[0]:016X}"

@@ -16,9 +16,9 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws.friction import lugre
 from hpcclear.dynamics.linkage.observe import observe
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.switches import Off, switches

@@ -12,8 +12,8 @@ from hpcclear import grid
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime
 from hpcclear.cli import cli
-from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
-from hpcclear.dynamics.steady.mapping import mapped
+from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
+from hpcclear.dynamics.evaluation.steady.mapping import mapped
 from hpcclear.ensemble.api import as_points
 from hpcclear.ensemble.maps import SHAPE, axis, cells
 from hpcclear.scene import load_scene

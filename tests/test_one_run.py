@@ -28,7 +28,7 @@ from hpcclear.ensemble.wear import run_wear
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.results import netcdf
-from hpcclear.results.checkpoint import KEY
+from hpcclear.results.keys import KEY
 from hpcclear.scene import Scene, load_scene
 from hpcclear.study import run_study
 

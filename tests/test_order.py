@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.dynamics.explicit.tableau import TABLEAUS, Tableau
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Parameters, Settings
+from hpcclear.dynamics.layout.views import Parameters, Settings
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, Tableau
+from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene, load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

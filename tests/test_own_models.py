@@ -220,7 +220,7 @@ def test_units_are_taken_off_and_put_on_again():
 
 
 def test_moments_are_averages_of_predictions_or_its_own():
-    draws = {"x2": np.linspace(0.0, 1e-4, 64)}
+    draws = {"x2": np.linspace(0.0, 1e-4, 64)[None]}
     linear = fitted(lambda: Constant(lambda X: X[:, 0] + X[:, 1]))
     own = fitted(lambda: Own(lambda X: X[:, 0]))
     from hpcclear.base.quantiles import Uniform
@@ -230,7 +230,9 @@ def test_moments_are_averages_of_predictions_or_its_own():
     for leaf in (linear, own):
         model = Piecewise((leaf,), np.ones(1), np.zeros(1), np.ones(1, bool))
         random = [RandomVariable("x2", Uniform(5e-5, 5e-5))]
-        found.append(RobustObjective(model, ("x1",), random, draws=draws)(np.array([[1.0]]))[0])
+        found.append(
+            RobustObjective(model, ("x1",), random, draws=lambda _: draws)(np.array([[1.0]]))[0]
+        )
     mean, scale = linear.values.mean(), linear.values.std()
     unit = np.linspace(0.0, 1.0, 64)
     np.testing.assert_allclose(found[0], [mean + scale, scale * unit.std(ddof=1)], rtol=1e-9)

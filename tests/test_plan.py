@@ -1,16 +1,19 @@
 """The plan: cost measured on samples, the job that follows from it."""
 
 import re
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import hpcclear.accuracy.plan as planning
 from hpcclear.accuracy.plan import Plan, Row, measure
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli import cli
-from hpcclear.cli.plan import RESERVE, describe, slurm
+from hpcclear.cli.plan import RESERVE, describe, preview, slurm
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
@@ -102,7 +105,7 @@ def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
     file, loose, strict = found.rows
     assert file.scene == SCENE
     for row in (loose, strict):
-        limit = re.match(r"±(\S+), met by 100%", row.reached).group(1)
+        limit = re.match(r"half-width (\S+), met by 100%", row.reached).group(1)
         assert float(limit) <= row.error
     assert file.reached == ""
     assert found.samples == SCENE.study.samples
@@ -132,3 +135,41 @@ def test_core_seconds_of_a_long_run_are_predicted():
     sample_points(scene, points, ranks, stage="long")
     busy = ranks.stage_seconds["long"][0, 0]
     assert plan.rows[0].seconds * count == pytest.approx(busy, rel=0.2)
+
+
+def test_a_forecast_states_how_far_it_holds():
+    records = np.zeros(100, OUTCOME)
+    records["sample"] = np.arange(100)
+    records["rhs_evaluations"] = 1000 + 100 * (-1) ** np.arange(100)
+    share = planning._spread(
+        np.concatenate([records, records])
+    )  # the same samples again tell nothing
+    assert share == pytest.approx(1.96 * 0.1 / 10, rel=0.01)
+    assert np.isnan(planning._spread(records[:1]))
+    text = preview(
+        Plan((Row(None, SCENE, 2e-3, "", share),), 1000, None, 3.0, 400e6, 5, first=True), 1
+    )
+    assert text.startswith(
+        "first look, settings of the file: 2 ms per sample, 1000 simulations take"
+    )
+    assert text.endswith("(± 2 % between designs; probably less: a short batch leaves lanes idle)")
+
+
+def test_the_first_answer_takes_less_than_ten_seconds():
+    """Of processor time, once the motion is compiled; the rest of the ladder refines it."""
+
+    class Answered(Exception):
+        pass
+
+    def show(made):
+        assert made.first
+        raise Answered
+
+    scene = load_scene(JOBS / "quickstart.toml")
+    design(scene, None)
+    for _ in range(2):  # the first time may compile
+        begin = time.process_time()
+        with pytest.raises(Answered):
+            measure(scene, alone(), show=show)
+        spent = time.process_time() - begin
+    assert spent < 8.0  # and some two seconds to start the program

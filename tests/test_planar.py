@@ -14,9 +14,9 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.parts import Clearance, Force, Slide, Spring
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.tables import mechanism_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.points import Points
 from hpcclear.scene.validation import validated

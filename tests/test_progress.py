@@ -59,7 +59,7 @@ def test_what_an_earlier_run_did_counts_as_done_but_not_as_fast():
     clock.now += 5.0
     progress.refresh()
     assert log.getvalue().splitlines() == [
-        "80/100 (80 %), 2 failed, 0 samples/s, ? left",
+        "80/100 (80 %), 2 failed, 0 samples/s, time left not known",
         "85/100 (85 %), 2 failed, 0.5 samples/s, 30 s left",
     ]
 

@@ -19,7 +19,7 @@ from hpcclear.statistics.random.rules import kernel_integral, rule
 from hpcclear.statistics.surrogate.kernels import MATERN, SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study.optimisation import problem_of
+from hpcclear.study.problem import problem_of
 
 JOBS = Path(__file__).parent.parent / "jobs"
 ROBUST = load_scene(JOBS / "robust_slider_crank.toml")

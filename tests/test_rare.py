@@ -1,32 +1,21 @@
 """Rare failures: indices from few values, probabilities by importance sampling, and designs at the edge of what is allowed."""
 
-import subprocess
-import sys
-import tomllib
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from commands import warm
+from formula_study import contents, formula, on_two_ranks, scene_of
 from margins import fewest
-from patience import crowded
 from scipy import stats
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
-from hpcclear.scene import load_scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random import tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare
-from hpcclear.study import rare, run_study
-
-PROGRAMS = Path(__file__).parent / "mpi_programs"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
+from hpcclear.study import rare
 
 # -- indices ----------------------------------------------------------------------------------------
 
@@ -173,37 +162,23 @@ def test_inputs_too_far_out_to_make_a_mechanism_count_as_failed():
 # -- a study ----------------------------------------------------------------------------------------
 
 STUDY = """
-[study]
-seed = 3
 samples = 30
-test_samples = 8
-[study.variables]
-m2 = { range = [0.105, 0.42] }
+[variables]
 m3 = { range = [0.07, 0.28] }
-C = { range = ["0.3 mm", "1 mm"] }
-[study.random]
+[random]
 C = { distribution = "lognormal", mean = "0.5 mm", deviation = "0.05 mm", range = ["0.31 mm", "0.99 mm"] }
-[study.cases.heavy]
+[cases.heavy]
 random = ["C"]
 objectives = [{ formula = "0 - m3" }, "mean"]
 constraints = [{ statistic = "exceedance", limit = "0.475 mm", most = 5e-4 }]
-[study.sensitivity]
-groups = []
-[study.surrogate]
-r2 = 0.5
-restarts = 0
-[study.swarm]
+[swarm]
 particles = 16
 iterations = 8
-runs = 1
-archive = 8
-[study.verification]
+[verification]
 designs = 1
 most_samples = 4096
 infill_rounds = 1
 infill_designs = 6
-response_windows = 2
-response_copies = 2
 """
 
 
@@ -215,13 +190,9 @@ def share_above(values: np.ndarray, m2: float, m3: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    place = tmp_path_factory.mktemp("rare") / "out"
-    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY))
-    with pytest.MonkeyPatch.context() as patch:
-        formula.replace_dynamics(patch.setattr)
-        run_study(scene, place, alone(), progress_style="quiet")
-    return scene, dataset.read(place / "verification.nc", "verification")
+def done(carried_out):
+    scene = scene_of(STUDY)
+    return scene, dataset.read(carried_out(scene) / "verification.nc", "verification")
 
 
 def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
@@ -242,36 +213,16 @@ def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
     assert float(best["m3"]) > 0.99 * heaviest
 
 
-@pytest.mark.full  # pytest -m full tests/test_rare.py: half a minute
-def test_a_study_of_rare_failures_stopped_after_every_stage_ends_with_the_same_bytes(tmp_path, monkeypatch):  # fmt: skip
-    formula.replace_dynamics(monkeypatch.setattr)
-    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY))
-    run_study(scene, tmp_path / "whole", alone(), progress_style="quiet")
-    assert formula.run_in_pieces(scene, str(tmp_path / "pieces"), alone()) > 3
-    for path in sorted((tmp_path / "whole").glob("*.nc")):
-        if path.name != "timing.nc":
-            assert path.read_bytes() == (tmp_path / "pieces" / path.name).read_bytes(), path.name
-
-
 @pytest.mark.full
 @pytest.mark.mpi
 @pytest.mark.parametrize("way", ["two ranks", "in pieces"])
-def test_rare_failures_have_the_same_bytes_on_any_way(way, tmp_path, monkeypatch):
+def test_rare_failures_have_the_same_bytes_on_any_way(way, tmp_path, monkeypatch, carried_out):
     """``python -m pytest tests/test_rare.py -m full -k same_bytes``"""
-    scene = load_scene(tomllib.loads(formula.PHYSICS + STUDY))
-    formula.replace_dynamics(monkeypatch.setattr)
-    run_study(scene, tmp_path / "whole", alone(), progress_style="quiet")
+    scene = scene_of(STUDY)
+    whole = contents(carried_out(scene))
     if way == "in pieces":
-        formula.run_in_pieces(scene, str(tmp_path / "out"), alone())
+        formula.replace_dynamics(monkeypatch.setattr)
+        assert formula.run_in_pieces(scene, str(tmp_path / "out"), alone()) > 3
     else:
-        (tmp_path / "scene.toml").write_text(scene.text)
-        program = [
-            str(PROGRAMS / "formula.py"),
-            str(tmp_path / "scene.toml"),
-            str(tmp_path / "out"),
-        ]
-        words = [str(Path(sys.executable).parent / "mpiexec"), "-n", "2", *warm().words(program)]
-        made = subprocess.run(words, capture_output=True, text=True, timeout=crowded(300), check=False)  # fmt: skip
-        assert made.returncode == 0, made.stderr
-    for name in ("verification.nc", "samples.nc", "contributions.nc"):
-        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        on_two_ranks(scene, tmp_path)
+    assert contents(tmp_path / "out") == whole

@@ -8,15 +8,14 @@ import pytest
 from running import integrate, kept_steps
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import evaluator
-from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.evaluation import evaluate_records, evaluator
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.layout.views import Outcome
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record
-from hpcclear.dynamics.views import Outcome
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 

@@ -24,6 +24,7 @@ JOBS = {
 DATA = (
     JOBS
     | {
+        "hpcclear/cli/compressor.toml",
         "hpcclear/cli/four_stroke.toml",
         "hpcclear/cli/starter.toml",
         "hpcclear/py.typed",

@@ -295,6 +295,11 @@ def test_loads_cleanly_and_fits_the_screen(
         " && e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 80));"
     )
     assert overflow == []
+    sideways = browser.run(
+        "return [...document.querySelectorAll('.scroll, pre')].filter(e => e.scrollWidth > e.clientWidth + 1)"
+        ".map(e => e.outerHTML.slice(0, 120));"
+    )
+    assert sideways == [] or width > 400
     assert browser.run("return window.hostile;") is None
     small = browser.run(
         "return [...document.querySelectorAll('p, td, th, dd, dt, li, a, figcaption, button, label')]"

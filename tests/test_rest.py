@@ -9,9 +9,9 @@ from test_linkage_scenes import slider_crank_pair
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.response import simulate
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene import load_scene
 from hpcclear.scene.describing import effects_on
 from hpcclear.scene.points import Points, check_points

@@ -394,7 +394,9 @@ def test_moments_under_matern_are_those_of_a_dense_grid():
     """Draws in equal steps of probability, against a Gauss rule through scikit-learn's kernel."""
     rough = replace(surrogate(), kernel=MATERN)
     steps = (np.arange(4000) + 0.5) / 4000
-    objective = RobustObjective(rough, DESIGN, UNIFORM[:1], draws={"C": 3e-4 + 7e-4 * steps})
+    objective = RobustObjective(
+        rough, DESIGN, UNIFORM[:1], draws=lambda _: {"C": 3e-4 + 7e-4 * steps[None]}
+    )
     (place,) = designs(1)
     nodes, weights = np.polynomial.legendre.leggauss(40)
     at = np.column_stack([np.tile(place, (40, 1)), 6.5e-4 + 3.5e-4 * nodes])

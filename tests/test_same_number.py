@@ -5,17 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 from running import integrate
 
 import hpcclear
 from hpcclear.cli import cli
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import coordinate_count, problem_of
-from hpcclear.dynamics.response import simulate
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.response import kernel_of, simulate, simulate_together
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import coordinate_count, problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
 from hpcclear.ranks.boundary import alone
@@ -81,6 +82,31 @@ def test_series_are_those_of_the_sample(name: str):
 def test_so_are_those_of_implicit_steps():
     series, sample = parting(scene_of("slider_crank.toml").with_(SHORT | STIFF))
     assert series.tobytes() == sample.tobytes()
+
+
+def test_responses_side_by_side_have_the_bytes_of_single_ones():
+    """Of different clearances, friction and outcomes; what has another kernel is simulated by itself."""
+    scene = scene_of("slider_crank.toml").with_(SHORT)
+    path, failing = "joints.crank_rod.clearance", {"numerics.max_steps": 50}
+    alike = [{path: 2e-4}, {path: 5e-4, "effects.friction.coefficient": 0.02}, {path: 8e-4}]
+    others = [failing, {**failing, path: 3e-4}, {"effects.friction": {"law": "none"}}]
+    ideal = {joint: {"kind": "ideal"} for joint in ("joints.crank_rod", "joints.rod_slider")}
+    made = [scene.with_(changes) for changes in (*alike, *others, {**ideal, "effects": {}})]
+    assert [kernel_of(one) == kernel_of(made[0]) for one in made] == [True] * 3 + [False] * 4
+    assert kernel_of(made[3]) == kernel_of(made[4])
+    found = dict(simulate_together(made))
+    assert sorted(found) == list(range(len(made)))
+    for k, one in enumerate(made):
+        xr.testing.assert_identical(found[k], simulate(one, checked=False))
+    assert [int(found[k]["status"]) for k in range(len(made))] == [
+        0,
+        0,
+        0,
+        *2 * [found[3]["status"]],
+        0,
+        0,
+    ]
+    assert int(found[3]["status"]) != 0
 
 
 @pytest.mark.parametrize(

@@ -14,15 +14,15 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.numbered import Rows
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.explicit import tableau as tab
-from hpcclear.dynamics.explicit.combine import Step, stage_state, step_error
-from hpcclear.dynamics.explicit.steps import weigh_rates
-from hpcclear.dynamics.implicit.columns import leave
-from hpcclear.dynamics.implicit.newton import observe_stages
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.stepping.control import commit_measures
-from hpcclear.dynamics.views import Outcome, Start
+from hpcclear.dynamics.stepping.explicit import tableau as tab
+from hpcclear.dynamics.stepping.explicit.combine import Step, stage_state, step_error
+from hpcclear.dynamics.stepping.explicit.steps import weigh_rates
+from hpcclear.dynamics.stepping.implicit.columns import leave
+from hpcclear.dynamics.stepping.implicit.newton import observe_stages
+from hpcclear.dynamics.stepping.lanes import Lanes
 
 W = 4
 NONE_OPEN = at.Stepped(at.rules_of(at.Effects()), np.zeros(0, np.int64))

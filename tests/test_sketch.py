@@ -94,17 +94,22 @@ def test_the_key_has_the_scenes_own_numbers():
     assert "-9 kN" not in rigid
 
 
-@pytest.mark.parametrize("options", [[], ["--four-stroke"]], ids=["two-stroke", "four-stroke"])
+@pytest.mark.parametrize(
+    "options",
+    [[], ["--four-stroke"], ["--compressor"]],
+    ids=["two-stroke", "four-stroke", "compressor"],
+)
 def test_check_draws_and_init_writes_what_check_accepts(tmp_path, options):
     file, figure = tmp_path / "my engine.toml", tmp_path / "sketch.svg"
     made = CliRunner().invoke(cli, ["init", str(file), *options])
     assert made.exit_code == 0
     assert f"hpcclear check {file}" in made.output
-    assert f"hpcclear run {file} -o results" in file.read_text()
+    last = "sample" if "--compressor" in options else "run"
+    assert f"hpcclear {last} {file} -o " in file.read_text()
     scene = load_scene(file)
     assert scene.warnings == ()
     assert scene.study.objective in file.read_text()
-    assert ("720 deg" in file.read_text()) == bool(options)
+    assert ("720 deg" in file.read_text()) == ("--four-stroke" in options)
     words = ["check", str(file), "--no-cost", "--sketch", str(figure)]
     checked = CliRunner().invoke(cli, words)
     assert checked.exit_code == 0

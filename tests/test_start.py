@@ -47,7 +47,7 @@ def test_a_response_that_is_compiled_loads_nothing_that_only_compiling_needs(tmp
         "-o",
         str(tmp_path / "a.nc"),
         "--set",
-        "numerics.averaged_revolutions=1",
+        "numerics.averaged_revolutions=4",
     ]
     program = [sys.executable, "-m", "hpcclear", *words]
     subprocess.run(program, check=True, capture_output=True, timeout=crowded(600.0))  # compiles

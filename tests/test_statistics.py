@@ -303,7 +303,10 @@ def written(folder: Path) -> dict[str, bytes]:
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     "keeps",
-    ["by leaders", *(pytest.param(k, marks=pytest.mark.full) for k in ("nothing", "by ranks"))],
+    [
+        pytest.param("by leaders", marks=pytest.mark.nightly),
+        *(pytest.param(k, marks=pytest.mark.full) for k in ("nothing", "by ranks")),
+    ],
 )
 def test_leaders_of_nodes_change_no_bit(tmp_path, keeps):
     here, there, stopped = (tmp_path / name for name in ("here", "there", "stopped"))
@@ -424,6 +427,7 @@ def test_a_leader_merges_blocks_that_ranks_summed_up_and_wrote():
     assert rest["first"].tolist() == [4096]
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_ranks_write_the_samples_of_blocks_that_they_make_in_time(tmp_path):
     places = {"root": {}, "ranks": {"BLOCKS": "1"}, "apart": {"BLOCKS": "1", "APART": "1"}}
@@ -439,6 +443,7 @@ def test_ranks_write_the_samples_of_blocks_that_they_make_in_time(tmp_path):
     assert of_root["ranks"] < 0.5 * of_root["root"]  # the first block and the checkpoint
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_samples_summed_up_without_files_are_made_again(tmp_path):
     output, raw = tmp_path / "out.nc", tmp_path / "raw"

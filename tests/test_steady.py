@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady import ensemble, judging
-from hpcclear.dynamics.steady.copies import scales
-from hpcclear.dynamics.steady.effort import Effort, Mean, Sample
-from hpcclear.dynamics.steady.judging import objective
-from hpcclear.dynamics.steady.look import look
-from hpcclear.dynamics.steady.procedure import loosest
-from hpcclear.dynamics.views import Outcome, Parameters, Start
+from hpcclear.dynamics.evaluation.steady import ensemble, judging
+from hpcclear.dynamics.evaluation.steady.copies import scales
+from hpcclear.dynamics.evaluation.steady.effort import Effort, Mean, Sample
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.evaluation.steady.look import look
+from hpcclear.dynamics.evaluation.steady.procedure import loosest
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -113,7 +113,7 @@ def test_copies_that_come_together_are_told_from_those_that_stay_apart():
 def test_limits_hold_the_mean_as_often_as_they_say():
     holds = 0
     for seed in RNG_SEEDS:
-        mean, _, limit = judging.student(np.random.default_rng(seed).standard_normal(8))
+        mean, _, limit = judging.with_limit(np.random.default_rng(seed).standard_normal(8))
         holds += abs(mean) <= limit
     least = stats.binom.ppf(0.001, len(RNG_SEEDS), judging.LEVEL)
     assert holds >= least

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import implicit_method, problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Outcome, Start
+from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import implicit_method, problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.api import evaluate
 from hpcclear.scene import Scene, load_scene
 

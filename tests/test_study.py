@@ -31,7 +31,6 @@ from hpcclear.statistics.surrogate.stored import models_in
 from hpcclear.study import (
     chaos,
     extent,
-    optimisation,
     responses,
     run_study,
     sensitivities,
@@ -39,6 +38,7 @@ from hpcclear.study import (
 from hpcclear.study.paper import claims
 from hpcclear.study.paper.printed import printed_designs
 from hpcclear.study.paper.recognition import is_the_papers, own_names
+from hpcclear.study.problem import problem_of
 from hpcclear.study.stages import STAGES, files_of
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
@@ -699,7 +699,7 @@ def test_the_swarm_sees_the_exact_moments():
     surrogate = Piecewise((model,), np.ones(1), np.ones(1), np.ones(1, bool))
     design = {"m2": 0.2, "m3": 0.15, "u2": 0.05, "I2": 4e-4}
     for case, robust in (("first", False), ("second", True)):
-        problem = optimisation.problem_of(scene, case, surrogate)
+        problem = problem_of(scene, case, surrogate)
         found = problem.moments(np.array([[design[name] for name in problem.names]]))[0]
         assert found == pytest.approx(truth(design, robust), rel=2e-4)
     outside = problem.moments(np.array([[0.5, 0.15, 0.05, 4e-4]]))

@@ -24,7 +24,7 @@ sys.path.insert(0, str(commands.PROGRAM.parent))
 
 import formula
 
-pytestmark = pytest.mark.mpi
+pytestmark = [pytest.mark.mpi, pytest.mark.nightly]
 SAMPLES = 4000
 INTERVAL = 0.5  # s
 OPTIONS = ("--checkpoint-interval", str(INTERVAL), "--progress", "quiet")
@@ -100,7 +100,6 @@ only_sample = pytest.mark.parametrize("undisturbed", ["sample"], indirect=True)
 
 
 # of each of the two commands
-@pytest.mark.nightly
 @pytest.mark.parametrize("kills", [3, pytest.param(50, marks=pytest.mark.full)])
 @pytest.mark.timeout(3600)
 def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
@@ -151,7 +150,6 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
 # -- signals and the time limit -----------------------------------------------------------------
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("moments", [2, pytest.param(10, marks=pytest.mark.full)])
 @pytest.mark.parametrize("how", ["SIGTERM", "SIGINT", "SIGUSR1", "time limit"])
 @pytest.mark.timeout(3600)
@@ -244,7 +242,7 @@ BEFORE = [
     "import hpcclear.ensemble.samples",
     "import hpcclear.scene",
 ]
-DURING = ["import hpcclear.dynamics.evaluator", "maker", "simulation"]
+DURING = ["import hpcclear.dynamics.evaluation.evaluator", "maker", "simulation"]
 NO_MORE_SAVES = [
     "call hpcclear.results.checkpoint:Checkpoint.flush 2",
     "call hpcclear.results.dataset:samples_dataset 2",
@@ -259,14 +257,6 @@ AFTER = [
     "call hpcclear.cli.printing:describe_samples",
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
-ALWAYS = [
-    (BEFORE[0], 0),
-    (NO_MORE_SAVES[0], 0),
-    (AFTER[-1], 0),
-    ("simulation", 0),
-    ("simulation", 1),
-]
-"""In every profile: before, amid and after the simulations, on root and on another rank."""
 STUDY_CASES = [
     "call hpcclear.cli.options:Written.scene",
     "import hpcclear.study",
@@ -312,7 +302,7 @@ def fail_and_resume(place: Path, undisturbed: Undisturbed, case: str, rank: int)
 @only_sample
 @pytest.mark.parametrize(
     ("case", "rank"),
-    [pytest.param(*c, marks=() if c in ALWAYS else pytest.mark.nightly) for c in CASES],
+    CASES,
 )
 def test_a_program_error_at_any_stage_is_reported_once_and_work_is_saved(
     place, undisturbed, case, rank

@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.parts import TableDrive
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.planar.curves import angle_cells
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.problem import problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 
 LINKAGES = Path(__file__).parent.parent / "jobs" / "linkages"
 ROCKER = load_scene(LINKAGES / "crank_rocker.toml").with_(

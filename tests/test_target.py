@@ -12,13 +12,13 @@ from hpcclear import simulate
 from hpcclear.base.outcome import Flag, Regime
 from hpcclear.cli import cli
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady import procedure
-from hpcclear.dynamics.steady.copies import perturbed, scales, separation
-from hpcclear.dynamics.steady.judging import objective
+from hpcclear.dynamics.evaluation.steady import procedure
+from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales, separation
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.api import evaluate
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points

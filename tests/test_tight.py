@@ -5,13 +5,13 @@ import pytest
 from running import HUNT_CROSSLEY, LATCHED, energy_residual, integrate, kept_steps, run, scene_with
 
 from hpcclear.base import remarks
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import integrator_of, problem_of
-from hpcclear.dynamics.start import start_states
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.layout.views import Outcome
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import integrator_of, problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record
-from hpcclear.dynamics.views import Outcome
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene.points import Points
 
 TIGHT = "prince-dormand"

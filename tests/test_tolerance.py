@@ -1,16 +1,13 @@
 """An accuracy of a whole study: pairs at a stricter tolerance, and limits that hold what the tolerance takes."""
 
-import pathlib
-import subprocess
-import sys
 import tomllib
 from collections import Counter
 from types import SimpleNamespace
 
+import formula_study
 import numpy as np
 import pytest
-from commands import warm
-from patience import crowded
+from formula_study import contents, formula, on_two_ranks
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.simulate import sample_points
@@ -20,49 +17,23 @@ from hpcclear.scene import load_scene
 from hpcclear.study import extent, run_study, simulations, tolerance
 from hpcclear.study.optimisation import Choice
 
-PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
-MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
-
 STUDY = """
-[study]
-seed = 3
-samples = 20
-test_samples = 8
 accuracy = { mean = 0.005, deviation = 0.01 }
-[study.variables]
-m2 = { range = [0.105, 0.42] }
-C = { range = ["0.3 mm", "1 mm"] }
-[study.random]
-C = { distribution = "uniform", range = ["0.3 mm", "1 mm"] }
+[random]
 m2 = { distribution = "uniform", half_width = 0.005 }
-[study.cases]
+[cases]
 play = ["C", "m2"]
-[study.sensitivity]
-groups = []
-[study.surrogate]
-r2 = 0.5
-restarts = 0
-[study.swarm]
-particles = 10
-iterations = 5
-runs = 1
-archive = 8
-[study.verification]
+[verification]
 designs = 2
 infill_rounds = 1
 infill_designs = 4
-response_windows = 2
-response_copies = 2
 """
 BIAS = 15.0  # of f over rtol: 0.15 % at 1e-4
 SHARE = BIAS * (1e-4 - 1e-6) / (1.0 - 0.25)  # that of pairs at 1e-6, which leave a quarter of it
 
 
 def scene_of(*overrides: str):
-    return load_scene(tomllib.loads(formula.PHYSICS + STUDY), ["numerics.rtol=1e-4", *overrides])
+    return formula_study.scene_of(STUDY, "numerics.rtol=1e-4", *overrides)
 
 
 @pytest.fixture(autouse=True)
@@ -138,23 +109,11 @@ def test_pairs_are_a_hundred_times_stricter_or_as_strict_as_can_be():
 # -- a study ----------------------------------------------------------------------------------------
 
 
-def contents(place: pathlib.Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(place)): path.read_bytes()
-        for path in sorted(place.rglob("*.nc"))
-        if path.name != "timing.nc"
-    }
-
-
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def done(carried_out):
     """A study in one go, and what it told."""
-    place, told = tmp_path_factory.mktemp("accurate") / "whole", []
-    with pytest.MonkeyPatch.context() as patch:
-        formula.replace_dynamics(patch.setattr)
-        patch.setattr(formula, "BIAS", BIAS)
-        run_study(scene_of(), place, alone(), progress_style="quiet", notify=told.append)
-    return place, told
+    told: list[str] = []
+    return carried_out(scene_of(), notify=told.append, BIAS=BIAS), told
 
 
 def test_limits_hold_the_tolerance_and_the_truth(done):
@@ -194,18 +153,7 @@ def test_a_study_that_is_stopped_after_each_stage_ends_with_the_same_bytes(done,
 
 @pytest.mark.mpi
 def test_the_number_of_ranks_changes_no_byte(done, tmp_path):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(scene_of().text)
-    program = warm().words([str(PROGRAMS / "formula.py"), str(scene), str(tmp_path / "out")])
-    made = subprocess.run(
-        [str(MPIEXEC), "-n", "2", *program, str(BIAS)],
-        capture_output=True,
-        text=True,
-        timeout=crowded(120),
-        check=False,
-    )
-    assert made.returncode == 0, made.stderr
-    assert contents(tmp_path / "out") == contents(done[0])
+    assert contents(on_two_ranks(scene_of(), tmp_path, BIAS)) == contents(done[0])
 
 
 def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeypatch):
@@ -314,9 +262,7 @@ def test_one_number_stands_for_mean_and_deviation(entry):
 )
 def test_an_accuracy_of_verification_is_read_as_that_of_the_study(old, expected):
     bare = STUDY.replace("accuracy = { mean = 0.005, deviation = 0.01 }\n", "")
-    scene = load_scene(
-        tomllib.loads(formula.PHYSICS + bare), [f"study.verification.accuracy={old}"]
-    )
+    scene = formula_study.scene_of(bare, f"study.verification.accuracy={old}")
     given = scene.required_study.accuracy
     assert (given and (given.mean, given.deviation)) == expected
     assert len(scene.readings) == (expected is not None)

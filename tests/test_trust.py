@@ -6,7 +6,7 @@ from margins import at_least, at_most, bootstrap, fewest, ratio_of_medians
 
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import PERTURBATIONS
+from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS
 from hpcclear.ensemble.api import as_points
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import latin_hypercube

@@ -15,13 +15,14 @@ from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import ConstantSpeed, Harmonic, TorqueDrive
-from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.turning import refused
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Outcome, Parameters, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.points import Points
 
 JOBS = Path(__file__).parents[1] / "jobs" / "linkages"
@@ -322,6 +323,23 @@ def test_designs_that_differ_in_mass_alone_all_turn_or_none(path, locked):
         (alone,) = evaluate_records(scene.with_({path: float(value)}), NOTHING)
         assert alone["status"] == record["status"]
         np.testing.assert_allclose(alone["objective"], record["objective"], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "path", ["bodies.coupler.mass_center", "bodies.rocker.mass_center", "bodies.coupler.mass"]
+)
+def test_samples_start_with_the_bits_of_their_own_scenes(path):
+    path = f"mechanism.{path}"
+    scene = rocker(*(f"mechanism.bodies.{one}.mass_center=0.03" for one in ("coupler", "rocker")))
+    values = np.linspace(0.9, 1.1, 5)[:, None] * scene.number(path)
+    points = Points(("x",), values, ((path,),))
+    together = start_states(scene, parameters(scene, points), points)
+    n = len(linkage_of(scene).forest.coordinates)
+    for row, value in enumerate(values[:, 0]):
+        own = scene.with_({path: float(value)})
+        alone = start_states(own, parameters(own))
+        for part in ("coordinates", "velocities"):
+            assert (getattr(alone, part)(n)[0] == getattr(together, part)(n)[row]).all()
 
 
 @pytest.mark.parametrize("speed", [6.0, -6.0])

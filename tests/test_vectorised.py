@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 
 ANALYSIS = Path(__file__).parents[1] / "analysis"
 sys.path.insert(0, str(ANALYSIS))

@@ -12,7 +12,7 @@ from running import HUNT_CROSSLEY, run, scene_with
 import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.problem import effects_of
+from hpcclear.dynamics.setup.problem import effects_of
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 

@@ -19,11 +19,11 @@ import hpcclear
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.parameters import parameters
+from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.planar import energy
-from hpcclear.dynamics.problem import effects_of, problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.views import Outcome
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
+from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.wear.curves import curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.life import Plan, Seen, life

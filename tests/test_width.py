@@ -16,7 +16,7 @@ from hpcclear.base.cached import features_in_use
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import narrow_vectors
 from hpcclear.base.one_text import one_text
-from hpcclear.dynamics.explicit.steps import explicit_steps
+from hpcclear.dynamics.stepping.explicit.steps import explicit_steps
 
 WIDE = llvm.get_host_cpu_features().get("avx512f", False)
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"

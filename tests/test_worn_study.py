@@ -232,6 +232,7 @@ def test_the_page_tells_lives(study):
     (study / "report.html").unlink()
 
 
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_ranks_and_a_kill_among_the_lives_change_no_byte(study, tmp_path):
     expected = files(study)

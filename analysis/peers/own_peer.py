@@ -7,9 +7,9 @@ from functools import cache
 import plain_loop
 from scenes import Setup
 
-from hpcclear.dynamics.explicit.tableau import TABLEAUS
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.problem import Problem
+from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS
+from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.problem import Problem
 from peers.system import SLIDER, Array
 
 WIDTH = 32

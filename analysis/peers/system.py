@@ -7,7 +7,7 @@ from scenes import Setup
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
 
 STATES = 8
 SLIDER = 3  # index of the slider's position

@@ -51,7 +51,7 @@ def scene_entries() -> Iterator[str]:
         yield from ("| entry | value | default | meaning |", "| --- | --- | --- | --- |")
         for entry, field in part["properties"].items():
             required = entry in part.get("required", ())
-            default = "needed" if required else _default(field)
+            default = "required" if required else _default(field)
             meaning = _cell(field.get("description") or _first_meaning(field, parts))
             yield f"| `{entry}` | {_value(field, names)} | {default} | {meaning} |"
         yield ""
@@ -229,12 +229,13 @@ def files() -> Iterator[str]:
         yield from (
             f"## {kind}",
             "",
-            "| name | dimensions | unit | what |",
+            "| name | dimensions | unit | meaning |",
             "| --- | --- | --- | --- |",
         )
         for name, row in {**table.coords, **table.data}.items():
             unit = _cell(row.unit("that of the objective"))
-            yield f"| `{name}` | {', '.join(row.dims)} | {unit} | {_cell(row.long_name)} |"
+            dims = ", ".join(f"`{one}`" for one in row.dims)
+            yield f"| `{name}` | {dims} | {unit} | {_cell(row.long_name)} |"
         yield ""
 
 

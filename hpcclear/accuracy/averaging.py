@@ -16,14 +16,14 @@ import numpy as np
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.accuracy.profile import Profile
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.layout import MAX_JOINTS
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.judging import objective
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.layout.views import Parameters, Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 
 PERTURBATION = 1e-10

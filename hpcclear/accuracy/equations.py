@@ -10,9 +10,9 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
 from hpcclear.dynamics.layout import MAX_JOINTS
+from hpcclear.dynamics.layout.views import Parameters, Start
 from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE, derivative, new_seen
-from hpcclear.dynamics.problem import Problem
-from hpcclear.dynamics.views import Parameters, Start
+from hpcclear.dynamics.stepping.problem import Problem
 
 
 @scalar_function
@@ -84,7 +84,7 @@ class Equations:
     ----------
     par : ndarray, shape (PARAMETERS,)
     start : Start
-        Of this design alone, as `hpcclear.dynamics.start` makes it.
+        Of this design alone, as `hpcclear.dynamics.setup.start` makes it.
     """
 
     def __init__(self, problem: Problem, par: Array, start: Start) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics import views
+from hpcclear.dynamics.layout import views
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene

@@ -14,13 +14,14 @@ from hpcclear.accuracy.looked_at import QUANTITIES, end_of, neighbours
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics import views
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import Problem, problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.judging import objective
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.layout import views
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
 
 LARGEST_STEP = 1.0 / 64.0
@@ -53,7 +54,7 @@ class Method:
     """Convert a tolerance level into the setting of the method: the same, or a step over the period."""
 
 
-def one_turn(scene: Scene, rtol: float | None = None, **numerics: Any) -> Scene:
+def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Scene:
     """The scene for one revolution from the start, all of it averaged."""
     changes: dict[str, Any] = {
         "transient_revolutions": 0,

@@ -13,7 +13,7 @@ from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.steady.wording import in_a_line
+from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ensemble.session import command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset

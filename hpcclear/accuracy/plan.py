@@ -14,8 +14,8 @@ from hpcclear.base import host, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.evaluator import DEFAULT_LANES, Evaluator
-from hpcclear.dynamics.steady import wording
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
+from hpcclear.dynamics.evaluation.steady import wording
 from hpcclear.ensemble.samples import design
 from hpcclear.ensemble.simulate import sample_points
 from hpcclear.ranks.boundary import alone
@@ -60,6 +60,11 @@ class Row:
     """Core-seconds of one sample."""
     reached: str
     """Half-widths that the measured samples reached; empty without a target error in the file."""
+    spread: float = np.nan
+    """95 % half-width of `seconds`, relative, from the differences between designs; NaN if unknown.
+
+    The load of other programs adds to it.
+    """
 
     def settings(self) -> str:
         """Tolerance and revolutions in words; of a steady mean its half-width and the share of designs that meet the error."""
@@ -185,8 +190,8 @@ def measure(
             f"start-up and memory are not measured on this system; {USUAL_STARTUP:g} s and "
             f"{USUAL_MEMORY / 2**20:g} MB a rank are assumed"
         )
-    seconds, _ = _busy(scene, points, ranks, _block(scene) * ranks.size, "plan: first look")
-    rows.append(Row(None, scene, seconds, ""))
+    seconds, first = _busy(scene, points, ranks, _block(scene) * ranks.size, "plan: first look")
+    rows.append(Row(None, scene, seconds, "", _spread(first)))
     if study.cases:
         pilot = partial(sample_points, scene, ranks=ranks, stage="plan: pilot")
         whole, _ = forecast.expected(scene, pilot, seconds)
@@ -200,7 +205,7 @@ def measure(
             )
             notify(f"measuring {k + 1} of {len(wanted)}: {setting}")
             seconds, records = cost(one, points, ranks, limit, str(k), progress_style)
-            rows.append(Row(error, one, seconds, wording.in_short(one, records)))
+            rows.append(Row(error, one, seconds, wording.in_short(one, records), _spread(records)))
             if k + 1 < len(wanted):
                 show(made())
     return made()
@@ -219,6 +224,15 @@ def cost(
         return once, found
     count = block * int(np.clip(seconds * ranks.size / (once * block), 2, 2000))
     return _busy(scene, points, ranks, count, f"plan {label}", style)
+
+
+def _spread(records: Records) -> float:
+    """Relative 95 % half-width of the mean cost of these samples, by their force evaluations."""
+    _, once = np.unique(records["sample"], return_index=True)
+    spent = records["rhs_evaluations"][once].astype(float)
+    if len(spent) < 2 or spent.mean() == 0.0:
+        return np.nan
+    return float(1.96 * spent.std(ddof=1) / spent.mean() / np.sqrt(len(spent)))
 
 
 def _block(scene: Scene) -> int:

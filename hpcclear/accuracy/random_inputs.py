@@ -16,7 +16,7 @@ from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.sampling import generator, monte_carlo
 from hpcclear.statistics.random.moments import sample_moments
 from hpcclear.statistics.surrogate.leaf import Leaf
-from hpcclear.study.optimisation import problem_of
+from hpcclear.study.problem import problem_of
 
 ESTIMATES = ("surrogate", "simulation")
 MOMENTS = ("mean", "deviation")

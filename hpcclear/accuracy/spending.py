@@ -17,16 +17,16 @@ from hpcclear.accuracy.averaging import doubling
 from hpcclear.accuracy.methods import one_turn
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import MAX_JOINTS
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.lanes import Lanes
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.problem import problem_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady import judging
-from hpcclear.dynamics.steady.copies import perturbed, scales
-from hpcclear.dynamics.steady.ensemble import POOLED
-from hpcclear.dynamics.steady.judging import objective
-from hpcclear.dynamics.views import Start
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.evaluation.steady import judging
+from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
+from hpcclear.dynamics.evaluation.steady.ensemble import POOLED
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.layout.views import Start
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 9))

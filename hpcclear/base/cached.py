@@ -25,7 +25,7 @@ from hpcclear.base.width import asked_width, features
 
 
 @contextmanager
-def _set(name: str, value: Any) -> Iterator[None]:
+def _set(name: str, value: object) -> Iterator[None]:
     """Have a setting of Numba inside the block, and the host's own behind it."""
     before = getattr(config, name)
     setattr(config, name, value)
@@ -67,7 +67,7 @@ def _lightly(compiled: Any) -> Any:
     return compiled
 
 
-def cached(function: Any, **options: Any) -> Any:
+def cached(function: object, **options: object) -> Any:
     """Compile a function for Python at its first call, or load it; `options` as those of `numba.njit`."""
     with _set("CACHE_DIR", chosen_folder()):  # read where the function's own cache is made, here
         return _lightly(njit(cache=True, error_model="numpy", **options)(function))

@@ -21,9 +21,9 @@ from hpcclear.base.remarks import remark
 
 def _compiled_sources(root: Path) -> list[Path]:
     """Files whose code or constants end up in compiled functions: whatever compiles, the kernel, the status codes."""
-    parts = {root / "dynamics" / "layout.py"} | set((root / "dynamics").glob("*/*.py"))
     # of laws the texts are, each named by its content
-    parts -= set((root / "dynamics" / "laws").glob("*.py"))
+    kernel = ("layout", "physics", "contacts", "linkage", "stepping")
+    parts = {path for room in kernel for path in (root / "dynamics" / room).rglob("*.py")}
     parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
     parts |= set((root / "base" / "text").glob("*.py"))
     return sorted(

@@ -72,7 +72,7 @@ _written: dict[Any, str] = {}
 _apart: set[Any] = set()
 
 
-def written_kind(function: Any) -> str | None:
+def written_kind(function: object) -> str | None:
     """Whether `one_text` writes calls of a function out, and in which texts: "lane", "scalar" or None."""
     return _written.get(function) if isinstance(function, Hashable) else None
 
@@ -84,12 +84,12 @@ def lane_function(function: Callable[..., Any]) -> Any:
     return compiled
 
 
-def stands_apart(function: Any) -> bool:
+def stands_apart(function: object) -> bool:
     """Whether it is marked by `apart`."""
     return function in _apart
 
 
-def apart(compiled: Any) -> Any:
+def apart(compiled: object) -> Any:
     """Leave a function a function of its own beside the text; to stand above the decorator that compiles.
 
     For sums of products: which of two products is fused with their sum goes by the order the compiler has put them in, and

@@ -12,7 +12,7 @@ JOINTS = ("crank_rod", "rod_slider")
 """Joint labels in every dataset of a slider-crank: O12 and O23 of the paper."""
 
 MAX_JOINTS = 8
-"""Largest number of contacts of a record, one in each pin and four in each guide; datasets contain those of the scene."""
+"""Largest number of contacts of a record, one in a pin, two in a slot, four in a guide; datasets contain those of the scene."""
 
 CORNERS = {
     "front_left": (1.0, 1.0), "front_right": (1.0, -1.0),
@@ -22,6 +22,9 @@ CORNERS = {
 
 MAX_BANDS = 4
 """Largest number of third-octave bands whose levels a record has."""
+
+WALLS = {"left": 1.0, "right": -1.0}
+"""Contacts of a pin in a slot with clearance, the slot's walls on either side of its line."""
 
 WAVE_ROWS = 32
 """Largest number of profile coefficients of all joints."""
@@ -196,11 +199,11 @@ FIELDS = {
         "Pa", "largest pressure at the peak contact force", per="joint", when="request"),
     "contact_half_angle": Field(
         "rad", "half of the angle of contact at the peak contact force", per="joint", when="request"),
-    "rate_of_objective": Field("rate", "what is made of the objective's own rate", per="joint", when="request"),
+    "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="request"),
     "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
     "sliding_waves": Field(
         "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="request"),
-    "energy_error": Field("1", "residual of the energy balance, relative", when="request"),
+    "energy_error": Field("1", "energy residual over the larger of kinetic energy and driving work", when="request"),
     "objective_limit": Field(
         "objective", "half-width of the 95 % confidence interval of f as a steady mean", when="steady"),
     "lyapunov_exponent": Field("1", "largest Lyapunov exponent, per revolution", when="steady"),

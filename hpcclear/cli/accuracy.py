@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hpcclear.accuracy import spending
 from hpcclear.accuracy.integration import MARGIN
-from hpcclear.cli.printing import console, table
+from hpcclear.cli.printing import console, fitting, table
 from hpcclear.report import targets
 from hpcclear.report.figures.accuracy import AIM
 
@@ -30,18 +30,20 @@ def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     out.print(table("Cheapest integrator for an error of f over one revolution", advice(found)))
     out.print(table("Averaging", _averaging(found)))
     out.print(_surrogates(found))
-    out.print(table("Random inputs, at the middle of the design space", _random(found)))
+    out.print(
+        table("Random inputs, at the middle of the design space: relative errors", _random(found))
+    )
     out.print(table("Ranks", _ranks(found)))
     out.print(f"{found.attrs['versions']}\n{found.attrs['processor']}; {found.attrs['repeats']}")
     for what, path in files.items():
         out.print(f"{what:14} {path}", soft_wrap=True)
-    out.print(f"motion         {found.attrs['motion']}", soft_wrap=True)
+    out.print(fitting(f"f              {found.attrs['motion']}"), soft_wrap=True)
     out.print(f"steady mean    {result(found)}", soft_wrap=True)
 
 
 def _integration(found: xr.Dataset) -> Table:
     made = _grid("One revolution: error of f, force evaluations, time")
-    for name in ("integrator", "order", "setting", "error", "evaluations", "ms"):
+    for name in ("integrator", "order", "rtol or step", "error of f", "evaluations", "ms"):
         made.add_column(name, no_wrap=True, justify="left" if name == "integrator" else "right")
     for method in found["integrator"].to_numpy():
         row = found.sel(integrator=method, quantity="objective")
@@ -59,9 +61,9 @@ def _integration(found: xr.Dataset) -> Table:
 
 def _spending(found: xr.Dataset) -> Table:
     """A row a tolerance."""
-    made = _grid("Steady mean: bias and run time of each tolerance")
-    for name in ("rtol", "bias", "+-", "variance", "ms", "error/formula"):
-        made.add_column(name, no_wrap=True, justify="right")
+    made = _grid("Steady mean: relative bias and variance of f, and run time, by tolerance")
+    for name in ("rtol", "bias of f", "± 2 s.e.", "variance/rev.", "ms/rev.", "error/formula"):
+        made.add_column(fitting(name), no_wrap=True, justify="right")
     with np.errstate(invalid="ignore", divide="ignore"):
         holds = found["spent_error"].to_numpy() / found["spent_model"].to_numpy()
     for k, rtol in enumerate(found["tolerance"].to_numpy()):
@@ -174,7 +176,7 @@ def _random(found: xr.Dataset) -> list[tuple[str, str]]:
         rows.append(
             (
                 f"bias, {'std. ' * (moment == 'deviation')}{moment}",
-                f"{bias:+.1e} +- {own:.1e}, surrogate against simulation",
+                fitting(f"{bias:+.1e} ± {own:.1e} (standard error), surrogate against simulation"),
             )
         )
     text = f"{1e3 * float(found['quadrature_seconds']):.2g} ms, no sampling error"

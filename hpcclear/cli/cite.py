@@ -1,4 +1,4 @@
-"""`cite`: how to cite the program, and the paper whose method it carries out."""
+"""`cite`: how to cite the program, and the paper whose method it implements."""
 
 import click
 
@@ -17,7 +17,7 @@ PROGRAM = f"""@software{{hpcclear,
 @click.command(short_help="Print how to cite the program and the paper.")
 @of_one_process
 def cite() -> int:
-    """Print BibTeX entries of this version of the program and of the paper whose method it carries out.
+    """Print BibTeX entries of this version of the program and of the paper whose method it implements.
 
     Each contact and friction law has a source of its own: hpcclear laws.
 

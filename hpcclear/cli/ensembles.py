@@ -180,7 +180,8 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
     default="objective",
     show_default=True,
     metavar="SERIES",
-    help='Series of a response at the section: "contact_force o2"; or its max, min, mean a revolution: "max contact_force o2".',
+    help='Series of a response, taken at the section: "contact_force crank_rod". With max, min or mean before it, '
+    'that value of each revolution: "max contact_force crank_rod".',
 )
 @click.option(
     "--section",
@@ -296,7 +297,7 @@ def effects(
 ) -> int:
     """Find effects that can be neglected: clearance in each joint, friction, gravity, loads and others.
 
-    Each effect is switched off; its change of the results and of the run time is measured, with confidence intervals.
+    Each effect is disabled in turn. The command measures how results and run time change, with confidence intervals.
 
     Example: mpiexec -n 2 hpcclear effects jobs/quickstart.toml --tolerance 2% -o results/effects.nc
     """

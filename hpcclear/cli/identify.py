@@ -1,7 +1,7 @@
 """The command `identify` and what it prints: unknowns with their intervals, the fit, growth, and what to measure."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,7 +21,6 @@ from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
-    from hpcclear.identify.signals import Sensor
     from hpcclear.ranks.team import Ranks
 
 
@@ -29,26 +28,24 @@ if TYPE_CHECKING:
 @with_scene
 @output_option("NetCDF file to write.")
 @click.option(
-    "--unknown", "unknowns", multiple=True, required=True, metavar="PATH=LO:HI",
+    "--unknown", multiple=True, required=True, metavar="PATH=LO:HI",
     help="Entry to identify and its bounds. Repeatable.",
 )  # fmt: skip
 @click.option(
-    "--signal", "signals", multiple=True, type=PATH,
+    "--signal", multiple=True, type=PATH,
     help="Measured table: time or crank angle, then signals. Repeatable, one for each date.",
 )  # fmt: skip
 @click.option(
-    "--of", "names", multiple=True, default=("crank_moment",), show_default=True, metavar="SIGNAL",
+    "--of", multiple=True, default=("crank_moment",), show_default=True, metavar="SIGNAL",
     help="Signal to use: a series of a response, frame_force_x, acceleration_x BODY.POINT, impacts JOINT. Repeatable.",
 )  # fmt: skip
 @click.option(
-    "--date",
-    "dates",
-    multiple=True,
-    metavar="YYYY-MM-DD",
-    help="Date of each signal, in their order.",
+    "--date", multiple=True, metavar="YYYY-MM-DD", help="Date of each signal, in their order."
 )
 @click.option(
-    "--limit", metavar="VALUE", help="Value of the unknowns whose time of reaching is printed."
+    "--limit",
+    metavar="VALUE",
+    help="Value of the unknowns; the time until it is reached is printed.",
 )
 @click.option("--band", metavar="LO:HI", help="Frequencies that the sensor passes, in Hz.")
 @click.option(
@@ -76,11 +73,7 @@ if TYPE_CHECKING:
     help="Simulations, rounded up to a power of two. By default 256, doubled by each further unknown.",
 )  # fmt: skip
 @with_how
-def identify(
-    written: Written, output: Path, unknowns: tuple[str, ...], signals: tuple[Path, ...], names: tuple[str, ...],
-    dates: tuple[str, ...], limit: str | None, band: str | None, resonance: str | None, gain_error: float,
-    angle_error: str, noise: float | None, pressure: str, advise: bool, members: int | None, how: How,
-) -> int:  # fmt: skip
+def identify(written: Written, output: Path, how: How, **settings: Any) -> int:
     """Identify unknown clearances from a measured signal, with calibrated intervals.
 
     Random inputs of the scene's study are unknown too, within their distributions. Exit code 4 if the model does not
@@ -91,43 +84,13 @@ def identify(
     """
 
     def program(ranks: "Ranks") -> int:
-        from hpcclear.ensemble.maps import number_of
-        from hpcclear.identify.answer import Wanted, run_identify
-        from hpcclear.identify.inputs import Unknown
+        from hpcclear.identify.answer import run_identify
+        from hpcclear.identify.settings import Settings
 
-        scene = written.scene()
-        sensor = _sensor(band, resonance, gain_error, angle_error)
-        unit = Unknown.of(scene, unknowns[0]).unit
-        most = None if limit is None else number_of("--limit", limit, unit)
-        wanted = Wanted(
-            unknowns,
-            signals,
-            tuple(dict.fromkeys(names)),
-            dates,
-            most,
-            sensor,
-            noise,
-            pressure,
-            advise,
-            members,
-        )
-        return describe(run_identify(scene, place_of(output), ranks, wanted, how.options()))
+        place, made = place_of(output), Settings(**settings)
+        return describe(run_identify(written.scene(), place, ranks, made, how.options()))
 
     return on_ranks(program, how.time_limit)
-
-
-def _sensor(band: str | None, resonance: str | None, gain: float, angle: str) -> "Sensor":
-    """The sensor of the command's words; raises InputError where they are no numbers."""
-    from hpcclear.ensemble.maps import number_of
-    from hpcclear.identify.signals import Sensor
-
-    low, high = (band or "0:1e12").partition(":")[::2]
-    ends = number_of("--band", low, "Hz"), number_of("--band", high or "1e12", "Hz")
-    place, quality = (resonance or "1e12").partition(":")[::2]
-    return Sensor(
-        ends, number_of("--resonance", place, "Hz"), number_of("--resonance", quality or "10", "1"),
-        gain, number_of("--angle-error", angle, "rad"),
-    )  # fmt: skip
 
 
 def describe(found: "Finished") -> int:

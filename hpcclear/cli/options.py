@@ -152,7 +152,7 @@ def _gathering(name: str, kind: type, *options: Callable[[Any], Any]) -> Callabl
 
     def decorator(command: Callable[..., int]) -> Callable[..., int]:
         @functools.wraps(command)
-        def gathered(**values: Any) -> int:
+        def gathered(**values: object) -> int:
             parts = {field.name: values.pop(field.name) for field in fields(kind)}
             return command(**{name: kind(**parts)}, **values)
 
@@ -189,7 +189,7 @@ def of_one_process(command: Callable[..., int]) -> Callable[..., int]:
     """A command that one process carries out: others of its launcher leave at once."""
 
     @functools.wraps(command)
-    def alone(**values: Any) -> int:
+    def alone(**values: object) -> int:
         return command(**values) if is_root() else Exit.DONE
 
     return alone

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from rich import box
 from rich.table import Table
 
@@ -19,10 +20,17 @@ def preview(plan: Plan, ranks: int) -> str:
     simulations = plan.simulations
     name = "settings of the file" if row.error is None else f"error {row.error:g}"
     name = f"first look, {name}" if plan.first else name
+    doubts = [f"± {_percent(row.spread)} between designs"] if np.isfinite(row.spread) else []
+    doubts += ["probably less: a short batch leaves lanes idle"] if plan.first else []
     return (
         f"{name}: {1e3 * row.seconds:.3g} ms per sample, {simulations} simulations take "
         f"{duration(plan.wall_seconds(row, simulations, ranks))} on {counted(ranks)}"
+        + (f" ({'; '.join(doubts)})" if doubts else "")
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
 
 
 def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
@@ -35,7 +43,7 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
         title=f"{command}: {simulations} simulations on {counted(ranks)}", title_justify="left",
         box=box.SIMPLE_HEAD, pad_edge=False,
     )  # fmt: skip
-    for name in ("error", "settings", "ms/sample", "core-s", "core-h", "wall time"):
+    for name in ("error of f", "settings", "ms/sample", "core-s", "core-h", "wall time"):
         made.add_column(
             name,
             no_wrap=name != "settings",
@@ -45,10 +53,11 @@ def describe(plan: Plan, file: str, error: float | None, ranks: int) -> None:
     for one in plan.rows:
         total = plan.core_seconds(one, simulations, ranks)
         made.add_row(
-            "file" if one.error is None else f"{one.error:.0e}",
+            "as in file" if one.error is None else f"{one.error:.0e}",
             one.settings(),
-            f"{1e3 * one.seconds:.3g}",
-            f"{total:.4g}",
+            f"{1e3 * one.seconds:.3g}"
+            + (f" ± {_percent(one.spread)}" if np.isfinite(one.spread) else ""),
+            f"{total:.3g}",
             f"{total / 3600:.2g}",
             duration(plan.wall_seconds(one, simulations, ranks)),
         )
@@ -65,7 +74,7 @@ def _needs(
     plan: Plan, row: Row, simulations: int, command: str, ranks: int
 ) -> list[tuple[str, str]]:
     rows = [
-        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.4g}"),
+        ("core-seconds", f"{plan.core_seconds(row, simulations, ranks):.3g}"),
         ("wall time", duration(plan.wall_seconds(row, simulations, ranks))),
         ("start-up", f"{plan.startup:.1f} s per rank, and once per node up to a minute to compile"),
         (

@@ -1,7 +1,6 @@
 """What the commands print: tables that fit 80 columns, plain when piped."""
 
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,10 +12,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
 from hpcclear.base.plain import plain
-from hpcclear.dynamics.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.report.answer import answer
@@ -24,11 +21,9 @@ from hpcclear.report.beside import beside_original
 from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
 from hpcclear.results import dataset
-from hpcclear.scene import Scene
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
-    from hpcclear.ranks.team import Ranks
 
 WIDTH = 80
 
@@ -83,207 +78,9 @@ def objective_of(content: xr.Dataset) -> tuple[str, str]:
     return labels.objective(content), str(unit)
 
 
-def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:
-    """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
-    scene's own design can turn."""
-    out = console()
-    from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
-
-    problem_of(scene)  # refuses what cannot be simulated
-    locked = _locked(scene)
-    if scene.study is not None:
-        from hpcclear.study import lives  # loads the statistics: not for every command
-
-        lives.check(scene)
-    states = 2 * (coordinate_count(scene) - scene.bristles)
-    bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
-    open_joints = len(scene.contact_labels())
-    rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
-    method = integrator_of(scene)
-    rows += [
-        (
-            "states",
-            f"{states} (positions and velocities){bristles} + {open_joints} integrals of the gaps",
-        ),
-        ("method", f"{method}, rtol {scene.numerics.rtol:g}"),
-        (
-            "revolutions",
-            f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
-        ),
-        *_speeds(scene),
-        *_assembly(scene),
-        ("scene hash", scene.hash[:16]),
-        ("MPI", _mpi(ranks)),
-    ]
-    out.print(table("Model", rows))
-    for text in scene.readings:
-        out.print(remark("Note", text))
-    for warning in (*locked, *scene.warnings):
-        out.print(remark("Warning", warning))
-    if scene.study is not None:
-        out.print(table("Study", _study_rows(scene)))
-    if cost and not locked:
-        out.print(table("Run time of a sample on this machine", _cost_rows(scene)))
-    return not locked
-
-
-def turning(value: float, unit: str) -> str:
-    """A number with its unit; an angular speed in rpm too."""
-    if unit == "rad/s":
-        return f"{30.0 * value / np.pi:.6g} rpm ({value:.6g} rad/s)"
-    return quantity(value, unit)
-
-
-def _speeds(scene: Scene) -> list[tuple[str, str]]:
-    """Every angular speed and frequency of the mechanism, a row each."""
-    words = {"rad/s": "speed", "Hz": "frequency"}
-    return [
-        (words[unit], f"{path}: {turning(scene.number(path), unit)}")
-        for path in scene.numeric_paths()
-        if (unit := scene.unit(path)) in words
-    ]
-
-
-def _assembly(scene: Scene) -> list[tuple[str, str]]:
-    """How a linkage was put together, a row a body; refuses one that does not close."""
-    from hpcclear.dynamics.planar.problem import linkage_of, put_together
-    from hpcclear.dynamics.planar.tables import mechanism_of
-
-    linkage_of(scene)
-    lines = put_together(mechanism_of(scene.linkage)).report()
-    return [(f"start of {line.partition(': ')[0]}", line.partition(": ")[2]) for line in lines]
-
-
-def _locked(scene: Scene) -> list[str]:
-    """That the scene's own linkage cannot turn, where its study varies what that depends on; refuses it otherwise."""
-    from hpcclear.dynamics.planar.problem import refused_of, varies_geometry
-
-    refusal = refused_of(scene)
-    if refusal is None:
-        return []
-    if not varies_geometry(scene):
-        raise refusal[1]
-    return [f"the scene's own design {refusal[1].reason}; its run time is not measured"]
-
-
-def _mpi(ranks: "Ranks | None") -> str:
-    """The MPI library; the ranks that met in it, where a launcher started them; cores of this node."""
-    from hpcclear.ranks.boundary import alone, describe_mpi
-
-    try:
-        library = describe_mpi()
-    except InputError:
-        return "none found: one process"
-    mail = (ranks or alone()).mail
-    met = f"; {mail.size} ranks connected" if mail.size > 1 else ""
-    crowded = (
-        f"; {mail.node_size} ranks on {mail.node_cores} cores: more ranks than cores are slower"
-        if mail.node_size > mail.node_cores
-        else ""
-    )
-    return f"{library}{met}; {mail.node_cores} cores on this node{crowded}"
-
-
-def _study_rows(scene: Scene) -> list[tuple[str, str]]:
-    study = scene.study
-    assert study is not None
-    rows = [
-        ("samples", f"{study.samples} ({spread.DRAWN[study.method]}), seed {study.seed}"),
-        ("objective", f"{study.objective}: {scene.objective.words}"),
-    ]
-    for variable in study.variables:
-        loads = "" if variable.over is None else f" (load cases, {_over(variable.over)})"
-        if variable.rows:
-            named = ", ".join(row.name for row in variable.rows)
-            rows.append((variable.name, f"{named}: {variable.words}{loads}"))
-        elif variable.values is not None:
-            listed = ", ".join(turning(one, variable.unit) for one in variable.values)
-            rows.append((variable.name, f"{listed}: {variable.words}{loads}"))
-        elif variable.range is not None:
-            lower, upper = (turning(end, variable.unit) for end in variable.range)
-            step = "" if variable.step is None else f" by {turning(variable.step, variable.unit)}"
-            rows.append((variable.name, f"{lower} to {upper}{step}: {variable.words}"))
-        elif variable.ratio is not None:
-            rows.append(
-                (
-                    variable.name,
-                    f"{variable.ratio[0]:g} to {variable.ratio[1]:g}: {variable.ratio_words}",
-                )
-            )
-    for row in study.random:
-        if row.parameters is not None:
-            unit = "" if scene.unit(row.paths[0]) == "" else f" {scene.unit(row.paths[0])}"
-            least, most = row.span
-            text = f"{row.shape_words}, {least:g} to {most:g}{unit}"
-            rows.append(
-                (f"{row.name} random", text + ("" if row.absolute else " about the design"))
-            )
-    if any(case.kept for case in study.cases):
-        from hpcclear.study import verdicts
-
-        rows += [("constraint", text) for text in verdicts.costs(study, scene.objective.unit)]
-    for row in study.worn:
-        from hpcclear.study import lives
-
-        assert scene.wear is not None  # by validation
-        text = f"clearance after {row.cycles:g} revolutions of {scene.wear.lives} service lives, "
-        text += f"simulated first (about {lives.simulations(scene)} simulations)"
-        rows.append((f"{row.name} random", text))
-    return rows
-
-
-def _over(over: str | tuple[float, ...]) -> str:
-    """How load cases make one f, in words."""
-    weights = "" if over == "worst" else ", ".join(f"{float(one):g}" for one in over)
-    return f"weights {weights}" if weights else "f of the worst"
-
-
-def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
-    """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
-    from hpcclear.dynamics.evaluation import evaluate_records
-    from hpcclear.dynamics.evaluator import DEFAULT_LANES
-    from hpcclear.scene.points import Points
-
-    path = next(path for path in scene.numeric_paths() if path.endswith(".mass"))
-    columns = Points(("mass",), np.full((DEFAULT_LANES, 1), scene.number(path)), ((path,),))
-    start = time.perf_counter()
-    record = evaluate_records(scene, columns)[0]
-    first = time.perf_counter() - start
-    start = time.perf_counter()
-    evaluate_records(scene, columns)
-    each = (time.perf_counter() - start) / DEFAULT_LANES
-    evaluations = int(record["rhs_evaluations"])
-    rows = [("f, steady mean", in_a_line(record))] if record["regime"] else []
-    rows += [
-        ("force evaluations", f"{evaluations}"),
-        ("run time per sample", f"{each * 1e3:.3g} ms on one core ({DEFAULT_LANES} per batch)"),
-        ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
-    ]
-    if scene.study is None:
-        return rows
-    whole = 0
-    if scene.study.cases:
-        from hpcclear.base.objectives import asked
-        from hpcclear.study.forecast import expected
-
-        def evaluated(points: Points) -> np.ndarray:
-            return asked(evaluate_records(scene, points), scene.objective)
-
-        whole, each = expected(scene, evaluated, each)
-    rows.append(("hpcclear sample", _all(scene.study.samples, each)))
-    if whole:
-        rows.append(("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear plan"))
-    return rows
-
-
 def counted(ranks: int) -> str:
     """A number of ranks in words."""
     return f"{ranks} rank{'' if ranks == 1 else 's'}"
-
-
-def _all(count: int, each: float) -> str:
-    """Number of samples and their time on one core; `each`: s."""
-    return f"{count} samples, {duration(count * each)} of one core"
 
 
 def _load(found: "Finished") -> list[tuple[str, str]]:
@@ -328,9 +125,10 @@ def describe_study(place: Path) -> None:
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()
+    level = float(found["verification"].attrs.get("confidence", 0.95))
     for case, designs, rows in beside_original(found["verification"]):
         beside = Table(
-            title=f"Case {case}: simulated designs against the baseline",
+            title=f"Case {case}: simulated designs against the baseline (± {level:.0%} half-width)",
             title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
         )  # fmt: skip
         beside.add_column(
@@ -366,7 +164,7 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
     if len(good):
         words, unit = objective_of(samples)
         low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
-        rows += [("f", words), ("", f"{low} to {high}, median {middle}")]
+        rows += [("f", words), ("range of f", f"{low} to {high}, median {middle}")]
         rows.append(("half-width of f", _half_widths(samples)))
         in_time = samples["objective_spread"].to_numpy()[status == Status.OK] / good
     if len(good) and np.isfinite(in_time).any():

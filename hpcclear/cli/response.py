@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hpcclear.base.outcome import Status
 from hpcclear.cli.printing import console, fitting, objective_of, quantity, remark, table
-from hpcclear.dynamics.steady.wording import in_a_line
+from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels, motion
 from hpcclear.scene.citation import TITLE
@@ -45,9 +45,7 @@ def _impact_table(rows: list[list[str]]) -> Table:
     """What a revolution has of impacts, a row for each joint."""
     made = Table(title=noise.TITLE, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     for header in noise.HEADER:
-        made.add_column(
-            header, justify="left" if header == "joint" else "right", no_wrap=True, overflow="fold"
-        )
+        made.add_column(header, justify="left" if header == "joint" else "right", overflow="fold")
     for row in rows:
         made.add_row(*map(fitting, row))
     return made

@@ -13,6 +13,7 @@ from hpcclear.cli.options import (
     TRUST,
     Amount,
     directory_option,
+    flag,
     of_one_process,
     place_of,
     say,
@@ -23,6 +24,7 @@ from hpcclear.ranks.stopping import Exit
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from hpcclear.report.compare import Quantity
     from hpcclear.report.html.content import Content
@@ -38,26 +40,66 @@ UNITS = click.option(
 
 
 @click.command(short_help="Write results as a table for Excel, MATLAB or pandas.")
-@FILE
+@click.argument("files", type=PATH, nargs=-1, required=True, metavar="FILE...")
 @directory_option("Table to write: its name ends in .csv, .xlsx, .mat or .parquet.")
 @UNITS
+@flag(
+    "--statistics",
+    "Write statistics of samples with their intervals instead, a column for each file.",
+)
+@click.option(
+    "--beyond",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="With --statistics, share of samples beyond this value. Repeatable.",
+)
 @of_one_process
-def export(file: Path, output: Path, units: tuple[str, ...]) -> int:
+def export(
+    files: tuple[Path, ...],
+    output: Path,
+    units: tuple[str, ...],
+    statistics: bool,
+    beyond: tuple[str, ...],
+) -> int:
     """Write a result file as a table: one row per design or instant, joints as columns.
 
     Headings are names with units. Quantities have the units that the scene file uses, otherwise SI units.
+    With --statistics, several samples stand side by side, such as those of several fits.
 
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
-    from hpcclear.report.export import check_format
-    from hpcclear.report.export import export as export_file
+    from hpcclear.report import export as writing
 
-    check_format(output)
-    table = export_file(file, place_of(output), units)
-    for name in table.attrs["left_out"]:
-        say(f"Note: {name} is left out: it has too many columns. It stands in {file}")
+    writing.check_format(output)
+    if statistics:
+        table = writing.statistics(files, place_of(output), beyond)
+        _print_rows(table)
+    elif len(files) > 1 or beyond:
+        reason = "a table holds one result"
+        raise InputError(
+            "export", f"{len(files)} files", reason, "Add --statistics, or export each by itself"
+        )
+    else:
+        table = writing.export(files[0], place_of(output), units)
+        for name in table.attrs["left_out"]:
+            say(f"Note: {name} is left out: it has too many columns. It stands in {files[0]}")
     show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
     return Exit.DONE
+
+
+def _print_rows(frame: "DataFrame") -> None:
+    """Print a table of texts, its columns as wide as the terminal allows."""
+    from rich import box
+    from rich.table import Table
+
+    from hpcclear.cli.printing import console
+
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in frame.columns:
+        made.add_column(str(heading), overflow="fold")
+    for row in frame.itertuples(index=False):
+        made.add_row(*map(str, row))
+    console().print(made)
 
 
 @click.command(short_help="Compare a response with measurements.")
@@ -86,7 +128,7 @@ def compare(
 
     The first column is time or crank_angle, the others are quantities as exported tables name them, such as
     "contact_force crank_rod [kN]". The averaged revolutions are repeated
-    periodically and compared with it.
+    periodically and compared with the measurement.
 
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """

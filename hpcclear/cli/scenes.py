@@ -35,9 +35,13 @@ if TYPE_CHECKING:
     "--four-stroke",
     "A four-stroke engine, written as a linkage; its gas force repeats every two turns of the crank.",
 )
+@flag(
+    "--compressor",
+    "A piston compressor with fits by ISO 286, and a sample of machines as they are made.",
+)
 @flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @of_one_process
-def init(file: Path, four_stroke: bool, jobs: bool) -> int:
+def init(file: Path, four_stroke: bool, compressor: bool, jobs: bool) -> int:
     """Write a starter scene: an engine with every table, a unit on each number, and a small study.
 
     With --jobs, write the scenes and scripts that the documentation names, as a directory. Nothing is overwritten.
@@ -53,7 +57,9 @@ def init(file: Path, four_stroke: bool, jobs: bool) -> int:
         _copy_jobs(file)
         return Exit.DONE
     files.probe(place_of(file))
-    name = "four_stroke.toml" if four_stroke else "starter.toml"
+    name = (
+        "four_stroke.toml" if four_stroke else "compressor.toml" if compressor else "starter.toml"
+    )
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
     show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
@@ -78,9 +84,15 @@ def _copy_jobs(place: Path) -> None:
     )
 
 
-@click.command("import", short_help="Write a linkage from a table of its points.")
-@click.argument("table", type=PATH)
+@click.command("import", short_help="Write a linkage from a table of points or a drawing.")
+@click.argument("source", type=PATH)
 @click.argument("file", type=PATH)
+@click.option(
+    "--unit",
+    default="",
+    metavar="UNIT",
+    help="Of lengths, where the source states none, such as mm.",
+)
 @click.option(
     "--sketch",
     type=PATH,
@@ -88,25 +100,27 @@ def _copy_jobs(place: Path) -> None:
     help="Draw the linkage with names, axes and signs to this file (png, svg, pdf).",
 )
 @of_one_process
-def import_(table: Path, file: Path, sketch: Path | None) -> int:
-    """Write a linkage from a table of its points.
+def import_(source: Path, file: Path, unit: str, sketch: Path | None) -> int:
+    """Write a linkage from a table of points, a DXF drawing, a PMKS+ project or a Linkage document.
 
-    TABLE is a CSV file or Excel workbook with the columns name, x [mm], y [mm] and bodies; points that bodies share
-    are pins, "ground" stands still. Without bodies the points are a chain of bars between the first and the last.
-    FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
+    A table (CSV, Excel) has the columns name, x [mm], y [mm] and bodies; points that bodies share are pins, "ground"
+    stands still. Without bodies the points are a chain of bars between the first and the last. In a DXF drawing a
+    layer is a body. FILE is the scene to write; masses in it are placeholders. An existing file is never overwritten.
 
     Example: hpcclear import points.csv linkage.toml --sketch linkage.png
     """
     from hpcclear.results import files
-    from hpcclear.scene import load_scene
-    from hpcclear.scene.points_of_linkage import linkage_of, text_of
+    from hpcclear.scene import importers, load_scene
 
     check_free(file)
-    content = linkage_of(table)
+    drawing = importers.drawing_of(source, unit)
+    content = importers.scene_of(drawing, str(source))
     scene = load_scene(content)
     mechanism = content["mechanism"]
-    files.write_bytes(file, text_of(content, table.name).encode())
+    files.write_bytes(file, importers.text_of(content, source.name, drawing.notes).encode())
     show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
+    for note in drawing.notes:
+        show(f"note     {note}")
     if sketch is not None:
         _draw(scene, sketch)
     show(f"next     put masses and the speed in, then: hpcclear check {file}")
@@ -125,14 +139,14 @@ def import_(table: Path, file: Path, sketch: Path | None) -> int:
 def check(written: Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
 
-    Exit code 1 if the file's own design cannot turn but its study varies the geometry; 2 if no design can.
-    Under mpiexec or srun it also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
+    If the design in the file cannot turn, the exit code is 1 if the study varies its geometry, and 2 otherwise.
+    Under mpiexec or srun the command also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
 
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
 
     def program(ranks: "Ranks") -> int:
-        from hpcclear.cli.printing import describe_scene
+        from hpcclear.cli.check import describe_scene
 
         scene = written.scene(warn=False)
         turns = describe_scene(scene, cost, ranks)
@@ -174,8 +188,8 @@ def simulate(written: Written, output: Path) -> int:
     lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
+    from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulate as simulate_scene
-    from hpcclear.dynamics.steady.wording import why_missed
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset

@@ -72,7 +72,8 @@ def accuracy(
     fresh: bool,
     time_limit: float | None,
 ) -> int:
-    """Plot accuracy against run time: tolerance, revolutions, surrogate, Monte Carlo samples and number of ranks.
+    """Plot accuracy against run time, for each setting that costs time: tolerance, revolutions, points of the surrogate,
+    Monte Carlo samples and number of ranks.
 
     Each figure is written as soon as its panel is measured. After a stop the same command resumes.
 

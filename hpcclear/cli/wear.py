@@ -65,7 +65,7 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
     for k, name in enumerate(content["joint"].to_numpy()):
         new = float(np.nanmedian(content["clearance"].isel(cycle=0).sel(joint=name)))
         low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
-        text = f"initial {quantity(new, 'm')}, final {middle}"
+        text = f"median initial {quantity(new, 'm')}, final {middle}"
         rows.append(
             (f"clearance {name}", text + (f" (5 to 95 %: {low} to {high})" if low != high else ""))
         )
@@ -85,7 +85,8 @@ def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
         low, high = order_interval(known, level, len(lives) - len(known))
         ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
         value = one(float(content[f"{name}_quantile"].sel(quantile=level)))
-        shown.append(f"{value} (95 % CI {ends[0]} to {ends[1]})")
+        interval = "" if ends[0] == ends[1] == value else f" (95 % CI {ends[0]} to {ends[1]})"
+        shown.append(f"{value}{interval}")
     return f"median {shown[0]}; 5th percentile {shown[1]}; 95th percentile {shown[2]}"
 
 
@@ -95,15 +96,18 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
     each = content["revolution_time"].to_numpy() / HOUR
     followed = content["ended"].to_numpy()
     rows = [
-        ("simulated", f"at most {followed.max():.4g} revolutions, {(followed * each).max():.4g} h")
+        (
+            "simulated",
+            f"at most {followed.max():.4g} revolutions, or {(followed * each).max():.4g} h",
+        )
     ]
     given = [name for name in content.attrs if name.startswith("limit_")]
     if not given:
-        return [*rows, ("service life", "no limit given (wear.limit)")]
+        return [*rows, ("service life", "no threshold given (wear.limit)")]
     rows += [
-        ("life in revolutions", _spread(content, "lifetime", cycles)),
+        ("service life, revolutions", _spread(content, "lifetime", cycles)),
         (
-            "life in hours",
+            "service life, h",
             _spread(content, "lifetime_hours", float((cycles * each).min())),
         ),
     ]
@@ -136,13 +140,13 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
             if np.isfinite(even).all()
             else ""
         )
-        rows.append((f"largest around {name}", f"{largest} at the end{beside} (medians)"))
+        rows.append((f"largest clearance, {name}", f"{largest} at the end{beside} (medians)"))
     if any(name.startswith("limit_") for name in content.attrs):
         cycles, parts = float(content["cycle"][-1]), []
         for name in ("lifetime_quantile", "even_lifetime_quantile"):
             value = float(content[name].sel(quantile=0.5))
             parts.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
-        rows.append(("median life", f"{parts[0]}; {parts[1]} with uniform wear"))
+        rows.append(("median service life", f"{parts[0]}; {parts[1]} with uniform wear"))
     return rows
 
 
@@ -155,7 +159,7 @@ def _causes(content: xr.Dataset) -> list[tuple[str, str]]:
             k = int(np.nanargmax(share))
             word = "dominant" if share[k] >= DOMINATES else "largest"
             text = (
-                f"{content['random_input'].to_numpy()[k]}, {share[k]:.0%} of the variance of ranks"
+                f"{content['random_input'].to_numpy()[k]}, squared rank correlation {share[k]:.2f}"
             )
             rows.append((f"{word} input, {name}", text))
     return rows

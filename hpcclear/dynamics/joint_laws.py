@@ -11,8 +11,9 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.contacts.declared import Shape
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.laws import numbers
+from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import length_path
 
@@ -77,7 +78,7 @@ def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
     p[:, at.BEARING_RADIUS] = shape.bearing_radius
     p[:, at.JOURNAL_RADIUS] = shape.journal_radius
     table: Any = scene.effects.contact
-    law = table.declared
+    law = with_constants(table.declared)
     given = {**joint, **_given(get, "contact", table)}
     rows = numbers.rows_of(law, given, len(p))
     p[:, at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + rows.shape[1]] = rows
@@ -94,16 +95,17 @@ def fill(scene: Scene, get: Get, label: str, force: Array, p: Array) -> None:
     if rubs.law == "none":
         return
     given = {**joint, **_given(get, "friction", rubs)}
-    rows = numbers.rows_of(rubs.declared, given, len(p))
+    friction = with_constants(rubs.declared)
+    rows = numbers.rows_of(friction, given, len(p))
     p[:, at.FRICTION_NUMBERS : at.FRICTION_NUMBERS + rows.shape[1]] = rows
-    found = numbers.sample_numbers(rubs.declared, given)
-    ramp, slope = numbers.steepness_of(rubs.declared, found, len(p))
+    found = numbers.sample_numbers(friction, given)
+    ramp, slope = numbers.steepness_of(friction, found, len(p))
     p[:, at.INVERSE_RAMP], p[:, at.STEEPNESS] = ramp, slope
 
 
 def swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
     """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
-    law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
+    law = with_constants(scene.effects.contact.declared)  # type: ignore[union-attr]
     found: Array = numbers.swing(law, force, _read(law, p, [place], 0))
     return found
 
@@ -144,7 +146,7 @@ def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: 
     table = scene.effects.contact
     if table is None or not len(places):
         return np.zeros(len(gaps))
-    law: Any = table.declared
+    law = with_constants(table.declared)
     depth = np.maximum(gaps, 0.0)
     on = active if law.latched else np.ones_like(depth)
     each = on * numbers.stored(law, depth, _read(law, par, places))

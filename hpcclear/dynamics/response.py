@@ -1,5 +1,6 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,24 +11,32 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY, WIDEST, Status
-from hpcclear.dynamics.between import seen_between
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.evaluator import alone, outcome_records, responses_reported
-from hpcclear.dynamics.impacts import Turns, measured_of
+from hpcclear.dynamics.evaluation.evaluator import (
+    DEFAULT_LANES,
+    alone,
+    impacts_reported,
+    outcome_records,
+    responses_reported,
+)
+from hpcclear.dynamics.evaluation.recorded.between import seen_between
+from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
+from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
+from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
+from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.joint_laws import has_pressure
-from hpcclear.dynamics.lanes import PrescribedSamples
-from hpcclear.dynamics.parameters import parameters
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.problem import coordinate_count, integrator_of, problem_of
-from hpcclear.dynamics.recorded import ITSELF, Piece, Recording, pieces
-from hpcclear.dynamics.sounding import enter_levels, spectra_of
-from hpcclear.dynamics.start import start_states
-from hpcclear.dynamics.steady.wording import recorded
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import coordinate_count, effects_of, integrator_of, problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.stepping.lanes import PrescribedSamples
+from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.results import dataset
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
@@ -37,13 +46,15 @@ MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
 
 
-def _works_between(recording: Recording, piece: Piece, s: Array) -> Array:
+def _works_between(sample: Recorded, piece: Piece, s: Array) -> Array:
     """Works (t, 4) by the cubic through works and powers at both ends of the step."""
     steps, k = piece.steps, piece.k
     after = np.minimum(k + 1, len(steps.time) - 1)
     rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
     ends = np.hstack([steps.q[rows], steps.v[rows]])
-    powers = recording.observe(ends, steps.contacts[rows], steps.turn_time[rows])[1].powers
+    turn_time = steps.turn_time[rows]
+    began = steps.time[rows] - turn_time
+    powers = sample.observe(ends, steps.contacts[rows], turn_time, began)[1].powers
     before, behind = np.split(powers[where], 2)
     h = (steps.time[after] - steps.time[k])[:, None]
     s = s[:, None]
@@ -65,7 +76,7 @@ def simulate(
         What ``objective`` is; by default that of the scene's study, f without one. Others than gaps and peak contact forces
         need ``numerics.responses`` where there is no study that requires them.
     copy : int
-        Start a little beside the scene's start, in the direction of this number (`hpcclear.dynamics.steady.copies`); a
+        Start a little beside the scene's start, in the direction of this number (`evaluation.steady.copies`); a
         motion without clearance has no copies.
     checked : bool
         Whether the objective gets a half-width (``objective_uncertainty``), by replicas beside it; never for a copy.
@@ -85,14 +96,69 @@ def simulate(
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
     objective = named.objective if objective is None else objective
-    still = coordinate_count(scene) == 0
-    if still:
-        times, data, record = _prescribed(scene)
+    if coordinate_count(scene) == 0:
+        found = _prescribed(scene)
     else:
         perturbations = (
             alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
         )
-        times, data, record = _integrated(scene, Recording(scene, copy, perturbations, objective))
+        recording = Recording(scene, copy, perturbations, objective)
+        collected = Collected(scene, recording.samples[0])
+        for rows in recording.chunks():
+            collected.take(rows)
+        found = collected.finish(recording.record())
+    return _response(named, scene, found, objective, steady)
+
+
+def simulate_together(scenes: Sequence[Scene]) -> Iterator[tuple[int, xr.Dataset]]:
+    """Simulate scenes that differ in numbers only in one batch; yield their places in the sequence and responses, in any order.
+
+    Every response has the bytes of ``simulate(scene, checked=False)``. A scene whose kernel differs is simulated alone.
+    """
+    groups: dict[Any, list[int]] = {}
+    for k, scene in enumerate(scenes):
+        kernel = kernel_of(scene)
+        groups.setdefault((k,) if kernel is None else kernel, []).append(k)
+    for numbers in groups.values():
+        if len(numbers) == 1:
+            yield numbers[0], simulate(scenes[numbers[0]], checked=False)
+            continue
+        first, *others = (scenes[k] for k in numbers)
+        recording = Recording(first, beside=others)
+        collected = [
+            Collected(scenes[k], one) for k, one in zip(numbers, recording.samples, strict=True)
+        ]
+        for rows in recording.chunks():
+            for slot, one in enumerate(collected):
+                one.take(rows[rows[:, rec.SLOT] == slot])
+        for slot, k in enumerate(numbers):
+            scene, record = scenes[k], recording.record()[slot : slot + 1]
+            found, collected[slot] = collected[slot].finish(record), None  # type: ignore[call-overload]
+            yield k, _response(scene, scene, found, scene.objective)
+
+
+def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
+    """Return what scenes of one batch have in common, or None if a scene has to be simulated alone."""
+    steady = scene.numerics.target_error is not None and scene.clearance_joints()
+    if steady or coordinate_count(scene) == 0 or refused_of(scene) is not None:
+        return None
+    problem = problem_of(scene)
+    kinds = (problem.effects, effects_of(scene, series=True, energies=True, impacts=True))
+    texts = [problem.motion_text(effects, DEFAULT_LANES) for effects in kinds]
+    settings = problem.settings().rows.tobytes()
+    return (*texts, settings, problem.tables.tobytes(), problem.tableau.packed().tobytes())
+
+
+Found = tuple[Array, dict[str, Any], Records]
+"""Instants, time series and outcome record (1,)."""
+
+
+def _response(
+    named: Scene, scene: Scene, found: Found, objective: Objective, steady: Records | None = None
+) -> xr.Dataset:
+    """The dataset of a scene `named` by a user, whose series are those of `scene`."""
+    times, data, record = found
+    still = coordinate_count(scene) == 0
     if steady is not None:
         steady["status"] = max(steady["status"][0], record["status"][0])  # of the series as well
         record = steady
@@ -102,6 +168,8 @@ def simulate(
     labels = scene.joint_labels
     names = [*_REPORTED, *(WIDEST if has_pressure(scene) and not still else ())]
     names += [] if steady is None else [*STEADY, "regime"]
+    if steady is None and not still:  # what the sample measures as well has its bits
+        names += [name for name in impacts_reported(problem_of(scene)) if name in data]
     if scene.effects.slider_load is not None:
         data["slider_load"] = curve_at(
             scene.effects.slider_load,
@@ -189,7 +257,7 @@ def _shown(scene: Scene, steady: Records) -> Scene:
     return scene.with_(changes)
 
 
-def _prescribed(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
+def _prescribed(scene: Scene) -> Found:
     """Instants, time series and outcome record (1,) of a scene without clearance at prescribed speed."""
     problem = problem_of(scene)
     lanes = PrescribedSamples(problem)
@@ -201,43 +269,58 @@ def _prescribed(scene: Scene) -> tuple[Array, dict[str, Array], Records]:
     return *prescribed_series(scene, problem.transient + problem.averaged), record
 
 
-def _integrated(scene: Scene, recording: Recording) -> tuple[Array, dict[str, Array], Records]:
-    """Instants, time series and outcome record (1,) of a scene that is integrated."""
-    count = scene.output.instants_per_revolution
-    problem = recording.problem
-    parts: list[dict[str, Array]] = []
-    taken, turns, spectra = 0, Turns(), spectra_of(scene, recording)
-    for piece in pieces(recording.chunks(), count):
-        series = {"time": piece.times, **_series_between(scene, recording, piece)}
+class Collected:
+    """Time series of one sample of a recording, as its steps come."""
+
+    def __init__(self, scene: Scene, sample: Recorded) -> None:
+        self._scene, self._sample = scene, sample
+        self._pieces = Pieces(scene.output.instants_per_revolution)
+        self._parts: list[dict[str, Array]] = []
+        self._taken, self._turns = 0, Turns()
+        self._spectra = spectra_of(scene, sample)
+
+    def take(self, rows: Array) -> None:
+        """Take rows (m, columns) of the record; raises InputError where time series do not fit into memory."""
+        for piece in self._pieces.take(rows):
+            self._add(piece)
+
+    def _add(self, piece: Piece) -> None:
+        problem, count = self._sample.problem, self._scene.output.instants_per_revolution
+        series = {"time": piece.times, **_series_between(self._scene, self._sample, piece)}
         # copies: a column that is a view would keep all that was observed
-        parts.append({name: one.copy() for name, one in series.items()})
-        taken += len(piece.times)
-        turns.take(piece.steps)
-        if spectra is not None:
-            spectra.take(piece)
-        least = max(taken, count * (problem.transient + problem.averaged))
-        _refuse_what_does_not_fit(least * _bytes_an_instant(parts[0]), count)
-    turns.finish(piece.steps)
-    data = {}
-    for name in list(parts[0]):
-        data[name] = np.concatenate([part.pop(name) for part in parts])
-    data["energy_residual"] -= data["energy_residual"][0]
-    record = recording.record()
-    if Status(int(record["status"][0])).valid and problem.effects.joints:
-        data |= _measured(scene, recording, turns)
-        data |= {} if spectra is None else spectra.measured()
-        if spectra is not None and scene.bands():
-            enter_levels(scene, recording, turns, spectra, record)
-    return data.pop("time"), data, record
+        self._parts.append({name: one.copy() for name, one in series.items()})
+        self._taken += len(piece.times)
+        self._turns.take(piece.steps)
+        if self._spectra is not None:
+            self._spectra.take(piece)
+        least = max(self._taken, count * (problem.transient + problem.averaged))
+        _refuse_what_does_not_fit(least * _bytes_an_instant(self._parts[0]), count)
+
+    def finish(self, record: Records) -> Found:
+        """Return what it comes to, with the outcome (1,)."""
+        last = self._pieces.finish()
+        self._add(last)
+        self._turns.finish(last.steps)
+        data = {}
+        for name in list(self._parts[0]):
+            data[name] = np.concatenate([part.pop(name) for part in self._parts])
+        data["energy_residual"] -= data["energy_residual"][0]
+        problem = self._sample.problem
+        if Status(int(record["status"][0])).valid and problem.effects.joints:
+            data |= _measured(self._scene, problem, self._turns)
+            data |= {} if self._spectra is None else self._spectra.measured()
+            if self._spectra is not None and self._scene.bands():
+                enter_levels(self._scene, self._sample, self._turns, self._spectra, record)
+        return data.pop("time"), data, record
 
 
-def _measured(scene: Scene, recording: Recording, turns: Turns) -> dict[str, Any]:
+def _measured(scene: Scene, problem: Problem, turns: Turns) -> dict[str, Any]:
     """Measures of impact and noise of the averaged revolutions, and the coordinate that goes with them."""
-    periods, integrals = turns.averaged(recording.problem.transient)
-    first = recording.problem.transient + 1
+    periods, integrals = turns.averaged(problem.transient)
+    first = problem.transient + 1
     return {
         "revolution": np.arange(float(first), first + len(periods)),
-        **measured_of(scene, recording.problem, periods, integrals),
+        **measured_of(scene, problem, periods, integrals),
     }
 
 
@@ -258,9 +341,9 @@ def _refuse_what_does_not_fit(size: float, count: int) -> None:
         )
 
 
-def _series_between(scene: Scene, recording: Recording, piece: Piece) -> dict[str, Array]:
+def _series_between(scene: Scene, sample: Recorded, piece: Piece) -> dict[str, Array]:
     """Every time series at the instants of a piece."""
-    seen = seen_between(recording, piece)
-    works = _works_between(recording, piece, seen.share)
+    seen = seen_between(sample, piece)
+    works = _works_between(sample, piece, seen.share)
     q, v = (one[:, scene.bristles :] for one in seen[:2])
-    return planar_series(scene, recording.par, Seen(q, v, *seen[2:6], works))
+    return planar_series(scene, sample.par, Seen(q, v, *seen[2:6], works))

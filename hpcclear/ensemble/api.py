@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.steady.wording import recorded
+from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.session import samples_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene

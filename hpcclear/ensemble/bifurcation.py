@@ -62,7 +62,8 @@ class Observation:
         at = f"at crank angle {np.degrees(self.section):g} deg"
         how = f"{word} of each revolution" if word in REDUCED else at
         name = self.name.removeprefix(f"{word} ") if word in REDUCED else self.name
-        words = f"{name.replace('_', ' ')}, {how}"
+        quantity, blank, place = name.partition(" ")
+        words = f"{quantity.replace('_', ' ')}{blank}{place}, {how}"
         return replace(MEAN_GAP, name=self.name, unit=str(series.attrs["units"]), words=words)
 
     def __call__(self, scene: Scene, response: xr.Dataset) -> Array:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.quantiles import Uniform
-from hpcclear.dynamics.evaluator import Evaluator
+from hpcclear.dynamics.evaluation.evaluator import Evaluator
 from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.ranks.progress import Style
@@ -25,7 +25,7 @@ from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 
-def compile_share(payload: Mapping[str, Any], ranks: Ranks) -> None:
+def compile_share(payload: Mapping[str, object], ranks: Ranks) -> None:
     """Compile this rank's share of the parts; root and the others are at it together.
 
     Parameters

@@ -16,7 +16,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
-from hpcclear.dynamics.problem import coordinate_count
+from hpcclear.dynamics.setup.problem import coordinate_count
 from hpcclear.ensemble.certificate import Certificate, Changes, Plan, Seen, judged
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import Finished, Options, Place, Session

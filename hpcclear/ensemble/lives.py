@@ -8,8 +8,8 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.dynamics.parameters import parameters
-from hpcclear.dynamics.views import Parameters
+from hpcclear.dynamics.layout.views import Parameters
+from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.wear.curves import THROUGH, Curves, curves, lifetime, local_bounds
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.record import Life
@@ -70,39 +70,67 @@ def lives_dataset(
     assert scene.wear is not None
     cycles, relief = ages_of(scene, [*lives, *(even or ())]), relief_of(scene)
     angles = np.linspace(0.0, 2.0 * np.pi, scene.wear.bins, endpoint=False)
-    found = [curves(one, joints[k], cycles, relief, angles) for k, one in enumerate(lives)]
-    labels = len(scene.joint_labels)
-    values = {
-        "clearance": _stacked(found, "clearance"),
-        "bearing_depth": _stacked(found, "bearing"),
-        "journal_depth": _stacked(found, "journal"),
-        "objective": _stacked(found, "objective"),
-        "peak_contact_force": np.stack(
-            [
-                one.peak if one.peak.shape[1] else np.full((len(cycles), labels), np.nan)
-                for one in found
-            ]
-        ),
-    }
     limits = scene.wear.limit.given()
+    found = [curves(one, joints[k], cycles, relief, angles) for k, one in enumerate(lives)]
+    last = [curves(one, joints[k], np.array([one.ended]), relief) for k, one in enumerate(lives)]
     ends = np.array([lifetime(one, joints[k], limits, relief) for k, one in enumerate(lives)])
     local, times = _stacked(found, "local"), revolution_times(scene, inputs)
-    last = [curves(one, joints[k], np.array([one.ended]), relief) for k, one in enumerate(lives)]
     at_end = np.concatenate([one.local for one in last])
     # a crossing is interpolated between points of the curve, which lies below its chord where wear speeds up
     over = at_end >= (1.0 - 1e-6) * local_bounds(joints, limits)
-    failed = np.array([not (one.reason or one.status.valid) for one in lives], bool)
-    at_end[failed] = np.nan
+    at_end[[not (one.reason or one.status.valid) for one in lives]] = np.nan
+    values = _curves(found, len(cycles), len(scene.joint_labels))
     data: dict[str, Any] = {
         **values,
-        "clearance_limit": np.stack([one.limit for one in lives]),
-        "clearance_error": np.stack([one.error for one in lives]),
-        "drift": np.array([one.drift for one in lives]),
+        **_of_lives(lives),
         "lifetime": ends,
         "lifetime_hours": ends * times / HOUR,
         "revolution_time": times,
-        "end_reason": np.array([_reason(one) for one in lives], dtype=str),
         "end_clearance": at_end,
+        "lifetime_hours_quantile": quantiles(ends * times / HOUR, LEVELS),
+        **statistics(
+            values, ends, lives, cycles, limits.get("clearance"), local,
+            np.where(over, np.inf, at_end),
+        ),
+        "rank_correlation": _causes(inputs, joints, lives, last),
+    }  # fmt: skip
+    if even is not None:
+        data |= {"local_clearance": local, "sharpest": np.array([one.sharpest for one in lives])}
+        data |= _profiles(relief, found, angles) | _evenly(joints, even, cycles, limits)
+    names = () if inputs is None else inputs.names
+    if inputs is not None:
+        data |= {name: inputs.column(name) for name in names}
+    coords: dict[str, Any] = {
+        "life": np.arange(len(lives)), "joint": np.array(scene.worn_joints(), dtype=str),
+        "open_joint": np.array(scene.joint_labels, dtype=str), "cycle": cycles, "quantile": LEVELS,
+        "random_input": np.array(names, dtype=str),
+    } | ({} if even is None else {"angle": angles})  # fmt: skip
+    units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
+    words = None if inputs is None else inputs.words
+    bounds = {f"limit_{name}": value for name, value in limits.items()}
+    attrs = {**attributes, "tolerance": scene.wear.tolerance, **bounds}
+    return dataset.dataset("wear", coords, data, attrs, units, scene.objective, words)
+
+
+def _curves(found: list[Curves], ages: int, labels: int) -> dict[str, Array]:
+    """What lives have at each age, (lives, ages, ...)."""
+    names = {"bearing_depth": "bearing", "journal_depth": "journal"}
+    names |= {name: name for name in ("clearance", "objective")}
+    unknown = np.full((ages, labels), np.nan)
+    peaks = [one.peak if one.peak.shape[1] else unknown for one in found]
+    return {
+        **{name: _stacked(found, one) for name, one in names.items()},
+        "peak_contact_force": np.stack(peaks),
+    }
+
+
+def _of_lives(lives: list[Life]) -> dict[str, Array]:
+    """How each life went, and what it cost."""
+    return {
+        "clearance_limit": np.stack([one.limit for one in lives]),
+        "clearance_error": np.stack([one.error for one in lives]),
+        "drift": np.array([one.drift for one in lives]),
+        "end_reason": np.array([_reason(one) for one in lives], dtype=str),
         "ended": np.array([one.ended for one in lives]),
         "jumps": np.array([max(len(one.nodes) - 1, 0) for one in lives]),
         "simulations": np.array([one.simulations for one in lives]),
@@ -110,46 +138,19 @@ def lives_dataset(
         "flags": np.array(
             [0 if one.certain else int(Flag.TARGET_MISSED) for one in lives], np.int8
         ),
-        "lifetime_hours_quantile": quantiles(ends * times / HOUR, LEVELS),
-        **statistics(
-            values,
-            ends,
-            lives,
-            cycles,
-            limits.get("clearance"),
-            local,
-            np.where(over, np.inf, at_end),
-        ),
     }
-    if even is not None:
-        data |= {"local_clearance": local, "sharpest": np.array([one.sharpest for one in lives])}
-        data |= _profiles(relief, found, angles) | _evenly(joints, even, cycles, limits)
-    names = () if inputs is None else inputs.names
+
+
+def _causes(inputs: Points | None, joints: Joints, lives: list[Life], last: list[Curves]) -> Array:
+    """Rank correlation of each random input with the growth of each clearance a revolution, (inputs, joints)."""
     ended = np.array([one.ended if one.reason or one.status.valid else np.nan for one in lives])
     grown = np.concatenate([one.clearance for one in last]) - joints.clearance
     growth = grown / np.where(ended > 0.0, ended, np.nan)[:, None]
-    data["rank_correlation"] = np.array(
-        [[rank_correlation(inputs.column(name), one) for one in growth.T] for name in names]
-        if inputs is not None
-        else np.empty((0, growth.shape[1]))
+    if inputs is None:
+        return np.empty((0, growth.shape[1]))
+    return np.array(
+        [[rank_correlation(column, one) for one in growth.T] for column in inputs.values.T]
     )
-    if inputs is not None:
-        data |= {name: inputs.column(name) for name in names}
-    coords: dict[str, Any] = {
-        "life": np.arange(len(lives)), "joint": np.array(scene.worn_joints(), dtype=str),
-        "open_joint": np.array(scene.joint_labels, dtype=str), "cycle": cycles, "quantile": LEVELS,
-        "random_input": np.array(names, dtype=str),
-    }  # fmt: skip
-    if even is not None:
-        coords["angle"] = angles
-    units = {} if inputs is None else dict(zip(names, inputs.units, strict=True))
-    words = None if inputs is None else inputs.words
-    attrs = {
-        **attributes,
-        "tolerance": scene.wear.tolerance,
-        **{f"limit_{name}": value for name, value in limits.items()},
-    }
-    return dataset.dataset("wear", coords, data, attrs, units, scene.objective, words)
 
 
 def _reason(one: Life) -> str:

@@ -23,7 +23,7 @@ from hpcclear.scene.units import UnitError, to_si
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
 
 if TYPE_CHECKING:
-    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
+    from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 
 
 def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
@@ -105,8 +105,8 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
 
 def make_mapper(payload: Mapping[str, Any], ranks: Ranks) -> "SteadyEvaluator":
     """A rank's worker."""
-    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
-    from hpcclear.dynamics.steady.mapping import mapped
+    from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
+    from hpcclear.dynamics.evaluation.steady.mapping import mapped
 
     nothing = np.empty((0, len(payload["names"])))
     columns = Points(payload["names"], nothing, payload["paths"])

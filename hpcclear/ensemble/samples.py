@@ -6,7 +6,7 @@ from pathlib import Path
 import xarray as xr
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.steady.wording import recorded
+from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
 from hpcclear.ensemble.simulate import sample_points, saving

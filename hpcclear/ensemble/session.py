@@ -29,12 +29,10 @@ from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import (
     INTERVAL,
     Checkpoint,
-    check_key,
     discard,
-    key_attribute,
-    key_of,
     unfinished,
 )
+from hpcclear.results.keys import check_key, key_attribute, key_of
 from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance

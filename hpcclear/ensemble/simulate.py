@@ -16,8 +16,6 @@ from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks, Task
 
 if TYPE_CHECKING:
-    from hpcclear.dynamics.evaluator import Evaluator
-    from hpcclear.dynamics.steady.evaluator import SteadyEvaluator
     from hpcclear.ranks.schedule import Worker
     from hpcclear.results.checkpoint import Checkpoint
     from hpcclear.scene import Scene
@@ -45,7 +43,7 @@ def content_of(scene: "Scene") -> dict[str, Any]:
 
 def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
     """What a rank needs to know before it gets points: plain content, small, the same everywhere."""
-    from hpcclear.dynamics.evaluator import DEFAULT_LANES
+    from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 
     return {
         "scene": content_of(scene),
@@ -64,7 +62,7 @@ _MOST_COMPILED = 8
 class Judge:
     """A rank's worker: an evaluator whose records contain the requested objective; see `ranks.schedule.Worker`."""
 
-    def __init__(self, evaluator: "Evaluator | SteadyEvaluator", objective: Objective) -> None:
+    def __init__(self, evaluator: "Worker", objective: Objective) -> None:
         self._evaluator, self._objective = evaluator, objective
         self.lanes = evaluator.lanes
         self.submit = evaluator.submit

@@ -1,13 +1,13 @@
 """Single responses of variants of a scene, on all ranks: of each what it boils down to."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulate, simulate_together
 from hpcclear.ensemble.simulate import content_of
 from hpcclear.ranks.team import Ranks, Task
 from hpcclear.scene import Scene, load_scene
@@ -21,6 +21,7 @@ def responses_of(
     ranks: Ranks,
     stage: str,
     copies: int = 1,
+    together: int = 1,
 ) -> Array:
     """What each response comes to, NaN where `evaluate` returns it; call it on root.
 
@@ -37,6 +38,8 @@ def responses_of(
         Name for reports and timing.
     copies : int
         Starts of each variant; all but the first are perturbed.
+    together : int
+        Responses in a batch, which share the memory of a rank; results do not depend on it.
 
     Returns
     -------
@@ -52,6 +55,7 @@ def responses_of(
         "variants": list(variants),
         "evaluate": evaluate,
         "dtype": dtype,
+        "together": together,
     }
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
     records = ranks.run_points(Task(stage, Responses, payload, dtype), rows)
@@ -61,18 +65,20 @@ def responses_of(
 class Responses:
     """A rank's worker; see `hpcclear.ranks.schedule.Worker`."""
 
-    lanes = 2  # one under way, one in stock: who hands out may be at one of its own
-
     def __init__(self, payload: Mapping[str, Any], ranks: Ranks) -> None:
         self._scene = load_scene(payload["scene"], trust=True)
         self._variants, self._evaluate = payload["variants"], payload["evaluate"]
-        self._dtype = payload["dtype"]
+        self._dtype, self._together = payload["dtype"], payload["together"]
+        # as many under way, and one in stock: who hands out may be at one of its own
+        self.lanes = 1 + self._together
         self._queue: list[tuple[int, int, int]] = []
+        self._begun: Iterator[np.ndarray] = iter(())
+        self._unfinished = 0
 
     @property
     def pending(self) -> int:
         """Responses submitted and not finished."""
-        return len(self._queue)
+        return len(self._queue) + self._unfinished
 
     def submit(self, index: Integers, points: Array) -> None:
         """Queue responses (m,), rows of variant and copy (m, 2)."""
@@ -81,10 +87,28 @@ class Responses:
 
     def advance(self, seconds: float) -> np.ndarray:
         """The record of the next one, shape (1,), however long it takes; (0,) if there is none."""
-        records = np.zeros(min(len(self._queue), 1), self._dtype)
-        for record in records:
-            record["sample"], variant, copy = self._queue.pop(0)
-            scene = self._scene.with_(self._variants[variant])
-            response = simulate(scene, copy=copy, checked=False)
-            record["values"] = self._evaluate(scene, response).ravel()
+        if not self._unfinished and self._queue:
+            taken, self._queue = self._queue[: self._together], self._queue[self._together :]
+            self._unfinished, self._begun = len(taken), self._records(taken)
+        if not self._unfinished:
+            return np.zeros(0, self._dtype)
+        self._unfinished -= 1
+        return next(self._begun)
+
+    def _records(self, taken: Sequence[tuple[int, int, int]]) -> Iterator[np.ndarray]:
+        """Yield records (1,) of responses; those without a perturbed start are simulated in one batch."""
+        scenes = [self._scene.with_(self._variants[variant]) for _, variant, _ in taken]
+        plain = [k for k, (_, _, copy) in enumerate(taken) if not copy]
+        for k, (_, _, copy) in enumerate(taken):
+            if copy:
+                yield self._record(
+                    taken[k][0], scenes[k], simulate(scenes[k], copy=copy, checked=False)
+                )
+        for k, response in simulate_together([scenes[k] for k in plain]):
+            yield self._record(taken[plain[k]][0], scenes[plain[k]], response)
+
+    def _record(self, sample: int, scene: Scene, response: xr.Dataset) -> np.ndarray:
+        """The record (1,) of a response."""
+        records = np.zeros(1, self._dtype)
+        records["sample"], records["values"] = sample, self._evaluate(scene, response).ravel()
         return records

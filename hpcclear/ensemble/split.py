@@ -13,12 +13,12 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.steady.wording import recorded
+from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session, samples_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
-from hpcclear.results.checkpoint import check_key
+from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 

@@ -12,8 +12,8 @@ from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag
 from hpcclear.dynamics.evaluation import evaluator_of
-from hpcclear.dynamics.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.problem import coordinate_count, implicit_method, problem_of
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.ensemble.certificate import Asked, Certificate, Plan, Seen, Variant, certificate
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.results.names import ALL_ON

@@ -15,7 +15,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.parameters import Numbers, wave_paths
+from hpcclear.dynamics.setup.parameters import Numbers, wave_paths
 from hpcclear.dynamics.wear.curves import DEEPEST
 from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Asking, Plan, Seen, life

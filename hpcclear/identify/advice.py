@@ -91,10 +91,13 @@ def _expected(
     errors = [truth - _cross_validated(scores, truth, penalty) for penalty in PENALTIES]
     error = min(errors, key=lambda one: float((one**2).sum()))
     ranges = np.array([one.upper - one.lower for one in unknowns])
-    related: Array = np.atleast_2d(np.corrcoef(error.T))
-    away = related[~np.eye(len(unknowns), dtype=bool)]
-    most = float(away[np.argmax(np.abs(away))]) if away.size else np.nan
-    return np.quantile(np.abs(error), 0.95, axis=0) * ranges, most
+    return np.quantile(np.abs(error), 0.95, axis=0) * ranges, largest_correlation(error)
+
+
+def largest_correlation(rows: Array) -> float:
+    """Return the correlation of two of the columns (n, k) that is the largest in magnitude; NaN of one column."""
+    related = np.atleast_2d(np.corrcoef(rows.T))[np.triu_indices(rows.shape[1], 1)]
+    return float(related[np.argmax(np.abs(related))]) if related.size else np.nan
 
 
 def _cross_validated(scores: Array, truth: Array, penalty: float) -> Array:

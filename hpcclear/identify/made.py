@@ -4,20 +4,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
-from hpcclear.identify.signals import revolutions_of, series_of, unit_of
+from hpcclear.identify.signals import IMPACTS, revolutions_of, series_of, unit_of
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
 
 def write_made(
     scene: Scene, path: str | Path, names: Sequence[str], *, noise: float, revolutions: int = 30,
-    samples: int = 512, seed: int = 0,
+    samples: int = 512, seed: int = 0, response: xr.Dataset | None = None,
 ) -> None:  # fmt: skip
     """Simulate a scene and write what a sensor would record over the crank angle, after the transient.
 
@@ -30,18 +31,21 @@ def write_made(
     names : sequence of str
         Signals.
     noise : float
-        Standard deviation of white noise in each sample, over the RMS of the signal about its mean.
+        Standard deviation of white noise in each sample, over the RMS of the signal about its mean; counts have none.
     revolutions, samples : int
         Revolutions of the drive, and samples of each.
     seed : int
+    response : xarray.Dataset, optional
+        Of the scene, with one revolution more than is written; by default it is simulated here.
 
     Raises
     ------
     InputError
         The simulation fails.
     """
-    longer = {"numerics.averaged_revolutions": revolutions + 1}
-    response = simulate(scene.with_(longer), checked=False)
+    if response is None:
+        longer = {"numerics.averaged_revolutions": revolutions + 1}
+        response = simulate(scene.with_(longer), checked=False)
     status = Status(int(response["status"]))
     if not status.valid:
         raise InputError("scene", status.name.lower(), status.message, status.remedy)
@@ -55,8 +59,13 @@ def write_made(
     clockwise = response["crank_angle"][-1] < response["crank_angle"][0]
     columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
-        values = make_interp_spline(turns, series_of(response, name), k=3)(places)
-        columns.append(values + noise * values.std() * rng.standard_normal(len(values)))
+        values = series_of(response, name)
+        if name.startswith(IMPACTS):  # whole events since the sample before, which have no noise
+            count = np.round(np.interp(places, turns, np.cumsum(values)))
+            columns.append(np.diff(count, prepend=count[0]))
+        else:
+            sampled = make_interp_spline(turns, values, k=3)(places)
+            columns.append(sampled + noise * sampled.std() * rng.standard_normal(len(places)))
         unit = unit_of(response, name)
         headings.append(name if unit == "1" else f"{name} [{unit}]")
     _write(Path(path), headings, columns)

@@ -128,6 +128,8 @@ def unit_of(response: xr.Dataset, name: str) -> str:
 
 def series_of(response: xr.Dataset, name: str) -> Array:
     """Return a signal of a response (t,), SI."""
+    if name in response:  # of the mechanism as a whole: no need to label those of its parts
+        return response[name].to_numpy()
     known = motion.series(response)
     if name in known:
         return known[name].to_numpy()

@@ -29,6 +29,9 @@ from hpcclear.scene.planar import turns_of
 CHUNK = 64
 """Members between two checkpoints."""
 
+TOGETHER = 8
+"""Members in a batch: integration costs little more than that of one member, but the time series fill the memory."""
+
 LEAST_REVOLUTIONS = 10
 """Revolutions that a member is averaged over at least: chaos takes some to be seen."""
 
@@ -124,7 +127,9 @@ def simulated(
         if known is None:
             rows = variants[first : first + CHUNK]
             reduced = partial(spectra, names=tuple(names))
-            found = responses_of(scene, rows, reduced, shape, ranks, "ensemble")[:, 0]
+            found = responses_of(scene, rows, reduced, shape, ranks, "ensemble", together=TOGETHER)[
+                :, 0
+            ]
             known = {"spectra": found}
             if checkpoint is not None:
                 checkpoint.save_stage(stage, known)

@@ -37,7 +37,7 @@ class Registry:
         self._families: list[tuple[re.Pattern[str], Callable[[re.Match[str]], Any]]] = []
         self._offered: dict[str, _Offered] = {}
 
-    def add(self, name: str, target: Any) -> None:
+    def add(self, name: str, target: object) -> None:
         """Offer one of ours: an object, or where to find it, "package.module:Name", which is imported at its first use."""
         assert name not in self._ours, f"two {self.kind}s are called {name}"
         self._ours[name] = target

@@ -111,7 +111,11 @@ class Progress:
 
     def _eta(self) -> str:
         rate = self._rate()
-        return f"{duration((self._total - self._done) / rate)} left" if rate > 0.0 else "? left"
+        return (
+            f"{duration((self._total - self._done) / rate)} left"
+            if rate > 0.0
+            else "time left not known"
+        )
 
     def _write(self, text: str) -> None:
         assert self._stream is not None
@@ -153,13 +157,13 @@ class LivesProgress(Progress):
     def text(self) -> str:
         """Lives that are over, part of the simulations done, their number and failures."""
         failed = f", {self._failed} failed" if self._failed else ""
-        share = f"{self._over}/{self._lives} lives over ({100.0 * self._behind:.0f} %)"
+        share = f"{self._over}/{self._lives} service lives finished ({100.0 * self._behind:.0f} %)"
         return f"{share}, {self._done} simulations{failed}"
 
     def _eta(self) -> str:
         gone = self._clock() - self._began
         left = gone * (1.0 - self._behind) / self._behind if self._behind > 0.0 else 0.0
-        return f"about {duration(left)} left" if left > 0.0 else "? left"
+        return f"about {duration(left)} left" if left > 0.0 else "time left not known"
 
     def _draw(self) -> None:
         self._bar.update(

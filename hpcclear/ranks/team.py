@@ -67,8 +67,6 @@ class Ranks:
         This process, and how many there are.
     is_root : bool
         Whether this process runs the program.
-    oversubscribed : bool
-        Whether this node has more ranks than cores for them.
     stage_seconds : dict of str to ndarray
         On root: seconds of every rank in each stage, float64 (size, 4), columns as in `COLUMNS`;
         every row of a stage adds up to its wall time.
@@ -90,7 +88,6 @@ class Ranks:
         self.rank = mail.rank
         self.size = mail.size
         self.is_root = mail.rank == 0
-        self.oversubscribed = mail.node_size > mail.node_cores
         self.stage_seconds: dict[str, np.ndarray] = {}
 
     def first_on_node(self, action: Callable[[], object]) -> None:

@@ -37,7 +37,7 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     if not names:
         return ""
     together = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names]))
-    text = f"{_listed(names)}: merit within {FLAT:.0%} of the recommended design"
+    text = f"{_listed(names)}: criterion within {FLAT:.0%} of the recommended design"
     if spans := _spans(together):
         text += f"; they differ in {spans}"
     same = [

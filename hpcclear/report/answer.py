@@ -128,13 +128,18 @@ _NONE = {
 """What stands in place of a recommendation where no design significantly satisfies the constraints, by the best verdict."""
 
 
+ENDS_IN_WORDS = {"alpha": "lowest mean of f", "beta": "lowest standard deviation of f"}
+"""What the ends of a front are, of a case without objectives of its own."""
+
+
 def _named(best: xr.Dataset) -> str:
     name = str(best["design"].item())
     if (verdict := standing(str(best.get("constraints", xr.DataArray("")).item()))) in _NONE:
         return f"{_NONE[verdict]}; nearest: {name}"
     if name.rpartition(" ")[2] == "original":
         return f"keep the baseline design ({name}): no simulated design is better"
-    return name
+    role = ENDS_IN_WORDS.get(name.rpartition(" ")[2], "") if is_plain(best) else ""
+    return f"{name}: {role}" if role else name
 
 
 def _case(best: xr.Dataset) -> str:
@@ -237,7 +242,7 @@ def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
         ("kriging", "the search began there"),
     ):
         if found := fits.warnings(kind, files.get(kind)):
-            yield f"{'; '.join(found)} ({what}); the simulated values do not depend on it"
+            yield f"{'; '.join(found)} ({what}); simulated values do not depend on surrogates"
 
 
 def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
@@ -249,17 +254,17 @@ def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     moved = (found["chaotic"] > SOME).to_numpy()
     text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
     if not float(own["chaotic"]) > SOME:
-        return f"{text}; this one is not: perturbations of 1e-9 leave its samples unchanged"
+        return f"{text}; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
     return (
-        f"{text}. Perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples and explain "
-        f"{float(own['chaos_share']):.0%} of its variance"
+        f"{text}. Relative perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples "
+        f"and explain {float(own['chaos_share']):.0%} of its variance"
     )
 
 
 def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     count = int(best["samples"]) if "samples" in best else 0
     level = float(verified.attrs.get("confidence", np.nan))
-    text = f"{count} simulations of it"
+    text = f"{count} simulations of the recommended design"
     text += " by randomised quasi-Monte Carlo" if verified.attrs.get("method") == "qmc" else ""
     if np.isfinite(level):
         paired = np.isfinite(float(best.get("mean_tolerance", np.nan)))

@@ -222,11 +222,23 @@ def _series(
     match = {_plain(name): name for name in found}.get(_plain(wanted))
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
-        remedy = f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, list(found))
+        fitting = [name for name in found if _fits(column.unit, found[name].attrs["units"])]
+        remedy = (
+            f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, fitting or list(found))
+        )
+        remedy += ". --name COLUMN=QUANTITY names the quantity of a column"
         raise InputError(
             "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
         )
     return match, found[match]
+
+
+def _fits(unit: str, of: str) -> bool:
+    """Whether a unit as written in a heading is one of the quantities in another unit."""
+    try:
+        return bool(unit and factor(unit, of))
+    except UnitError:
+        return False
 
 
 def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:

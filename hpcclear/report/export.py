@@ -10,7 +10,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
-from hpcclear.report import xlsx
+from hpcclear.report import spread, xlsx
 from hpcclear.report.tables import identifier, to_table
 from hpcclear.results import dataset, files
 
@@ -51,6 +51,53 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
     table = to_table(dataset.read(path), units)
     content, mark = FORMATS[place.suffix.lower()](table)
     files.write_bytes(place, content, mark)
+    return table
+
+
+def statistics(
+    paths: Sequence[str | Path], output: str | Path, thresholds: Sequence[str] = ()
+) -> "DataFrame":
+    """Write the statistics of several samples side by side: a row for each statistic with its interval, a column for each file.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Result files of `sample`; those of run times are passed over.
+    output : path
+        As `export`.
+    thresholds : sequence of str
+        Values such as "peak_contact_force=3 kN", beyond which shares are stated.
+
+    Raises
+    ------
+    InputError
+        As `export`, and if a file is no sample.
+    """
+    from pandas import DataFrame
+
+    check_format(Path(output))
+    columns: dict[str, dict[str, str]] = {}
+    for path in map(Path, paths):
+        if path.name.endswith(".timing.nc"):
+            continue
+        samples = dataset.read(path, "samples")
+        units = {str(name): row.attrs.get("units", "1") for name, row in samples.data_vars.items()}
+        levels = [spread.beyond(units, words) for words in thresholds]
+        lines = [("samples", str(samples.sizes["sample"])), *spread.statistics(samples, levels)]
+        name = path.stem if path.stem not in columns else str(path)
+        columns[name] = dict(lines)
+    labels = dict.fromkeys(label for column in columns.values() for label in column)
+    rows = {name: [column.get(label, "") for label in labels] for name, column in columns.items()}
+    table = DataFrame({"statistic": list(labels), **rows})
+    table.attrs = {
+        "units": {},
+        "long_names": {},
+        "title": "Statistics of samples",
+        "scene": "",
+        "scene_hash": "",
+    }
+    content, mark = FORMATS[Path(output).suffix.lower()](table)
+    files.write_bytes(Path(output), content, mark)
     return table
 
 

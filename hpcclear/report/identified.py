@@ -45,11 +45,35 @@ def _records(content: xr.Dataset) -> list[Line]:
         before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
         for u, name in enumerate(content["unknown"].to_numpy()):
             found.append(Line(_short(name), before + interval(content, k, u)))
+        if content.sizes["unknown"] > 1 and int(content["explained"][k]):
+            found.append(Line("together", before + _together(content, k)))
     share = content["coverage"].to_numpy()
     shown = " and ".join(f"{one:.0%}" for one in share)
     factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
     text = f"{shown} of simulated machines lie in their 95 % interval; widened by {factor}"
     return [*found, Line("calibration", text)]
+
+
+def _together(content: xr.Dataset, record: int) -> str:
+    """Say whether unknowns are identified separately; where they are not, the combination that is."""
+    related = float(content["correlation"][record])
+    if abs(related) <= TOGETHER:
+        return f"identified separately (correlation {related:.2f})"
+    names = [_short(name) for name in content["unknown"].to_numpy()]
+    units = set(content["unit"].to_numpy().astype(str))
+    text = f"not identified separately (correlation {related:.2f})"
+    if len(units) > 1:
+        return text
+    places = content["posterior"][record, :, : len(names)].to_numpy()
+    weights = np.linalg.eigh(np.cov(places.T))[1][:, 0]  # the direction of the least variance
+    weights = weights / np.abs(weights).sum() * np.sign(weights[np.argmax(np.abs(weights))])
+    low, middle, high = np.quantile(places @ weights, (0.025, 0.5, 0.975))
+    terms = " ".join(
+        f"{'-' if weight < 0.0 else '+'} {abs(weight):.2f} {name}"
+        for weight, name in zip(weights, names, strict=True)
+    )
+    middle, low, high = (rounded(float(one), *units) for one in (middle, low, high))
+    return f"{text}, only {terms.removeprefix('+ ')} = {middle} (95 % interval {low} to {high})"
 
 
 def interval(content: xr.Dataset, record: int, unknown: int) -> str:
@@ -129,6 +153,6 @@ def warnings(content: xr.Dataset) -> list[str]:
         related = float(content["correlation"][k])
         if abs(related) > TOGETHER:
             found.append(
-                f"the first two unknowns are not identified separately from {record}: their correlation is {related:.2f}"
+                f"the unknowns are not identified separately from {record}: their largest correlation is {related:.2f}"
             )
     return found

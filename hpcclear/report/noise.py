@@ -9,7 +9,7 @@ from hpcclear.report.figures import labels
 HEADER = ("joint", "impacts", "energy lost", "in flight", "RMS force")
 """Columns of the rows of `joints`."""
 
-TITLE = "Impacts, mean of a revolution"
+TITLE = "Impacts, mean per revolution"
 
 LOUDEST = 3
 """Third-octave bands that are named, the loudest first."""
@@ -50,7 +50,7 @@ def frame(response: xr.Dataset) -> list[tuple[str, str]]:
             for one, band in zip(level[order], bands, strict=True)
             if np.isfinite(one)
         )
-        found.append(("loudest third octaves", f"{words} (re 1 µN)"))
+        found.append(("highest third octaves", f"{words} (re 1 µN)"))
     return found
 
 
@@ -71,6 +71,6 @@ def _with(value: float, reach: float, unit: str) -> str:
     """A mean with its half-width; three digits where there are too few revolutions for one."""
     if not np.isfinite(reach):
         return labels.quantity(value, unit, 3)
-    if reach <= 1e-4 * abs(value):
+    if reach <= 1e-3 * abs(value):
         return labels.quantity(value, unit, 4)
     return labels.with_half_width(value, reach, unit)

@@ -15,6 +15,15 @@ HALF_WIDTH = 1.96
 TIGHTENED = 3
 """Inputs that are named as those to tighten first."""
 
+WORTH = 0.01
+"""Reduction of the standard deviation below which an input is not named."""
+
+COARSE = 0.00995
+"""Half-width of a share from which on no decimal is printed."""
+
+SMALL = 0.005
+"""Share below which, half-width included, an input is listed without a number."""
+
 
 def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
@@ -54,7 +63,7 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
 
 def _first(names: list[str], falls: np.ndarray, errors: np.ndarray, prices: np.ndarray) -> str:
     """Which inputs to tighten first, three at most: those that bring most, or most for what it costs where that is known."""
-    brings = falls > HALF_WIDTH * errors
+    brings = falls > np.maximum(HALF_WIDTH * errors, WORTH)
     known = prices.size and bool((prices[brings] > 0.0).all())
     merit = falls / np.where(prices > 0.0, prices, 1.0) if known else falls
     chosen = [k for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED]
@@ -85,7 +94,7 @@ def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     text += f"({int(own['tried'])} simulations"
     if np.isfinite(corner) and corner < value:
         text += f"; {quantity(corner, unit)} at their corners"
-    text += "; a search finds a lower limit)"
+    text += "; the largest value found is a lower bound of the worst case)"
     loose = [str(one) for one in own["input"].to_numpy()[own["without_bounds"].to_numpy() != 0]]
     if loose:
         text += f". Without bounds, taken within three standard deviations: {', '.join(loose)}"
@@ -94,12 +103,19 @@ def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
 
 def _listed(parts: list[tuple[str, float, float]]) -> str:
     """Names with shares and half-widths, the largest first."""
-    ranked = sorted(parts, key=lambda one: -one[1])
-    return ", ".join(share(name, value, HALF_WIDTH * error) for name, value, error in ranked)
+    ranked = [(n, v, HALF_WIDTH * e) for n, v, e in sorted(parts, key=lambda one: -one[1])]
+    small = [name for name, value, width in ranked if value + width < SMALL]
+    shown = [share(*one) for one in ranked if one[0] not in small]
+    return ", ".join([*shown, *[f"{', '.join(small)} below {SMALL:.1%}"] * bool(small)])
 
 
 def share(name: str, value: float, half_width: float) -> str:
     """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
     if value > half_width:
-        return f"{name} {value:.0%} ± {half_width:.1%}"
+        places = 0 if half_width >= COARSE else 1
+        step = 10.0 ** -(places + 2)
+        shown = (
+            max(np.ceil(half_width / step - 1e-9), 1.0) * step
+        )  # up: it is no narrower than it is
+        return f"{name} {value:.{places}%} ± {shown:.{places}%}"
     return f"{name} below {max(half_width, value):.1%}"

@@ -13,6 +13,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.objectives import Objective
 from hpcclear.base.outcome import Status
+from hpcclear.base.student import student
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.results.names import KINDS
@@ -150,7 +151,7 @@ def _values(samples: xr.Dataset, name: str) -> Array:
 
 def _moments(known: Array, unit: str, drawn: bool) -> list[Line]:
     # loads SciPy, which a page without samples does not need
-    from hpcclear.statistics.random.replicates import moments, student
+    from hpcclear.statistics.random.replicates import moments
 
     mean, deviation = moments(known[:, None])  # each sample is a replicate
     if not drawn or not np.isfinite(mean.value):

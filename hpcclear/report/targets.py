@@ -78,7 +78,7 @@ def sentences(found: xr.Dataset) -> list[str]:
     own = settings(found)
     if own is not None:
         words.append(
-            f"Your settings ({own.words}): error of {own.error:.1e}, {seconds(own.seconds)} of one core per design."
+            f"Your settings ({own.words}): error of {own.error * 100:.2g} %, {seconds(own.seconds)} of one core per design."
         )
     return words
 

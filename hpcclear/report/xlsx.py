@@ -95,7 +95,7 @@ def _sheet(rows: Iterable[Sequence[Any]]) -> str:
     return f'{_HEAD}<worksheet xmlns="{_MAIN}">{_PANE}<sheetData>{lines}</sheetData></worksheet>'
 
 
-def _cell(value: Any) -> str:
+def _cell(value: object) -> str:
     if isinstance(value, int | float):
         return f"<c><v>{value!r}</v></c>" if math.isfinite(value) else "<c/>"
     text = escape(_CONTROL.sub(" ", str(value))[:LONGEST])

@@ -6,7 +6,6 @@ logarithm of the run time and each record is rewritten a few times at most. Resu
 files of plain arrays. Every file carries the key of its run, and only the same run goes on from it.
 """
 
-import json
 import re
 import time
 from collections import Counter
@@ -23,74 +22,17 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
+from hpcclear.results.keys import check_key, key_attribute
 from hpcclear.results.names import designs_in
 
 INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""
 
-KEY = "run_key"
-"""Global attribute with the key of a run, in part, stage and final files."""
-
-_WITHOUT_EFFECT = ("lanes", "ranks")  # in keys of earlier versions; results do not depend on them
 _FANOUT = 8
 _KEPT = 50_000  # samples of a part that stay in memory, too: 20 MB; more are read from its file when they are asked for
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
 _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
 _DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
-
-
-def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
-    """The key of a run as a global attribute, for files that `check_key` is to recognise."""
-    return {KEY: json.dumps(dict(sorted(key.items())), ensure_ascii=False)}
-
-
-def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
-    """Refuse results of another run.
-
-    Parameters
-    ----------
-    content : xarray.Dataset
-        What was read from `place`.
-    key : mapping of str to str
-        What makes this run what it is: scene, version, seed, ...; flattened entries of a scene
-        make the message name the entries that changed.
-    place : Path
-        For the message.
-
-    Raises
-    ------
-    InputError
-        The keys differ; the message lists where.
-    """
-    found = key_of(content)
-    differ = [name for name in sorted({*found, *key}) if found.get(name) != key.get(name)]
-    if differ:
-        shown = [
-            f"{n}: {_short(found.get(n))} there, {_short(key.get(n))} now" for n in differ[:10]
-        ]
-        more = f"; and {len(differ) - 10} more" if len(differ) > 10 else ""
-        raise InputError(
-            "output",
-            str(place),
-            f"it contains results of another run ({'; '.join(shown)}{more})",
-            "Choose another output, or start a new run beside it with --fresh",
-        )
-
-
-def key_of(content: xr.Dataset) -> dict[str, object]:
-    """The key of the run that made a dataset; empty where it carries none, as a single response."""
-    try:
-        found = json.loads(str(content.attrs.get(KEY, "{}")))
-    except (ValueError, RecursionError):
-        return {}
-    if not isinstance(found, dict):
-        return {}
-    return {name: value for name, value in found.items() if name not in _WITHOUT_EFFECT}
-
-
-def _short(value: object) -> str:
-    text = "nothing" if value is None else str(value)
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def unfinished(directory: Path) -> bool:

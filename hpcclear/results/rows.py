@@ -97,10 +97,17 @@ def fit(*dims: str) -> Columns:
     return {
         "r2": number(dims, "1", "1 - SSE/SST on test points", required=True),
         "rmae": number(
-            dims, "1", "largest test error over their standard deviation", required=True
+            dims,
+            "1",
+            "largest test error / standard deviation of test values",
+            required=True,
         ),
         "r2_explained": number(dims, "1", "explained variance ratio, eq. 26 as printed"),
-        "rmae_mean": number(dims, "1", "largest test error over their mean, eq. 27 as printed"),
+        "rmae_mean": number(
+            dims,
+            "1",
+            "largest test error / mean of test values, eq. 27 as printed",
+        ),
         "rmse": number(dims, "objective", "root mean square error on test points"),
         "points": count(dims, "number of points fitted"),
     }

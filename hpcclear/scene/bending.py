@@ -12,9 +12,9 @@ class Bending(Table):
     stiffness: Annotated[float, Quantity("N*m**2", above=0)]
     """Bending stiffness E I in the plane, N m2: Young's modulus times second moment of the section."""
     modes: Annotated[int, Count(least=1, most=4)] = 2
-    """How many: half waves along the bar."""
+    """Number of bending modes; mode i has i half waves along the bar."""
     damping: Annotated[float, Quantity("", least=0, below=1)] = 0.0
-    """Structural damping of each mode, over critical."""
+    """Structural damping of each mode, relative to critical damping."""
 
 
 def check_bars(planar: Any) -> None:

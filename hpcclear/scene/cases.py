@@ -9,16 +9,16 @@ from hpcclear.scene.named import NAME
 
 
 class Case(Table):
-    """One optimisation: which of the random inputs are random in it."""
+    """One optimisation, with the random inputs that vary in it."""
 
     name: str
     random: tuple[str, ...]
-    """Names of `[study.random]`; what is left out has its design's value."""
+    """Names of the inputs in `[study.random]` that are random. All others have the value of the design."""
     objectives: tuple[Goal, ...] | None = None
-    """The things that are made small, one to five; default "mean" and "deviation" of f. A word stands for a statistic without
-    further entries."""
+    """Objectives to minimise, one to five; default "mean" and "deviation" of f. The name of a statistic alone suffices
+    if it needs no further entry."""
     constraints: tuple[Constraint, ...] | None = None
-    """What its designs must keep to."""
+    """Constraints on the designs of the case."""
 
     @model_validator(mode="after")
     def _named(self) -> "Case":

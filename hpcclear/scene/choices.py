@@ -30,17 +30,17 @@ OF_INPUT = {
 
 
 class Row(Table):
-    """A row of a catalogue: what all its entries are if it is chosen."""
+    """A row of a catalogue: the values of all entries if it is chosen."""
 
     name: str
     cost: Annotated[float, Quantity("")] | None = None
-    """Of this row, in any unit that all costs of the study share."""
+    """Cost of this row, in one unit for all costs of the study."""
     entries: dict[str, float | str]
-    """By paths: numbers of the scene, SI, and entries of random inputs."""
+    """Values by path: numbers of the scene, SI, and entries of random inputs."""
 
     @model_validator(mode="before")
     @classmethod
-    def _gathered(cls, data: Any) -> Any:
+    def _gathered(cls, data: object) -> Any:
         """Paths beside the name, as a file has them, as `entries` in SI."""
         if not isinstance(data, Mapping) or "entries" in data:
             return data

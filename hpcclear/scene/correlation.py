@@ -22,10 +22,10 @@ LEAST_EIGENVALUE = 1e-10
 
 
 class Correlation(Table):
-    """Which random inputs vary together, and how closely; all others are independent."""
+    """Correlation of random inputs. Inputs that it does not name are independent."""
 
     inputs: tuple[str, ...]
-    """Random inputs, in the order of the rows of the matrix."""
+    """Random inputs in the order of the rows of the matrix."""
     matrix: tuple[tuple[Entry, ...], ...]
     """Correlations, symmetric with ones along the diagonal."""
     measure: Literal["normal", "rank"] = "normal"

@@ -20,25 +20,25 @@ _GRADES = re.compile(r"[A-Za-z]{1,2}(\d+)\s*/\s*[A-Za-z]{1,2}(\d+)\s*$")
 
 
 class Cost(Table):
-    """A cost that falls with the value, or one for each option."""
+    """A cost that decreases with the value, or one cost for each option."""
 
     law: Literal["reciprocal", "exponential"] | None = None
     """"reciprocal": fixed + cost (at / value)^power; "exponential": fixed + cost exp((at - value) / scale)."""
     at: float | None = None
-    """A value, SI, and there `cost`."""
+    """Reference value, SI, at which the cost is `cost`."""
     cost: Annotated[float, _COST] | None = None
-    """Beside `fixed`, at the value `at`."""
+    """Cost at the reference value `at`, in addition to `fixed`."""
     fixed: Annotated[float, Quantity("")] = 0.0
-    """What it costs in any case."""
+    """Cost that does not depend on the value."""
     power: Annotated[float, Quantity("", above=0, most=10)] = 1.0
-    """Of "reciprocal"."""
+    """Exponent of the law "reciprocal"."""
     scale: float | None = None
-    """Of "exponential": by how much wider it costs 1/e, SI."""
+    """For the law "exponential": increase of the value that reduces the cost to 1/e, SI."""
     options: tuple[float, ...] | None = None
-    """Of each option of the variable, in their order."""
+    """Cost of each option of the variable, in their order."""
 
     @classmethod
-    def in_si(cls, given: Any, unit: str, fits: Sequence[Any] = ()) -> Any:
+    def in_si(cls, given: object, unit: str, fits: Sequence[object] = ()) -> Any:
         """A cost as a file has it, as the entries of this table: a list for all options, for fits a table by IT grades; errors
         for validators."""
         if isinstance(given, (list, tuple)):
@@ -90,7 +90,7 @@ class Cost(Table):
         return self.fixed + self.cost * np.exp((self.at - values) / self.scale)
 
 
-def _converted(given: Sequence[Any]) -> list[float]:
+def _converted(given: Sequence[object]) -> list[float]:
     found = []
     for k, one in enumerate(given):
         try:
@@ -101,7 +101,7 @@ def _converted(given: Sequence[Any]) -> list[float]:
     return found
 
 
-def _by_grades(given: Mapping[str, Any], fits: Sequence[Any]) -> list[float]:
+def _by_grades(given: Mapping[str, object], fits: Sequence[object]) -> list[float]:
     """Costs of fits: that of the hole's grade and that of the shaft's."""
     found = []
     for fit in fits:

@@ -6,7 +6,7 @@ from typing import Any
 from hpcclear.plugins.sources import digest
 from hpcclear.scene.mechanism import Mechanism, TorqueDrive, slender_inertia
 from hpcclear.scene.paths import flatten
-from hpcclear.scene.planar import Planar, PlanarSlide
+from hpcclear.scene.planar import Planar
 from hpcclear.scene.plausibility import implausible
 from hpcclear.scene.tables import SceneTables
 
@@ -45,16 +45,13 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     if isinstance(scene.mechanism, Planar):
         for row in (*scene.mechanism.drives, *scene.mechanism.loads):
             yield f"{row.kind} {row.name}"
-        for guide in scene.mechanism.joints:
-            if isinstance(guide, PlanarSlide) and guide.friction is not None:
-                yield f"friction of guide {guide.name}, coefficient {guide.friction.coefficient:g}"
     if effects.gravity != 0:
         yield f"gravity {effects.gravity:g} m/s2"
     if effects.slider_load is not None:
         shape = "constant" if isinstance(effects.slider_load, float) else "against crank angle"
         yield f"slider load, {shape}"
-    if effects.guide_friction is not None:
-        yield f"guide friction, coefficient {effects.guide_friction.coefficient:g}"
+    for words, coefficient in scene.joint_frictions().values():
+        yield f"{words}, coefficient {coefficient:g}"
     if scene.numerics.formulation == "baumgarte":
         yield "Lagrange multipliers with Baumgarte feedback"
     if scene.numerics.energy:

@@ -63,7 +63,7 @@ def _weibull(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     return quantiles.weibull(entries["scale"], entries["shape"], location, *_ends(entries))
 
 
-def _worn(entries: Mapping[str, Any]) -> quantiles.Quantiles:
+def _worn(entries: Mapping[str, object]) -> quantiles.Quantiles:
     raise InputError(
         f"study.random.{entries['name']}.distribution", "wear",
         "is known only after the wear simulation of [wear], which `hpcclear run` does first",
@@ -113,7 +113,7 @@ def form_of(name: str, parameters: Mapping[str, float]) -> Form:
     return Form(frozenset(), OF_LIMITS | {"parameters"}, law)
 
 
-def converted(name: str, parameters: Mapping[str, Any], unit: str) -> dict[str, float]:
+def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[str, float]:
     """Parameters of a distribution from elsewhere as numbers: texts in the unit of its input, scipy's shapes in none."""
     found = {}
     for key, value in parameters.items():
@@ -129,7 +129,7 @@ def converted(name: str, parameters: Mapping[str, Any], unit: str) -> dict[str, 
 
 
 def _of_scipy(
-    own: str, parameters: Mapping[str, float], entries: Mapping[str, Any]
+    own: str, parameters: Mapping[str, float], entries: Mapping[str, object]
 ) -> quantiles.Cut:
     from scipy import stats
 

@@ -14,7 +14,7 @@ from hpcclear.scene.fields import (
     check_one_of,
     invalid,
 )
-from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad
+from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad, by_time
 from hpcclear.scene.places import Angle, PairTable
 
 Turns = Annotated[int, Count(least=1, most=64)]
@@ -51,6 +51,24 @@ def check_torque(drive: Any) -> None:
         )  # fmt: skip
 
 
+def check_by(load: Any, entry: str) -> None:
+    """Refuse a load whose table goes by two things, or has no table to go by them; raises PydanticCustomError."""
+    timed = getattr(load, f"{entry}_by_time")
+    if timed is not None and getattr(load, entry) is not None:
+        raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
+    if load.angle_of is not None and not isinstance(getattr(load, entry), tuple):
+        reason = f"there is no table of {entry} against an angle"
+        raise invalid(reason, "Remove it", key="angle_of", value=load.angle_of)
+    if load.repeats and timed is None:
+        raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
+    if load.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
+        raise invalid(
+            "a table that repeats begins at 0 s, and ends at the value with which it begins",
+            "Make its first and last value equal",
+            key=f"{entry}_by_time",
+        )
+
+
 def speed_entry(drive: Any) -> str:
     """The entry of a drive that gives its speed: `speed`, or of a torque `expected_speed` or `initial_speed`."""
     if hasattr(drive, "speed"):
@@ -64,33 +82,35 @@ class PlanarSpeed(Table):
     name: str
     kind: Literal["constant-speed"]
     body: str
-    """That turns."""
+    """Body that rotates."""
     speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
-    """rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
+    """Angular speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions per minute."""
     period: bool = False
-    """Whether its turn is the revolution; the first drive is, where none says so."""
+    """Whether one turn of this drive defines the revolution. Default: true for the first drive if no drive has this
+    entry."""
     turns: Turns = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
-    360 degrees or more begins in the second."""
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
+    `start_angle` of 360 degrees or more begins in the second turn."""
 
 
 class PlanarHarmonic(Table):
-    """A body swings: mean + amplitude sin(2 pi frequency t + phase)."""
+    """A body oscillates: mean + amplitude sin(2 pi frequency t + phase)."""
 
     name: str
     kind: Literal["harmonic"]
     body: str
-    """That swings."""
+    """Body that oscillates."""
     amplitude: Angle
-    """rad."""
+    """Amplitude, rad."""
     frequency: Annotated[float, Quantity("Hz", above=0)]
-    """Swings a second, Hz; of an angular speed such as "1200 rpm", its turns."""
+    """Oscillations per second, Hz. For an angular speed such as "1200 rpm": turns per second."""
     mean: Angle = 0.0
-    """rad."""
+    """Mean angle, rad."""
     phase: Angle = 0.0
-    """rad."""
+    """Phase at time 0, rad."""
     period: bool = False
-    """Whether its swing is the revolution; the first drive is, where none says so."""
+    """Whether one oscillation of this drive defines the revolution. Default: true for the first drive if no drive has
+    this entry."""
 
 
 class PlanarTable(Table):
@@ -99,12 +119,14 @@ class PlanarTable(Table):
     name: str
     kind: Literal["table"]
     body: str
-    """That is moved."""
+    """Body that is moved."""
     angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
-    """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats at the last time, where the angle is the first
-    one, or a turn more or (clockwise) less. A cubic spline lies between, smooth where it repeats."""
+    """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats from the last time on. The last angle equals
+    the first one, or differs from it by one turn (plus: counter-clockwise, minus: clockwise). Values in between follow
+    a periodic cubic spline."""
     period: bool = False
-    """Whether the table's span is the revolution; the first drive is, where none says so."""
+    """Whether the period of this table defines the revolution. Default: true for the first drive if no drive has this
+    entry."""
 
 
 class PlanarTorque(Table):
@@ -113,25 +135,27 @@ class PlanarTorque(Table):
     name: str
     kind: Literal["torque"]
     body: str
-    """That the torque turns, against the ground."""
+    """Body on which the torque acts; the reaction acts on the ground."""
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
-    """N m, constant or against the angle of the body that gives the period."""
+    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
     torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
-    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m, straight from row
-    to row and level beyond."""
+    """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
+    between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
-    """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
+    """Speed at which the torque is 0, rad/s. The torque decreases linearly with the speed, as that of a motor. Without
+    it the torque does not depend on the speed."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
-    """rad/s; 0 starts from rest."""
+    """Angular speed at the start, rad/s; 0: from rest."""
     expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
-    """About how fast it will turn, rad/s, from rest needed: tolerances and the first step go by it; else by `initial_speed`."""
+    """Approximate speed to expect, rad/s. Tolerances and the first step are scaled by it, or by `initial_speed` if it
+    is missing. Required for a start from rest."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    """Inertia that turns with the body, kg m2."""
+    """Moment of inertia of a flywheel on the body, kg m2."""
     period: bool = False
-    """Whether a turn of the body is the revolution; the first drive is, where none says so."""
+    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
     turns: Turns = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns; a `start_angle` of
-    360 degrees or more begins in the second."""
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
+    `start_angle` of 360 degrees or more begins in the second turn."""
 
     @model_validator(mode="after")
     def _started(self) -> "PlanarTorque":
@@ -140,18 +164,49 @@ class PlanarTorque(Table):
         return self
 
 
+class PlanarRunUp(Table):
+    """A body turns at a prescribed speed that depends on time, such as a run-up, independent of the torque that this
+    requires."""
+
+    name: str
+    kind: Literal["run-up"]
+    body: str
+    """Body that rotates."""
+    speed_by_time: Annotated[Any, by_time("rad/s")]
+    """``[[time, speed], ...]``, s and rad/s, from 0 s on. Speeds are not negative, and the last one is positive. Values
+    in between follow a monotone cubic with zero slope at both ends; after the last row the speed is constant."""
+    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
+    """Moment of inertia of a flywheel on the body, kg m2."""
+    period: bool = False
+    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
+    turns: Turns = 1
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    @model_validator(mode="after")
+    def _forward(self) -> "PlanarRunUp":
+        speeds = [speed for _, speed in self.speed_by_time]
+        if min(speeds) < 0.0 or min(speeds[1:]) == 0.0:
+            raise invalid(
+                "the speed falls to 0 or below, where no revolution would end",
+                "Give speeds above 0 from the second row on",
+                key="speed_by_time",
+            )
+        return self
+
+
 PlanarDrive = Annotated[
-    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque, Field(discriminator="kind")
+    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp,
+    Field(discriminator="kind"),
 ]
 
 
 class Components(PairTable):
-    """A force by its components along the ground's axes; ``[x, y]`` is the same."""
+    """A force by its components along the ground's axes, N. ``[x, y]`` is a short form."""
 
     x: Annotated[float, Quantity("N")]
-    """N."""
+    """x component, N."""
     y: Annotated[float, Quantity("N")]
-    """N."""
+    """y component, N."""
 
 
 class ForceLoad(Table):
@@ -160,20 +215,28 @@ class ForceLoad(Table):
     name: str
     kind: Literal["force"]
     place: str
-    """``body.point`` that the force acts on."""
+    """``body.point`` on which the force acts."""
     force: Components | None = None
     size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
-    """N along `direction`, constant or against the angle of the body that gives the period: from the x axis, counter-clockwise,
-    `start_angle` included, whichever way it turns."""
+    """Force along `direction`, N; constant, or a table against the angle of the body that defines the period. The angle
+    is measured counter-clockwise from the x axis and includes `start_angle`, for both directions of rotation."""
+    size_by_time: Annotated[Any, by_time("N")] | None = None
+    """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether the table over time repeats after its last row."""
+    angle_of: str | None = None
+    """Another body against whose angle the table of `size` is read; it repeats with each turn of that body."""
     direction: Angle = 0.0
-    """From the ground's x axis, rad."""
+    """Angle of the force from the ground's x axis, rad."""
     follows: Annotated[bool, Field(strict=True)] = False
-    """Whether the force turns with the body: components and direction are then those in its own axes."""
+    """Whether the force rotates with the body. Components and direction then refer to the axes of the body."""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "ForceLoad":
         force = None if self.force is None else [self.force.x, self.force.y]
-        check_one_of("force", force, self.size, "Write force = [x, y], or size and direction")
+        size = self.size if self.size is not None else self.size_by_time
+        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
+        check_by(self, "size")
         return self
 
 
@@ -183,9 +246,23 @@ class TorqueLoad(Table):
     name: str
     kind: Literal["torque"]
     body: str
-    """That the torque acts on, against the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)]
-    """N m, constant or against the angle of the body that gives the period."""
+    """Body on which the torque acts; the reaction acts on the ground."""
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
+    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
+    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
+    """Instead of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on; smooth between the rows, constant after the
+    last."""
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether the table over time repeats after its last row."""
+    angle_of: str | None = None
+    """Another body against whose angle the table of `torque` is read; it repeats with each turn of that body."""
+
+    @model_validator(mode="after")
+    def _by_one(self) -> "TorqueLoad":
+        check_by(self, "torque")
+        remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
+        check_one_of("torque", self.torque, self.torque_by_time, remedy)
+        return self
 
 
 class SpringLoad(Table):
@@ -198,13 +275,14 @@ class SpringLoad(Table):
     second: str
     """``body.point``, or ``ground.point``."""
     stiffness: Annotated[float, Quantity("N/m", least=0)]
-    """N/m."""
+    """Stiffness, N/m."""
     length: Annotated[float, Quantity("m", least=0)] = 0.0
-    """At which it pulls and pushes nothing, m."""
+    """Length at which the spring exerts no force, m."""
     damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
-    """N s/m, along the line between both points."""
+    """Damping along the line between both points, N s/m."""
     acts: Literal["both", "pushing", "pulling"] = "both"
-    """Whether it acts on both sides of its length, only within it, as a buffer or an end stop, or only beyond it, as a rope."""
+    """Range in which the spring acts: "both" sides of its length; "pushing": only when shorter, as a buffer or end
+    stop; "pulling": only when longer, as a rope."""
 
 
 PlanarLoad = Annotated[

@@ -16,17 +16,19 @@ class Contact(LawTable):
     kind: ClassVar[str] = "contact"
     formula: ClassVar[str] = "force"
     law: str
-    """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
+    """Name of a law (`hpcclear laws` lists them), "module:name" of a file beside the scene, or "expression"."""
     geometry: str | None = None
-    """Shapes that touch: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or "table"."""
+    """Geometry of the contact: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or
+    "table"."""
     curve: Annotated[Any, Law("m", "N")] | None = None
-    """The geometry "table": ``[[depth, force], ...]``, m and N, both rising from 0."""
+    """For the geometry "table": ``[[depth, force], ...]``, m and N, both increasing from 0."""
     minimum_impact_speed: Speed = 1e-3
     """Lower bound of the impact velocity in the damping, m/s."""
     force: str | None = None
-    """The law "expression": the force in N of depth d, its rate v, Hertz' stiffness K, the impact speed v0 and parameters."""
+    """For the law "expression": force in N as a function of depth d, its rate v, Hertz stiffness K, impact velocity v0
+    and parameters."""
     units: dict[str, str] | None = None
-    """The law "expression": units of its parameters, which are further entries of this table."""
+    """For the law "expression": units of its parameters. The parameters are further entries of this table."""
 
     @field_validator("geometry")
     @classmethod
@@ -57,11 +59,11 @@ class Friction(LawTable):
     kind: ClassVar[str] = "friction"
     formula: ClassVar[str] = "ratio"
     law: str = "none"
-    """A law's name (`hpcclear laws` lists them); "module:name" of a file beside the scene; or "expression"."""
+    """Name of a law (`hpcclear laws` lists them), "module:name" of a file beside the scene, or "expression"."""
     ratio: str | None = None
-    """The law "expression": friction over normal force, of the sliding speed v and parameters."""
+    """For the law "expression": friction / normal force as a function of the sliding speed v and parameters."""
     units: dict[str, str] | None = None
-    """The law "expression": units of its parameters, which are further entries of this table."""
+    """For the law "expression": units of its parameters. The parameters are further entries of this table."""
 
     @property
     def bristled(self) -> bool:
@@ -79,19 +81,19 @@ class GuideFriction(Table):
 
 
 class Effects(Table):
-    """What acts on the mechanism; what is off is not computed."""
+    """Effects that act on the mechanism. Disabled effects are not computed."""
 
     contact: Contact | None = None
-    """Normal contact force; needed as soon as a joint has clearance."""
+    """Law of the normal contact force. Required if any joint has clearance."""
     friction: Friction = Friction()
-    """Friction in the clearance joints; "none" or left out is off."""
+    """Friction in the joints with clearance; default "none"."""
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
-    """m/s2, towards -y; 0 is off."""
+    """Acceleration of gravity towards -y, m/s2; 0: disabled."""
     slider_load: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
-    """N, positive along +x; constant or ``[[crank angle, force], ...]`` over the turns of a revolution; "none" or
-    left out is off."""
+    """Force on the slider, positive along +x, N; constant or ``[[crank angle, force], ...]`` over the turns of a
+    revolution; default "none"."""
     guide_friction: GuideFriction | None = None
-    """Friction of the slider in its guide; "none" or left out is off."""
+    """Friction of the slider in its guide; default "none"."""
 
     def law_unit(self, path: str) -> str | None:
         """Return the unit of a parameter of the scene's own laws by its path; None for any other entry."""
@@ -103,7 +105,7 @@ class Effects(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _none_is_off(cls, data: Any) -> Any:
+    def _none_is_off(cls, data: object) -> Any:
         if not isinstance(data, Mapping):
             return data
         for key in ("friction", "guide_friction"):

@@ -41,7 +41,7 @@ def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
         raise invalid("is given twice or not at all", remedy, key=key, value=value)
 
 
-def check_table(data: Any) -> None:
+def check_table(data: object) -> None:
     """Raise an error for validators unless this is a table whose keys are strings."""
     if not isinstance(data, Mapping):
         raise invalid("a table is expected here", "Write it as [table] or { key = value }")
@@ -53,7 +53,7 @@ def check_table(data: Any) -> None:
 class Table(BaseModel):
     """A table of the scene file: frozen, and closed against unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Keys that a user might expect here and that belong to another kind: reason and remedy."""
@@ -76,12 +76,12 @@ class Table(BaseModel):
 class Converted:
     """What an entry is made into: an annotation whose `convert` is pydantic's validator."""
 
-    def convert(self, value: Any) -> Any:
+    def convert(self, value: object) -> Any:
         """The value as the scene holds it; raises PydanticCustomError."""
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
+        self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.convert)
 
@@ -99,7 +99,7 @@ class Quantity(Converted):
     why: str = ""
     nonzero: bool = False
 
-    def convert(self, value: Any) -> float:
+    def convert(self, value: object) -> float:
         """The value in SI; raises PydanticCustomError."""
         number = self.number(value)
         if not self.holds(number):
@@ -108,7 +108,7 @@ class Quantity(Converted):
             )
         return number
 
-    def number(self, value: Any) -> float:
+    def number(self, value: object) -> float:
         """The value in SI, finite, bounds not looked at."""
         if isinstance(value, str):
             try:
@@ -184,7 +184,7 @@ class Count(Converted):
     least: int = 0
     most: int = LARGEST_COUNT
 
-    def convert(self, value: Any) -> int:
+    def convert(self, value: object) -> int:
         """The value; raises PydanticCustomError."""
         remedy = f"Write a whole number from {self.least} to {self.most}"
         if isinstance(value, float) and value.is_integer():
@@ -229,7 +229,7 @@ class CurveOf(Converted):
     unit: str
     cycles: bool = False
 
-    def convert(self, value: Any) -> Curve:
+    def convert(self, value: object) -> Curve:
         """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
         if isinstance(value, Mapping) and "file" in value:
             raise invalid(
@@ -291,7 +291,7 @@ LEAST_ROWS = 4
 class MotionTable(Converted):
     """A motion that repeats, ``[[time, angle], ...]`` in s and rad, from time 0 on."""
 
-    def convert(self, value: Any) -> tuple[tuple[float, float], ...]:
+    def convert(self, value: object) -> tuple[tuple[float, float], ...]:
         """Pairs in (s, rad); raises PydanticCustomError."""
         remedy = "Write pairs [[time, angle], ...] from 0 s to where the motion repeats"
         if not isinstance(value, (list, tuple)) or not LEAST_ROWS <= len(value) <= LONGEST_CURVE:
@@ -328,7 +328,7 @@ class MotionTable(Converted):
 class NamedRows:
     """A table of named rows, kept in file order as a tuple, because a dict would not be frozen."""
 
-    def rows(self, value: Any) -> Any:
+    def rows(self, value: object) -> Any:
         """``{name: {...}}`` as ``[{"name": name, ...}]``."""
         if isinstance(value, Mapping):
             rows: list[Any] = []
@@ -348,7 +348,7 @@ class NamedRows:
         raise invalid("a table is expected here", "Write it as [table] or { key = value }")
 
     def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
+        self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.rows, handler(source))
 

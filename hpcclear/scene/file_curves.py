@@ -25,8 +25,10 @@ FINEST = math.radians(0.1)
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
 """Units of gauge pressures."""
 _VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
+_MOTIONS = {"angle": "rad", "speed": "rad/s"}
 _HINTS = {
     "angle": ("angle", "deg", "phi", "φ", "crank", "winkel", "kw", "ca", "theta", "θ"),
+    "speed": ("speed", "drehzahl", "omega", "n"),
     "time": ("time", "zeit", "t"),
     "pressure": ("pressure", "druck", "p_", "p"),
     "force": ("force", "kraft", "f"),
@@ -39,13 +41,15 @@ class FileCurve(Table):
     """A curve from a file: CSV or Excel workbook, in place of a table ``[[angle, value], ...]``."""
 
     file: str
-    """Relative to the scene file; "book.xlsx#Sheet" for one of several sheets."""
+    """Path relative to the scene file; "book.xlsx#Sheet" for one of several sheets."""
     angle: str | None = None
-    """Unit or heading of the crank angles; left out, what the headings say."""
+    """Unit or heading of the crank angles. Without it the headings of the file are used."""
     time: str | None = None
-    """Of a drive's motion: unit or heading of the times."""
+    """For tables over time: unit or heading of the times."""
+    speed: str | None = None
+    """For a run-up: unit or heading of the speeds."""
     pressure: str | None = None
-    """Unit or heading of pressures, which push on a piston of that `bore`."""
+    """Unit or heading of pressures on a piston of diameter `bore`."""
     force: str | None = None
     """Unit or heading of forces."""
     torque: str | None = None
@@ -53,14 +57,15 @@ class FileCurve(Table):
     bore: PositiveLength | None = None
     """Diameter of the piston, m."""
     area: Annotated[float, Quantity("m**2", above=0)] | None = None
-    """In place of `bore`: the area that the pressure pushes on, m2."""
+    """Instead of `bore`: area on which the pressure acts, m2."""
     ambient: Annotated[float, Quantity("Pa", least=0)] | None = None
-    """Pressure on the other side of the piston, Pa, needed with pressures: 0 where those of the file are gauge pressures."""
+    """Pressure on the other side of the piston, Pa. Required with pressures; 0 if the file contains gauge pressures."""
     pushes: Literal["+x", "-x"] | None = None
-    """Of the load on a slider: where the pressure pushes it; unless said otherwise "-x", away from a cylinder head beyond its
-    outer dead centre."""
+    """Direction in which the pressure pushes a slider; default "-x", away from a cylinder head beyond the outer dead
+    centre."""
     zero: Annotated[float, Quantity("rad")] = 0.0
-    """Crank angle of the scene at which the file has 0, rad: that of the dead centre it counts from."""
+    """Crank angle of the scene at which the angle of the file is 0, rad: that of the dead centre from which the file
+    counts."""
     clockwise: bool = False
     """Whether the angles of the file count clockwise."""
 
@@ -141,12 +146,16 @@ def pairs_of(
     return [[float(a), float(v)] for a, v in zip(angles, values, strict=True)], shown
 
 
-def motion_of(curve: FileCurve, folder: Path, key: str) -> tuple[list[list[float]], str]:
-    """The pairs of a drive's motion, s and rad, as `pairs_of` does."""
+def against_time(
+    curve: FileCurve, folder: Path, unit: str, key: str
+) -> tuple[list[list[float]], str]:
+    """The pairs of a curve against the time, s and `unit`, as `pairs_of` does; the motion of a drive begins at 0 s."""
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
+    kind = next(name for name, own in {**_VALUES, **_MOTIONS}.items() if own == unit)
     first, times = _column(sheet, "time", curve.time, "s", key, ())
-    _, angles = _column(sheet, "angle", curve.angle, "rad", key, (first,))
-    made = np.column_stack([times - times[0], angles]).tolist()
+    _, values = _column(sheet, kind, getattr(curve, kind), unit, key, (first,))
+    start = times[0] if kind in _MOTIONS else 0.0
+    made = np.column_stack([times - start, values]).tolist()
     return made, f"{sheet.found}, {len(times)} rows"
 
 

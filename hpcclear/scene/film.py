@@ -7,17 +7,17 @@ from hpcclear.scene.laws import LawName, our_laws
 
 
 class Film(Table):
-    """Oil between journal and bearing: a film that carries until the surfaces touch."""
+    """Oil film between journal and bearing. It carries the load until the surfaces touch."""
 
     viscosity: Annotated[float, Quantity("Pa*s", least=0, most=1e4)]
-    """Dynamic viscosity at the temperature that the bearing runs at, Pa s."""
+    """Dynamic viscosity at the operating temperature of the bearing, Pa s."""
     length: PositiveLength
-    """Of the bearing, at right angles to the plane, m."""
+    """Length of the bearing along its axis, m."""
     model: Annotated[str, LawName("film")]
-    """How Reynolds' equation is solved: for bearings that are short beside their diameter (Ocvirk), long (Sommerfeld), or of
-    their own length, once a bearing."""
+    """Solution of Reynolds' equation: for bearings much shorter than their diameter ("short", Ocvirk), much longer
+    ("long", Sommerfeld), or for the actual length ("finite", solved once per bearing)."""
     roughness: PositiveLength = 1e-6
-    """Of both surfaces together, m: how thin the film is where they touch."""
+    """Combined roughness of both surfaces, m: the film thickness at which they touch."""
 
     @property
     def law(self) -> Any:

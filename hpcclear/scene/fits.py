@@ -25,22 +25,22 @@ class Tolerance(Table):
     """Diameters of a bore or a pin: limits of size, and the distribution within them."""
 
     range: tuple[float, float] | None = None
-    """Smallest and largest diameter, m; left out, those of the fit."""
+    """Smallest and largest diameter, m; default: those of the fit."""
     distribution: Literal["normal", "uniform"] = "normal"
-    """Of the diameters."""
+    """Distribution of the diameters."""
     cp: Annotated[float, Quantity("", above=0)] = 1.0
-    """Capability of a normal distribution: width of the tolerance over six standard deviations."""
+    """Capability of a normal distribution: width of the tolerance divided by six standard deviations."""
     cpk: Annotated[float, Quantity("")] | None = None
-    """Capability with the mean off the middle: its distance from the nearer limit over three standard deviations; like `cp`
-    unless given."""
+    """Capability of a distribution that is not centred: distance of its mean from the nearer limit of size, divided by
+    three standard deviations; default: `cp`."""
     towards: Literal["upper", "lower"] | None = None
-    """Limit towards which the mean is off, where `cpk` is less than `cp`."""
+    """Limit of size towards which the mean is shifted if `cpk` is less than `cp`."""
     inspected: bool = True
-    """Whether parts beyond the limits of size are sorted out."""
+    """Whether parts outside the limits of size are sorted out by inspection."""
 
     @model_validator(mode="before")
     @classmethod
-    def _in_metres(cls, data: Any) -> Any:
+    def _in_metres(cls, data: object) -> Any:
         if not isinstance(data, Mapping) or "range" not in data:
             return data
         ends = data["range"]
@@ -108,7 +108,7 @@ def law_of(entries: Mapping[str, Any]) -> tolerances.Clearance:
     return law
 
 
-def with_clearance(joint: Any) -> Any:
+def with_clearance(joint: object) -> Any:
     """Entries of a joint in the file with `clearance` and `bearing_radius` in place of a fit or a diametral clearance."""
     if not isinstance(joint, Mapping):
         return joint

@@ -11,7 +11,7 @@ from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
 
 
-def with_fits_of_joints(content: Mapping[str, Any]) -> Mapping[str, Any]:
+def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, Any]:
     """The content of a file whose random inputs with distribution "fit" say which: that of the joints that they drive."""
     for name, row, joints in _rows_of_fits(content):
         if "fit" in row or not joints:
@@ -22,7 +22,7 @@ def with_fits_of_joints(content: Mapping[str, Any]) -> Mapping[str, Any]:
     return content
 
 
-def with_shares(content: Mapping[str, Any]) -> Mapping[str, Any]:
+def with_shares(content: Mapping[str, object]) -> Mapping[str, Any]:
     """The content of a file with `half_width = "3 %"` of its random inputs as that share of the number that they scatter about;
     where the study varies that, it stays a share, and the input is `relative`.
 
@@ -65,14 +65,14 @@ def with_shares(content: Mapping[str, Any]) -> Mapping[str, Any]:
     return content
 
 
-def _number(content: Mapping[str, Any], path: str) -> Any:
+def _number(content: Mapping[str, object], path: str) -> Any:
     """What a file has at a path, a clearance by its fit, too."""
     owner, _, leaf = path.rpartition(".")
     table = _at(content, owner)
     return with_clearance(table).get(leaf) if isinstance(table, Mapping) else None
 
 
-def entry_replaced(content: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+def entry_replaced(content: Mapping[str, object], path: str, value: object) -> dict[str, Any]:
     """The content of a scene with an entry replaced, and without what it stands in place of: a fit takes a clearance's."""
     owner, _, leaf = path.rpartition(".")
     before = _at(content, owner)
@@ -90,14 +90,14 @@ def entry_replaced(content: Mapping[str, Any], path: str, value: Any) -> dict[st
     return made
 
 
-def _at(content: Any, path: str) -> Any:
+def _at(content: object, path: str) -> Any:
     for key in path.split("."):
         content = content.get(key) if isinstance(content, Mapping) else None
     return content
 
 
 def _rows_of_fits(
-    content: Mapping[str, Any],
+    content: Mapping[str, object],
 ) -> Iterator[tuple[str, Mapping[str, Any], list[Mapping[str, Any]]]]:
     """Random inputs of the distribution "fit": names, rows, and the open joints whose clearances they drive."""
     rows = _at(content, "study.random")

@@ -9,7 +9,7 @@ from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.units import UnitError, to_si
 
 
-def renewed(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+def renewed(content: Mapping[str, object]) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The tables of a file by the entries of today, and a sentence for each that was read as another one."""
     made, words = dict(content), list[str]()
     _accuracy(made, words)

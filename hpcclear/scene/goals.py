@@ -22,7 +22,7 @@ Level = Annotated[float, Quantity("", above=0, below=1)]
 class ObjectiveName(PluginName):
     """An entry that names an objective."""
 
-    def convert(self, value: Any) -> str:
+    def convert(self, value: object) -> str:
         """The name of one that is there and without fault; raises PydanticCustomError."""
         name = super().convert(value)
         found = self.registry.get(name)
@@ -37,16 +37,17 @@ class Goal(Table):
     """A statistic of f over the random inputs of a case, or a formula of its design variables."""
 
     statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
-    """Of f: its mean, its standard deviation, the value that a share `level` of all machines stays below, or the share of them
-    beyond `limit`. "cost": what the study variables say that the design costs."""
+    """Statistic of f: "mean", "deviation" (standard deviation), "quantile" (value that a fraction `level` of all
+    machines stays below) or "exceedance" (fraction of machines above `limit`). "cost": sum of the costs of the study
+    variables."""
     of: str | None = None
-    """Another response than the objective of the study that the statistic is of, by its name: "peak-contact-force", say."""
+    """Response that the statistic refers to, such as "peak-contact-force"; default: the objective of the study."""
     formula: str | None = None
-    """In place of a statistic: numbers, design variables (SI, as designed) and + - * / **, such as "m2 + m3"."""
+    """Instead of a statistic: a formula of numbers and nominal design variables (SI) with + - * / **, such as "m2 + m3"."""
     level: Level | None = None
-    """Of "quantile": the share that stays below; default 0.95."""
+    """For "quantile": fraction of machines below the value; default 0.95."""
     limit: float | None = None
-    """Of "exceedance": the value of f, SI."""
+    """For "exceedance": threshold of f, SI."""
 
     @model_validator(mode="after")
     def _complete(self) -> "Goal":
@@ -136,16 +137,16 @@ class Goal(Table):
 
 
 class Constraint(Goal):
-    """What a design must keep to."""
+    """A constraint on the designs of a case."""
 
     most: float
-    """The largest value that is allowed, SI; a share for "exceedance"."""
+    """Largest allowed value, SI; for "exceedance" a probability."""
 
 
 MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 
 
-def in_si(case: Any, objective: object, key: str) -> Any:
+def in_si(case: object, objective: object, key: str) -> Any:
     """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
     Raises
@@ -166,7 +167,7 @@ def in_si(case: Any, objective: object, key: str) -> Any:
     return made
 
 
-def _goal(row: Any, unit: str, key: str) -> Any:
+def _goal(row: object, unit: str, key: str) -> Any:
     if isinstance(row, str):
         return {"statistic": row}
     if not isinstance(row, Mapping):

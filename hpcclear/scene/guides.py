@@ -49,21 +49,21 @@ class SliderGuide(OfContacts, Table):
     clearance: PositiveLength
     """Gap on either side of a slider in the middle of its channel, m."""
     length: PositiveLength
-    """Of the slider, along the guide, m; its pin is in the middle."""
+    """Length of the slider along the guide, m. Its pin is in the middle."""
     height: PositiveLength
-    """Of the slider, across the guide, m; the channel is higher by twice the clearance."""
+    """Height of the slider across the guide, m. The channel is higher by twice the clearance."""
     corner_radius: PositiveLength
-    """Radius to which the slider's corners are rounded, m; stiffness follows from it."""
+    """Radius of the slider's rounded corners, m. It determines the contact stiffness."""
     width: PositiveLength | None = None
-    """Of the slider, at right angles to the plane, m; line contact needs it."""
+    """Width of the slider at right angles to the plane, m. Line contact requires it."""
     bearing: Material
-    """Of the channel."""
+    """Material of the channel."""
     journal: Material
-    """Of the slider."""
+    """Material of the slider."""
     start_offset: Length | None = None
-    """How far the slider's middle is to the left of the guide's line at the start, m; in the middle unless said otherwise."""
+    """Distance of the slider's middle from the guide's line at the start, positive to the left, m; default 0."""
     start_tilt: Angle | None = None
-    """Angle of the slider against the line at the start, rad; 0 unless said otherwise."""
+    """Angle between the slider and the line at the start, rad; default 0."""
 
     elsewhere: ClassVar = NOT_OF_GUIDES
 

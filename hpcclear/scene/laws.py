@@ -30,7 +30,7 @@ def _module(name: str) -> Any:
     return importlib.import_module(f"{_HOME}.{name}")
 
 
-def check_objective(objective: Any) -> None:
+def check_objective(objective: object) -> None:
     """An error for validators where an objective is at fault."""
     with as_mended(""):
         _module("objectives").check_objective(objective)
@@ -46,7 +46,7 @@ def as_mended(key: str) -> Iterator[None]:
 
 
 @cache
-def named(law: Any, name: str) -> Any:
+def named(law: object, name: str) -> Any:
     """A user's law with the name that the scene has for it."""
     return dataclasses.replace(law, name=name) if dataclasses.is_dataclass(law) else law  # type: ignore[type-var]
 
@@ -71,7 +71,7 @@ class LawName(Converted):
 
     kind: str
 
-    def convert(self, value: Any) -> str:
+    def convert(self, value: object) -> str:
         """The name, known to be there; raises PydanticCustomError."""
         names = importlib.import_module(_HOME).names(self.kind)
         if value not in names:
@@ -150,7 +150,7 @@ def law_entries(kind: str) -> Iterator[tuple[str, Quantity]]:
 class LawTable(Table):
     """A table with a law and its parameters."""
 
-    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, defer_build=True)
 
     kind: ClassVar[str] = ""
     formula: ClassVar[str] = ""
@@ -179,7 +179,7 @@ class LawTable(Table):
         return {**{k: v for k, v in data.items() if k in cls._own()}, **cls._converted(data, law)}
 
     @classmethod
-    def find(cls, name: str, data: Mapping[str, Any]) -> Any:
+    def find(cls, name: str, data: Mapping[str, object]) -> Any:
         """The law of a name, with what the table says besides; an error for validators where there is none."""
         shape = data.get("geometry")
         if isinstance(shape, str) and shape != SPHERE:
@@ -207,7 +207,7 @@ class LawTable(Table):
         return CONTACT_LAWS if cls.kind == "contact" else FRICTION_LAWS
 
     @classmethod
-    def _of_formula(cls, data: Mapping[str, Any]) -> Any:
+    def _of_formula(cls, data: Mapping[str, object]) -> Any:
         entry = cls.formula
         text, units = data.get(entry), data.get("units", {})
         if not isinstance(text, str):
@@ -310,7 +310,7 @@ class LawTable(Table):
         return made
 
 
-def _curve(data: Mapping[str, Any]) -> Any:
+def _curve(data: Mapping[str, object]) -> Any:
     """Rows of the entry ``curve``, both columns rising from 0, or None; an error for validators."""
     from pydantic_core import PydanticCustomError
 

@@ -1,13 +1,14 @@
 """Tables of loads that follow a law of their own; `hpcclear.dynamics.linkage.loads` has the physics."""
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
 
-from hpcclear.scene.fields import Converted, Quantity, Table, invalid
+from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Converted, Quantity, Table, invalid
 from hpcclear.scene.places import Angle
 
 MOST_ROWS = 16
@@ -21,20 +22,30 @@ class Law(Converted):
     x: str
     unit: str
     constant: bool = False
+    most: int = MOST_ROWS
+    least: float | None = None
+    """Of the first numbers."""
 
-    def convert(self, value: Any) -> Any:
+    def convert(self, value: object) -> Any:
         """A number, or a tuple of pairs in SI; raises PydanticCustomError."""
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
+        if isinstance(value, Mapping) and "file" in value:
+            raise invalid(
+                "files are read where a scene is loaded, and this came another way",
+                "Load a scene with it, or give pairs",
+            )
         remedy = f"Write pairs [[x in {self.x}, y in {self.unit}], ...], x rising"
-        if not isinstance(value, (list, tuple)) or not 2 <= len(value) <= MOST_ROWS:
-            raise invalid(f"a table of 2 to {MOST_ROWS} pairs is expected here", remedy)
+        if not isinstance(value, (list, tuple)) or not 2 <= len(value) <= self.most:
+            raise invalid(f"a table of 2 to {self.most} pairs is expected here", remedy)
         if any(not isinstance(row, (list, tuple)) or len(row) != 2 for row in value):
             raise invalid("every row of a table is a pair", remedy)
         first, second = Quantity(self.x), Quantity(self.unit)
         rows = tuple((first.convert(x), second.convert(y)) for x, y in value)
         if any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
             raise invalid("the first numbers must rise from row to row", "Sort the rows")
+        if self.least is not None and rows[0][0] < self.least:
+            raise invalid(f"the first number is below {self.least:g}", remedy)
         return rows
 
     def __get_pydantic_json_schema__(
@@ -42,11 +53,18 @@ class Law(Converted):
     ) -> dict[str, Any]:
         entry = {"type": ["number", "string"]}
         pair = {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
-        table = {"type": "array", "items": pair, "minItems": 2, "maxItems": MOST_ROWS}
+        table = {"type": "array", "items": pair, "minItems": 2, "maxItems": self.most}
         words = f"[[x in {self.x}, y in {self.unit}], ...]"
         if self.constant:
             return {"anyOf": [entry, table], "description": f"{self.unit}; constant, or {words}"}
+        if self.most > MOST_ROWS:
+            return {"anyOf": [table, OF_FILE], "description": words}
         return {**table, "description": words}
+
+
+def by_time(unit: str) -> Law:
+    """A table against the time in s, from 0 s on, which may come from a file."""
+    return Law("s", unit, most=LONGEST_CURVE, least=0.0)
 
 
 class TorsionSpringLoad(Table):
@@ -55,21 +73,21 @@ class TorsionSpringLoad(Table):
     name: str
     kind: Literal["torsion-spring"]
     body: str
-    """That it acts on."""
+    """Body on which it acts."""
     other: str | None = None
-    """Against which body; left out, against the ground."""
+    """Second body, on which the reaction acts; default: the ground."""
     stiffness: Annotated[float, Quantity("N*m/rad", least=0)] = 0.0
-    """N m/rad."""
+    """Stiffness, N m/rad."""
     angle: Angle = 0.0
-    """At which it exerts no moment, rad: from the x axis, or from the other body."""
+    """Angle at which it exerts no torque, rad: from the x axis, or relative to the other body."""
     damping: Annotated[float, Quantity("N*m*s/rad", least=0)] = 0.0
-    """N m s/rad."""
+    """Damping, N m s/rad."""
     lower: Angle | None = None
-    """Stop: below this angle `stop_stiffness` acts besides, rad."""
+    """Lower stop, rad: below this angle `stop_stiffness` acts in addition."""
     upper: Angle | None = None
-    """Stop: above this angle `stop_stiffness` acts besides, rad."""
+    """Upper stop, rad: above this angle `stop_stiffness` acts in addition."""
     stop_stiffness: Annotated[float, Quantity("N*m/rad", least=0)] = 0.0
-    """Of the stops, N m/rad."""
+    """Stiffness of the stops, N m/rad."""
 
     @model_validator(mode="after")
     def _stops(self) -> "TorsionSpringLoad":
@@ -96,19 +114,19 @@ class CylinderLoad(Table):
     second: str
     """``body.point``, or ``ground.point``."""
     force: Annotated[Any, Law("m", "N", constant=True)]
-    """N that pushes both points apart (negative: together), constant or ``[[distance, force], ...]``."""
+    """Force that pushes both points apart (negative: together), N; constant or ``[[distance, force], ...]``."""
     damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
-    """N s/m, along the line between both points."""
+    """Damping along the line between both points, N s/m."""
 
 
 class DragLoad(Table):
-    """A torque against the turning of a body."""
+    """A torque that resists the rotation of a body."""
 
     name: str
     kind: Literal["drag"]
     body: str
-    """That turns, against the ground."""
+    """Body whose rotation relative to the ground is resisted."""
     linear: Annotated[float, Quantity("N*m*s/rad", least=0)] = 0.0
-    """N m s/rad: times the speed."""
+    """Torque per angular speed, N m s/rad."""
     quadratic: Annotated[float, Quantity("N*m*s**2/rad**2", least=0)] = 0.0
-    """N m s2/rad2: times the square of the speed, as of a fan."""
+    """Torque per square of the angular speed, N m s2/rad2, as of a fan."""

@@ -9,13 +9,13 @@ class Material(Table):
     """Elastic constants of one contact partner."""
 
     youngs_modulus: Annotated[float, Quantity("Pa", above=0)]
-    """Pa."""
+    """Young's modulus, Pa."""
     poisson_ratio: Annotated[float, Quantity("", above=-1, most=0.5)]
     """Poisson's ratio."""
 
 
 class Materials(Table):
-    """Of both partners of a contact."""
+    """Materials of both partners of a contact."""
 
     bearing: Material
     journal: Material

@@ -7,7 +7,7 @@ from typing import Any
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
-from hpcclear.scene.file_curves import FileCurve, motion_of, pairs_of
+from hpcclear.scene.file_curves import FileCurve, against_time, pairs_of
 from hpcclear.scene.paths import replace
 from hpcclear.scene.sheets import place_of, read
 from hpcclear.scene.validation import validated
@@ -20,11 +20,16 @@ CURVES = {
     "mechanism.loads.*.torque": "N*m",
 }
 """Entries that may be a curve against the crank angle, and their units."""
-MOTION = "mechanism.drives.*.angle"
-"""The entry that is a table of angles against time."""
+BY_TIME = {
+    "mechanism.drives.*.angle": "rad",
+    "mechanism.drives.*.speed_by_time": "rad/s",
+    "mechanism.loads.*.size_by_time": "N",
+    "mechanism.loads.*.torque_by_time": "N*m",
+}
+"""Entries that are tables against the time."""
 
 
-def with_values(content: Mapping[str, Any], folder: Path) -> tuple[Mapping[str, Any], list[str]]:
+def with_values(content: Mapping[str, object], folder: Path) -> tuple[Mapping[str, Any], list[str]]:
     """The content of a scene with what files hold in the place of their names, and a sentence for each.
 
     Parameters
@@ -58,12 +63,12 @@ def with_values(content: Mapping[str, Any], folder: Path) -> tuple[Mapping[str, 
     return content, read_as
 
 
-def files_named(content: Mapping[str, Any], prefix: str = "") -> dict[str, Mapping[str, Any]]:
+def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, Any]]:
     """Return the tables of a parsed scene that name a file, by their dotted keys."""
     return dict(_named(content, prefix))
 
 
-def _named(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _named(content: Mapping[str, object], prefix: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for key, entry in content.items():
         if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
             if "file" in entry:
@@ -101,25 +106,25 @@ def _column(path: Path, column: str | None, key: str) -> tuple[list[float | str]
 
 
 def _curve(
-    content: Mapping[str, Any], row: Mapping[str, Any], key: str, folder: Path
+    content: Mapping[str, object], row: Mapping[str, object], key: str, folder: Path
 ) -> tuple[list[list[float]], str]:
     parts = key.split(".")
     general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
-    if general not in CURVES and general != MOTION:
+    if general not in CURVES and general not in BY_TIME:
         raise InputError(
             f"{key}.file", row["file"], "no file is read here",
-            f"Files stand in study.random.NAME, {', '.join((*CURVES, MOTION)).replace('*', 'NAME')}",
+            f"Files stand in study.random.NAME, {', '.join((*CURVES, *BY_TIME)).replace('*', 'NAME')}",
         )  # fmt: skip
     try:
         curve = validated(FileCurve, row)
     except InputError as error:
         raise InputError(f"{key}.{error.key}", error.value, error.reason, error.remedy) from None
-    if general == MOTION:
-        return motion_of(curve, folder, key)
+    if general in BY_TIME:
+        return against_time(curve, folder, BY_TIME[general], key)
     return pairs_of(curve, folder, CURVES[general], key, _turns(content))
 
 
-def _turns(content: Mapping[str, Any]) -> int:
+def _turns(content: Mapping[str, object]) -> int:
     """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
     mechanism = content.get("mechanism")
     drives = mechanism.get("drives") if isinstance(mechanism, Mapping) else None

@@ -24,6 +24,7 @@ from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.loads import Law
 from hpcclear.scene.materials import Material
 from hpcclear.scene.roundness import OutOfRound, check_waves
+from hpcclear.scene.rubbing import RubbingPin
 from hpcclear.scene.wear import Wear
 
 
@@ -37,25 +38,25 @@ class Link(Table):
     """A bar between two joints, rigid unless it bends."""
 
     length: PositiveLength
-    """Distance between its joints, m."""
+    """Distance between the joints of the bar, m."""
     mass: Mass
-    """kg."""
+    """Mass, kg."""
     inertia: Inertia
     """Moment of inertia about its mass centre, kg m2."""
     mass_center: Length
     """Distance of the mass centre from its first joint along the link, m; may lie beyond either
     pin."""
     bending: Bending | None = None
-    """Of the rod: how it bends; left out, it is rigid."""
+    """Bending of the rod. Without it the rod is rigid."""
 
 
 class Slider(Table):
     """The guided body."""
 
     mass: Mass
-    """kg."""
+    """Mass, kg."""
     inertia: Inertia | None = None
-    """Moment of inertia about its pin, where its mass centre is, kg m2; needed where its guide has clearance."""
+    """Moment of inertia about its pin, which is its mass centre, kg m2. Required if its guide has clearance."""
 
 
 class Mechanism(Table):
@@ -66,7 +67,7 @@ class Mechanism(Table):
     rod: Link
     slider: Slider
     offset: Length | None = None
-    """Of the slider's line from the crank's axis along +y, m; left out, the line goes through the axis."""
+    """Distance of the slider's line from the crank's axis along +y, m. Without it the line passes through the axis."""
 
     @model_validator(mode="after")
     def _assembles(self) -> "Mechanism":
@@ -91,13 +92,13 @@ class Mechanism(Table):
 
 
 class ConstantSpeed(Table):
-    """The crank angle is prescribed: it turns at a constant speed, whatever moment that takes."""
+    """The crank turns at a constant prescribed speed, independent of the torque that this requires."""
 
     kind: Literal["constant-speed"]
     speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
-    """Crank speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions a minute."""
+    """Crank speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions per minute."""
     turns: Turns = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns."""
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 
     elsewhere: ClassVar = dict.fromkeys(
         ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),
@@ -109,24 +110,26 @@ class ConstantSpeed(Table):
 
 
 class TorqueDrive(Table):
-    """A torque acts on the free crank; its speed is part of the motion."""
+    """A torque acts on the free crank; its speed is a result of the simulation."""
 
     kind: Literal["torque"]
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """N m, constant or ``[[crank angle, torque], ...]`` over the turns of a revolution."""
     torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
-    """In place of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m, straight from row
-    to row and level beyond."""
+    """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
+    between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
-    """Speed at which the torque has fallen to 0, in proportion, as that of a motor does, rad/s; left out, it does not fall."""
+    """Speed at which the torque is 0, rad/s. The torque decreases linearly with the speed, as that of a motor. Without
+    it the torque does not depend on the speed."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    """Inertia that turns with the crank, kg m2."""
+    """Moment of inertia of a flywheel on the crank, kg m2."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
-    """Crank speed at the start, rad/s; 0 starts from rest."""
+    """Crank speed at the start, rad/s; 0: from rest."""
     expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
-    """About how fast it will turn, rad/s, from rest needed: tolerances and the first step go by it; else by `initial_speed`."""
+    """Approximate speed to expect, rad/s. Tolerances and the first step are scaled by it, or by `initial_speed` if it
+    is missing. Required for a start from rest."""
     turns: Turns = 1
-    """Of a revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after as many turns."""
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 
     elsewhere: ClassVar = {
         "speed": (
@@ -170,7 +173,7 @@ def check_journal(joint: Any) -> None:
 
 
 class ClearanceJoint(Table):
-    """A journal that moves freely in a bearing larger than itself by the clearance."""
+    """A pin with clearance: the journal moves freely within the bearing."""
 
     geometry: ClassVar[str] = "pin_in_bearing"
     corners: ClassVar[tuple[str, ...]] = ()
@@ -179,23 +182,24 @@ class ClearanceJoint(Table):
     clearance: PositiveLength
     """Radial clearance c = R_B - R_J, m."""
     bearing_radius: PositiveLength
-    """R_B, m; it stays as it is when the clearance varies."""
+    """Radius of the bearing, m. It stays constant when the clearance varies."""
     length: PositiveLength | None = None
-    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
+    """Length of the bearing along its axis, m. Line contact and pressures require it."""
     fit: str | None = None
-    """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
+    """Instead of `clearance` and `bearing_radius`: an ISO 286 fit such as "20 H7/f7". Both are then at the middle of
+    their tolerances."""
     diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
-    """In place of `clearance`: twice that, the difference of both diameters, m."""
+    """Instead of `clearance`: difference of the diameters of bearing and journal, m. It is twice the radial clearance."""
     bearing: Material
     journal: Material
     start_eccentricity: tuple[Length, Length] = (0.0, 0.0)
-    """Journal centre minus bearing centre (x, y) at the start, m; centred unless said otherwise."""
+    """Vector (x, y) from the bearing centre to the journal centre at the start, m; default: centred."""
     wear: Wear | None = None
-    """How its surfaces wear; left out, they do not."""
+    """Wear of its surfaces. Without it they do not wear."""
     film: Film | None = None
-    """Oil between its surfaces; left out, the joint is dry."""
+    """Oil film between its surfaces. Without it the joint is dry."""
     out_of_round: OutOfRound | None = None
-    """Waves around its surfaces; left out, they are round."""
+    """Waviness of its surfaces. Without it they are round."""
 
     @property
     def journal_radius(self) -> float:
@@ -214,10 +218,12 @@ class IdealJoint(Table):
     """A pin without clearance."""
 
     kind: Literal["ideal"]
+    friction: RubbingPin | None = None
+    """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
     @model_validator(mode="before")
     @classmethod
-    def _no_dimensions(cls, data: Any) -> Any:
+    def _no_dimensions(cls, data: object) -> Any:
         # What a clearance joint needs may stay in the file, so that `--set
         # joints.crank_rod.kind=ideal` is enough to switch one off; it is dropped here, so that it
         # cannot make two equal scenes look different.
@@ -237,8 +243,10 @@ class Joints(Table):
     """The joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
-    """O12."""
+    """Joint of crank and rod (O12 in the paper)."""
     rod_slider: Joint
-    """O23."""
+    """Joint of rod and slider (O23 in the paper)."""
+    crank_frame: IdealJoint | None = None
+    """Joint of crank and frame (O14 in the paper). Required if it has friction."""
     guide: SliderGuide | None = None
-    """The slider's guide; left out, it has no clearance."""
+    """Clearance of the slider's guide. Without it the guide is ideal."""

@@ -85,7 +85,7 @@ class Moving:
         """Distributions that were made: those of fits are tables."""
         return {}
 
-    def _changed(self, row: RandomInput, entries: Mapping[str, Any]) -> quantiles.Quantiles:
+    def _changed(self, row: RandomInput, entries: Mapping[str, object]) -> quantiles.Quantiles:
         key = (row.name, *entries.items())
         if key not in self._made:
             if len(self._made) >= MOST_EXTREMES:

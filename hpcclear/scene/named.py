@@ -49,7 +49,7 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 Range = tuple[float, float]
 
 
-def resolved_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
+def resolved_paths(data: Mapping[str, object]) -> tuple[str, ...]:
     """The paths a named row drives, from `paths`, `path` or its name."""
     name = data.get("name")
     if not isinstance(name, str) or not NAME.fullmatch(name) or name in RESERVED:
@@ -91,7 +91,7 @@ def resolved_paths(data: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(paths)
 
 
-def number_of(value: Any, quantity: Quantity, key: str) -> float:
+def number_of(value: object, quantity: Quantity, key: str) -> float:
     """`Quantity.convert` with the key in its error."""
     try:
         return quantity.convert(value)
@@ -100,7 +100,7 @@ def number_of(value: Any, quantity: Quantity, key: str) -> float:
         raise invalid(context["reason"], context["remedy"], key=key) from None
 
 
-def range_of(value: Any, quantity: Quantity, key: str) -> Range:
+def range_of(value: object, quantity: Quantity, key: str) -> Range:
     """A pair in rising order."""
     if not isinstance(value, (list, tuple)) or len(value) != 2:
         raise invalid("two bounds are expected here", "Write [lower, upper]", key=key)
@@ -115,7 +115,9 @@ def range_of(value: Any, quantity: Quantity, key: str) -> Range:
     return lower, upper
 
 
-def list_of(value: Any, quantity: Quantity, key: str, least: int, most: int) -> tuple[float, ...]:
+def list_of(
+    value: object, quantity: Quantity, key: str, least: int, most: int
+) -> tuple[float, ...]:
     """Numbers, at least and at most so many."""
     if not isinstance(value, (list, tuple)) or not least <= len(value) <= most:
         count = f"{least}" if least == most else f"from {least} to {most}"
@@ -128,11 +130,11 @@ class NamedInput(Table):
 
     name: str
     paths: tuple[str, ...]
-    """Scene entries that all get its value."""
+    """Scene entries that are set to its value."""
 
     @model_validator(mode="before")
     @classmethod
-    def _resolve(cls, data: Any) -> Any:
+    def _resolve(cls, data: object) -> Any:
         if not isinstance(data, Mapping):
             return data
         data = cls._without_numbers(data)
@@ -141,7 +143,7 @@ class NamedInput(Table):
         return cls._in_si(row, paths)
 
     @classmethod
-    def _without_numbers(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, Any]:
         """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
         return data
 
@@ -151,7 +153,7 @@ class NamedInput(Table):
         raise NotImplementedError
 
 
-def paths_of(name: str, row: Mapping[str, Any]) -> tuple[str, ...]:
+def paths_of(name: str, row: Mapping[str, object]) -> tuple[str, ...]:
     """Paths of a row of a file, or those of a short name."""
     return texts_in(row.get("paths", row.get("path", SHORT_NAMES.get(name))))
 

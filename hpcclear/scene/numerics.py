@@ -14,7 +14,7 @@ Frequency = Annotated[float, Quantity("Hz", least=1.0, most=1e5)]
 
 
 class Numerics(Table):
-    """How the motion is integrated, and over which revolutions."""
+    """Integration of the motion: method, tolerances, and revolutions to average."""
 
     formulation: Literal["minimal", "baumgarte"] = "minimal"
     """Minimal coordinates, or Lagrange multipliers with Baumgarte feedback (eq. 11)."""
@@ -23,33 +23,35 @@ class Numerics(Table):
     beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
     """Baumgarte feedback on constraint position, 1/s; used by that formulation, and by ideal loops of linkages."""
     interpolation: Literal["smooth", "linear"] = "smooth"
-    """Between the rows of tables against the crank angle: a monotone cubic, or straight lines."""
+    """Interpolation between the rows of tables against the crank angle: monotone cubic ("smooth") or linear."""
     method: Literal[
         "auto", "tsitouras", "dormand-prince", "fehlberg", "prince-dormand", "switching", "radau"
     ] = "auto"
     """Integrator of responses and samples. The four named pairs are explicit, of order 5, 5, 4 and 8; the last is for
-    tolerances of 1e-9 and less. With "switching" steps are implicit where the motion is stiff, with "radau" always. By
+    tolerances of 1e-9 and less. "switching" takes implicit steps where the motion is stiff, "radau" always. By
     default ("auto") the method is "switching" for steep friction ramps, strong damping, oil or bristles, "radau" for fast
     bending modes, and "tsitouras" otherwise."""
     rtol: Annotated[float, Quantity("", least=1e-14, most=0.1)] = 1e-6
     """Relative tolerance of a step."""
     atol: PositiveLength | None = None
-    """Absolute tolerance on lengths, m; default rtol times 1 mm. Other states are scaled in proportion (see
-    the manual)."""
+    """Absolute tolerance on lengths, m; default rtol times 1 mm. Tolerances of other states are scaled in proportion
+    ("Integration" in the theory page)."""
     target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
-    """Relative error of the objective to aim at, of responses and samples: f becomes a steady mean, with its 95 % half-width.
-    Chooses tolerance and revolutions in place of the entries here."""
+    """Target for the relative error of the objective of responses and samples. f is then a steady mean with a 95 %
+    half-width; tolerance and revolutions are chosen automatically, instead of `rtol`, `transient_revolutions` and
+    `averaged_revolutions`."""
     target_revolutions: Annotated[int, Count(100, 10**12)] = 20_000
-    """With target_error: largest number of revolutions of a design, all replicas together; beyond it the target is missed."""
+    """With `target_error`: largest number of revolutions of a design, all replicas together. If they do not suffice,
+    the target is reported as missed."""
     transient_revolutions: Annotated[int, Count(0, 10**9)] = 5
-    """Revolutions before the average starts."""
+    """Number of revolutions before averaging begins."""
     averaged_revolutions: Annotated[int, Count(1, 10**9)] = 5
-    """Revolutions of the average."""
+    """Number of revolutions that are averaged."""
     objective: Annotated[str, ObjectiveName(OBJECTIVES)] | None = None
-    """What a sample is judged by in a scene without a study; default "mean-gap". A study has an entry of its own."""
+    """Objective f in a scene without a study; default "mean-gap". A study uses `study.objective`."""
     objective_joints: tuple[str, ...] = ()
-    """Joints with clearance, or single contacts such as "guide.front_left", whose gaps or contact forces make up the objective;
-    default all."""
+    """Joints with clearance, or single contacts such as "guide.front_left", whose gaps or contact forces the objective
+    combines; default: all."""
     max_steps: Annotated[int, Count(1)] = 10_000_000
     """Largest number of accepted and rejected steps of one sample; beyond it the sample ends with status
     STEP_CAP."""
@@ -57,12 +59,12 @@ class Numerics(Table):
     """Whether each sample also records its energy balance."""
     responses: Annotated[bool, Field(strict=True)] = False
     """Whether each sample also records mean contact forces, peak torque of the drive and standard deviation of the
-    slider acceleration. A study of one of these enables it."""
+    slider acceleration. Enabled automatically if the study needs one of them."""
 
     impacts: Annotated[bool, Field(strict=True)] = False
-    """Whether each sample also records measures of impact and noise. Of each joint in a revolution: number of impacts, energy
-    lost in them, impulse, angle without contact; root mean squares of contact forces and of the force on the frame. A study of
-    one of these enables it."""
+    """Whether each sample also records measures of impact and noise. For each joint and revolution: number of impacts,
+    energy lost in them, impulse, angle without contact, RMS contact force. For the mechanism: RMS force on the frame.
+    Enabled automatically if the study needs one of them."""
 
     levels: Annotated[tuple[Frequency, ...], Field(max_length=MAX_BANDS)] = ()
     """Third-octave bands, by a frequency in each, Hz, whose force levels each sample records, with half-widths and those of the
@@ -70,7 +72,7 @@ class Numerics(Table):
 
     @field_validator("method", mode="before")
     @classmethod
-    def _method_that_was(cls, value: Any) -> Any:
+    def _method_that_was(cls, value: object) -> Any:
         """One version long: collocation has gone, and what stands in its place is as tight."""
         if value != "lobatto":
             return value
@@ -87,8 +89,9 @@ class Numerics(Table):
 
 
 class Output(Table):
-    """What `simulate` writes."""
+    """Output of `simulate`."""
 
     instants_per_revolution: Annotated[int, Count(0, 10**6)] = 720
-    """Instants a revolution, evenly spaced in time; 0 writes every accepted step. Time series larger than half of the machine's
+    """Number of stored instants per revolution, evenly spaced in time; 0: every accepted step. Time series larger than
+    half of the machine's
     memory are refused."""

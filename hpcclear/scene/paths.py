@@ -19,7 +19,7 @@ PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects":
 """The tables whose numbers describe the mechanism and what acts on it."""
 
 
-def _parts(annotation: Any) -> Iterator[Any]:
+def _parts(annotation: object) -> Iterator[Any]:
     """An annotation and everything inside it: metadata, members of unions."""
     yield annotation
     for part in get_args(annotation):
@@ -43,7 +43,7 @@ def _named(field: FieldInfo) -> bool:
     return any(isinstance(part, NamedRows) for part in field.metadata)
 
 
-def _entries(annotation: Any, prefix: str) -> Iterator[tuple[str, Quantity]]:
+def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, Quantity]]:
     for model in _parts(annotation):
         if not (isinstance(model, type) and issubclass(model, BaseModel)):
             continue
@@ -90,7 +90,7 @@ class Quantities(dict[str, Quantity]):
             raise KeyError(path)
         return dict.__getitem__(self, general)
 
-    def get(self, path: str, default: Any = None) -> Any:
+    def get(self, path: str, default: object = None) -> Any:
         """The quantity at a path, or `default`."""
         return self[path] if path in self else default  # noqa: SIM401 - get() is this
 
@@ -128,7 +128,7 @@ def described(paths: Sequence[str]) -> str:
     return alike.pop() if len(paths) > 1 and len(alike) == 1 else " and ".join(found)
 
 
-def replace(content: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+def replace(content: Mapping[str, object], path: str, value: object) -> dict[str, Any]:
     """A copy of nested tables with the entry at `path` replaced, or removed when `value` is None.
 
     What is not a table on the way to it is replaced by one; the model then says what is wrong with
@@ -146,7 +146,7 @@ def replace(content: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]
     return copy
 
 
-def flatten(content: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flatten(content: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys and values of nested tables, in order."""
     for key, value in content.items():
         path = f"{prefix}{key}"

@@ -15,7 +15,7 @@ class PairTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _from_pair(cls, data: Any) -> Any:
+    def _from_pair(cls, data: object) -> Any:
         if not isinstance(data, (list, tuple)):
             return data
         if len(data) != 2:
@@ -27,9 +27,9 @@ class Place(PairTable):
     """A place or an offset; ``[x, y]`` is the same."""
 
     x: Length
-    """m."""
+    """x coordinate, m."""
     y: Length
-    """m."""
+    """y coordinate, m."""
 
 
 class NamedPlace(Place):
@@ -41,7 +41,7 @@ class NamedPlace(Place):
 class PlaceRows(NamedRows):
     """``{name = [x, y]}`` as named rows."""
 
-    def rows(self, value: Any) -> Any:
+    def rows(self, value: object) -> Any:
         """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; raises PydanticCustomError."""
         if not isinstance(value, (Mapping, tuple)):
             raise invalid("named points are expected here", "Write { name = [x, y] }")

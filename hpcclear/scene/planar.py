@@ -15,7 +15,6 @@ from hpcclear.scene.fields import (
     NamedRows,
     PositiveLength,
     Quantity,
-    Speed,
     Table,
     check_period,
     invalid,
@@ -28,6 +27,8 @@ from hpcclear.scene.materials import Materials
 from hpcclear.scene.mechanism import check_journal, slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.roundness import OutOfRound
+from hpcclear.scene.rubbing import Rubbing, RubbingPin
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.wear import Wear
 
 Rows = NamedRows()
@@ -38,24 +39,25 @@ class PlanarBody(Table):
 
     name: str
     mass: Mass
-    """kg."""
+    """Mass, kg."""
     inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    """About its mass centre, kg m2; ignored if the body cannot rotate."""
+    """Moment of inertia about the mass centre, kg m2; ignored if the body cannot rotate."""
     inertia_ratio: Annotated[float, Quantity("", above=0)] | None = None
-    """Of a bar, in place of its inertia: this over that of a slender bar, m L^2/12, so that it follows mass and length."""
+    """For a bar, instead of `inertia`: inertia divided by that of a slender bar, m L^2/12. The inertia then follows
+    mass and length."""
     length: Annotated[float, Quantity("m", above=0)] | None = None
-    """Of a bar: it has the points a, at its origin, and b, so far along its x axis, m."""
+    """Length of a bar, m. A bar has the points a at its origin and b at this distance along its x axis."""
     mass_center: Length | None = None
-    """Of a bar: distance of its mass centre from a towards b, m; its middle unless said otherwise."""
+    """For a bar: distance of its mass centre from a towards b, m; default: the middle."""
     center: Place = NOWHERE
-    """Mass centre in the body's own axes, m."""
+    """Position of the mass centre in the body's own axes, m."""
     points: NamedPlaces = ()
-    """Where joints and loads act, in the body's own axes, m."""
+    """Points at which joints and loads act, in the body's own axes, m."""
     start_angle: Angle = 0.0
-    """Rough angle at the start, rad: assembly starts from it. Of a driven body, its angle at the start, unless its drive gives
-    the angle itself (harmonic, table)."""
+    """Approximate angle at the start, rad, from which the assembly is computed. For a driven body it is the exact angle
+    at the start, unless the drive prescribes the angle (harmonic, table)."""
     bending: Bending | None = None
-    """Of a bar between two pins: how it bends; left out, it is rigid."""
+    """Bending of a bar between two pins. Without it the bar is rigid."""
 
     @property
     def own_inertia(self) -> Any:
@@ -101,10 +103,10 @@ class PlanarBody(Table):
 
 
 class Ground(Table):
-    """What stands still."""
+    """The ground, which does not move."""
 
     points: NamedPlaces = (NamedPlace(name="o", x=0.0, y=0.0),)
-    """m."""
+    """Named points of the ground, m."""
 
 
 class PlanarRevolute(Table):
@@ -116,10 +118,12 @@ class PlanarRevolute(Table):
     """``body.point``, or ``ground.point``."""
     bearing: str
     """``body.point``, or ``ground.point``."""
+    friction: RubbingPin | None = None
+    """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
 
 class PlanarClearance(Table):
-    """A journal in a bearing larger than itself."""
+    """A pin with clearance: a journal within a larger bearing."""
 
     geometry: ClassVar[str] = "pin_in_bearing"
     corners: ClassVar[tuple[str, ...]] = ()
@@ -127,28 +131,29 @@ class PlanarClearance(Table):
     name: str
     kind: Literal["clearance"]
     journal: str
-    """``body.point`` that is the journal's centre."""
+    """``body.point`` at the centre of the journal."""
     bearing: str
-    """``body.point``, or ``ground.point``, that is the bearing's centre."""
+    """``body.point`` or ``ground.point`` at the centre of the bearing."""
     clearance: PositiveLength
-    """R_B - R_J, m."""
+    """Radial clearance, bearing radius minus journal radius, m."""
     bearing_radius: PositiveLength
-    """R_B, m."""
+    """Radius of the bearing, m."""
     length: PositiveLength | None = None
-    """Of the bearing, at right angles to the plane, m; line contact and pressures need it."""
+    """Length of the bearing along its axis, m. Line contact and pressures require it."""
     fit: str | None = None
-    """In place of `clearance` and `bearing_radius`: a fit by ISO 286 such as "20 H7/f7", in the middle of both tolerances."""
+    """Instead of `clearance` and `bearing_radius`: an ISO 286 fit such as "20 H7/f7". Both are then at the middle of
+    their tolerances."""
     diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
-    """In place of `clearance`: twice that, the difference of both diameters, m."""
+    """Instead of `clearance`: difference of the diameters of bearing and journal, m. It is twice the radial clearance."""
     materials: Materials
     start_eccentricity: Place = NOWHERE
-    """Journal centre minus bearing centre at the start, m."""
+    """Vector from the bearing centre to the journal centre at the start, m."""
     wear: Wear | None = None
-    """How its surfaces wear; left out, they do not."""
+    """Wear of its surfaces. Without it they do not wear."""
     film: Film | None = None
-    """Oil between its surfaces; left out, the joint is dry."""
+    """Oil film between its surfaces. Without it the joint is dry."""
     out_of_round: OutOfRound | None = None
-    """Waves around its surfaces; left out, they are round."""
+    """Waviness of its surfaces. Without it they are round."""
 
     _in_radii = model_validator(mode="before")(with_clearance)
 
@@ -156,15 +161,6 @@ class PlanarClearance(Table):
     def _journal_fits(self) -> "PlanarClearance":
         check_journal(self)
         return self
-
-
-class Rubbing(Table):
-    """Friction of a guide."""
-
-    coefficient: Annotated[float, Quantity("", least=0)]
-    """Of Coulomb's law."""
-    ramp_speed: Speed = 0.01
-    """Sliding speed below which the force falls to zero with the speed, m/s."""
 
 
 class PlanarSlide(OfContacts, Table):
@@ -177,25 +173,25 @@ class PlanarSlide(OfContacts, Table):
     line: str
     """``body.point``, or ``ground.point``, on the line."""
     angle: Angle = 0.0
-    """Direction of the line in its carrier's axes, rad."""
+    """Direction of the line in the axes of the body that carries it, rad."""
     friction: Rubbing | None = None
-    """Of a guide without clearance; left out, it slides freely."""
+    """Friction of a guide without clearance. Without it the guide is frictionless."""
     clearance: PositiveLength | None = None
-    """Gap on either side of a slider in the middle of its channel, m; left out, there is none."""
+    """Gap on either side of a slider in the middle of its channel, m. Without it the guide is ideal."""
     length: PositiveLength | None = None
-    """Of a slider with clearance, along the line, m."""
+    """Length of a slider with clearance along the line, m."""
     height: PositiveLength | None = None
-    """Of such a slider, across the line, m; the channel is higher by twice the clearance."""
+    """Height of a slider with clearance across the line, m. The channel is higher by twice the clearance."""
     corner_radius: PositiveLength | None = None
-    """Radius to which the slider's corners are rounded, m; stiffness follows from it."""
+    """Radius of the slider's rounded corners, m. It determines the contact stiffness."""
     width: PositiveLength | None = None
-    """Of the slider, at right angles to the plane, m; line contact needs it."""
+    """Width of the slider at right angles to the plane, m. Line contact requires it."""
     materials: Materials | None = None
-    """Of channel (bearing) and slider (journal), with clearance."""
+    """Materials of channel (bearing) and slider (journal) of a guide with clearance."""
     start_offset: Length | None = None
-    """How far the slider's middle is to the left of the guide's line at the start, m; in the middle unless said otherwise."""
+    """Distance of the slider's middle from the guide's line at the start, positive to the left, m; default 0."""
     start_tilt: Angle | None = None
-    """Angle of the slider against the line at the start, rad; 0 unless said otherwise."""
+    """Angle between the slider and the line at the start, rad; default 0."""
 
     elsewhere: ClassVar = NOT_OF_GUIDES
 
@@ -206,20 +202,21 @@ class PlanarSlide(OfContacts, Table):
 
 
 class PlanarFixed(Table):
-    """A body held on the ground."""
+    """A body that is fixed to the ground."""
 
     name: str
     kind: Literal["fixed"]
     point: str
-    """``body.point`` that is held."""
+    """``body.point`` that is fixed."""
     line: str
-    """``ground.point`` at which it is held."""
+    """``ground.point`` to which it is fixed."""
     angle: Angle = 0.0
-    """Of the body against the ground, rad."""
+    """Angle of the body relative to the ground, rad."""
 
 
 PlanarJoint = Annotated[
-    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarFixed, Field(discriminator="kind")
+    PlanarRevolute | PlanarClearance | PlanarSlide | PlanarSlot | PlanarFixed,
+    Field(discriminator="kind"),
 ]
 
 
@@ -228,16 +225,16 @@ class Planar(Table):
 
     kind: Literal["planar"] = "planar"
     bodies: Annotated[tuple[PlanarBody, ...], Rows]
-    """What moves. ``like = "NAME"`` takes over what another body says."""
+    """The moving bodies. ``like = "NAME"`` copies the entries of another body."""
     ground: Ground = Ground()
     joints: Annotated[tuple[PlanarJoint, ...], Rows]
-    """What holds it together. ``like = "NAME"`` takes over what another joint says."""
+    """The joints. ``like = "NAME"`` copies the entries of another joint."""
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
-    """Drives of the mechanism; one is enough."""
+    """Drives of the mechanism; one is sufficient."""
     loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
-    """Forces, torques and springs; gravity is an effect."""
+    """Forces, torques and springs. Gravity is an entry of `effects`."""
     followed: str | None = None
-    """``body.point`` whose acceleration and path the responses report."""
+    """``body.point`` whose acceleration and path responses contain."""
 
     @model_validator(mode="after")
     def _followed_is_a_point(self) -> "Planar":
@@ -267,12 +264,15 @@ class Planar(Table):
                 for entry in ("torque", "size"):
                     curve = getattr(row, entry, None)
                     if isinstance(curve, tuple):
-                        check_period(curve, turns, f"{table}.{row.name}.{entry}")
+                        by_another = getattr(row, "angle_of", None) is not None
+                        check_period(
+                            curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}"
+                        )
         return self
 
     @model_validator(mode="before")
     @classmethod
-    def _alike(cls, data: Any) -> Any:
+    def _alike(cls, data: object) -> Any:
         """Entries of a body or joint that is ``like`` another, written out; tables among them, such as materials, take over
         what they do not say, points are a body's own."""
         if not isinstance(data, Mapping):

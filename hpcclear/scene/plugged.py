@@ -19,11 +19,11 @@ class UntrustedSource(InputError):
 
 
 class PluginFile(Table):
-    """A Python file beside the scene file, whose text goes wherever the scene goes."""
+    """A Python file beside the scene file. Its text is stored and sent with the scene."""
 
     name: str
     source: str
-    """The whole text of the file."""
+    """Complete text of the file."""
 
 
 class PluginPackage(Table):
@@ -31,16 +31,16 @@ class PluginPackage(Table):
 
     name: str
     version: str
-    """The one that was installed."""
+    """Version of the installed package."""
 
 
 class Plugins(Table):
-    """Where plug-ins of this scene come from. The program fills it: results carry it, a scene file need not have it."""
+    """Origin of the plug-ins of this scene. The program adds this table to results; a scene file does not need it."""
 
     files: Annotated[tuple[PluginFile, ...], NamedRows()] = ()
-    """Python files beside the scene file that it names, as "module:Name"."""
+    """Python files beside the scene file, named in it as "module:Name"."""
     packages: Annotated[tuple[PluginPackage, ...], NamedRows()] = ()
-    """Packages whose plug-ins it names."""
+    """Packages whose plug-ins the scene names."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class PluginName(Converted):
 
     registry: Registry
 
-    def convert(self, value: Any) -> str:
+    def convert(self, value: object) -> str:
         """The name, known to be there; raises PydanticCustomError."""
         if not isinstance(value, str):
             raise invalid("a name is expected here", "Write it in quotes")
@@ -75,7 +75,7 @@ def as_invalid(key: str = "") -> Iterator[None]:
         raise invalid(reason, error.remedy, key) from error
 
 
-def texts_of(content: Mapping[str, Any]) -> dict[str, str]:
+def texts_of(content: Mapping[str, object]) -> dict[str, str]:
     """Source texts that the content of a scene carries, by module; whatever else stands there."""
     table: Any = content.get("plugins")
     rows = table.get("files") if isinstance(table, Mapping) else None
@@ -85,7 +85,7 @@ def texts_of(content: Mapping[str, Any]) -> dict[str, str]:
     return {str(name): text for name, text in texts.items() if isinstance(text, str)}
 
 
-def modules_named(content: Any) -> set[str]:
+def modules_named(content: object) -> set[str]:
     """Modules of all texts in the content of a scene that read ``"module:Name"``."""
     if isinstance(content, str):
         found = REFERENCE.fullmatch(content)
@@ -96,7 +96,7 @@ def modules_named(content: Any) -> set[str]:
     return {module for one in inner for module in modules_named(one)}
 
 
-def with_texts(content: Mapping[str, Any], read: Callable[[str], str | None]) -> dict[str, Any]:
+def with_texts(content: Mapping[str, object], read: Callable[[str], str | None]) -> dict[str, Any]:
     """The content with the texts of the modules that it names.
 
     `read` gives a module's text, None where there is no such file: whatever wants it says so.
@@ -106,7 +106,7 @@ def with_texts(content: Mapping[str, Any], read: Callable[[str], str | None]) ->
     return {**content, **({"plugins": {"files": rows}} if rows else {})}
 
 
-def check_trust(content: Mapping[str, Any], name: str) -> None:
+def check_trust(content: Mapping[str, object], name: str) -> None:
     """InputError if the content carries Python text and nobody has said that it may be run; `name`: where it stands."""
     texts = texts_of(content)
     if not texts or is_trusting():

@@ -97,7 +97,10 @@ def check_points(
     for joint in scene.pins():
         key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
         pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
-    for joint in scene.guides():
+    sliders = [
+        one for one in scene.guides() if hasattr(scene.clearance_joint(one), "corner_radius")
+    ]
+    for joint in sliders:
         key, reason = scene.joint_key(joint), "corners rounder than half of the slider"
         pairs += [
             (f"{key}.corner_radius", f"{key}.{size}", reason) for size in ("length", "height")

@@ -20,8 +20,8 @@ _LEAST_SHARE = 1e-9
 
 
 class RandomInput(NamedInput):
-    """A random number of the scene: about the design's value, or wherever the design is
-    (`about_design = false`)."""
+    """A random input: distributed around the value of the design, or absolute, the same for all designs (`about_design
+    = false`)."""
 
     elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {
         "file": ("files are read only where a scene is loaded from a file",
@@ -30,47 +30,48 @@ class RandomInput(NamedInput):
     }  # fmt: skip
 
     distribution: str
-    """The distribution. "samples" are measured values; "wear" uses the clearances of the service lives of `[wear]`. Further
-    ones: any continuous one of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name" of a
-    file."""
+    """The distribution. "samples": measured values. "wear": clearances after the service lives of `[wear]`. Also any
+    continuous distribution of scipy.stats, such as "scipy:weibull_min", one of an installed package, or "module:Name"
+    of a file."""
     range: Range | None = None
-    """Bounds of a "uniform" or "beta" distribution; truncation of others. SI."""
+    """Bounds of a "uniform" or "beta" distribution, truncation of the others, SI."""
     mean: float | None = None
-    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the
-    design. Of "lognormal" its mean, before truncation."""
+    """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the design. For
+    "lognormal": mean before truncation."""
     half_width: float | None = None
-    """Of "uniform", "truncated-normal" and "beta", SI, or a share such as "3 %" of the number it is about, where the study
-    does not vary that; of "wear", that of the uniform distribution of new clearances about the scene's."""
+    """Half-width of "uniform", "truncated-normal" and "beta", SI, or a percentage such as "3 %" of the nominal value if
+    the study does not vary it. For "wear": half-width of the uniform distribution of new clearances around the value of
+    the scene."""
     deviation: float | None = None
-    """Standard deviation of "normal", and of "truncated-normal" and "lognormal" before they are cut, SI."""
+    """Standard deviation of "normal", SI; of "truncated-normal" and "lognormal" before truncation."""
     shapes: tuple[float, float] | None = None
-    """Of "beta": a and b of its density x^(a-1) (1-x)^(b-1), x from 0 to 1 over its range."""
+    """For "beta": a and b of the density x^(a-1) (1-x)^(b-1), with x from 0 to 1 over the range."""
     shape: float | None = None
-    """Of "weibull": k of exp(-((x - location)/scale)^k), the share above x."""
+    """For "weibull": k in the probability exp(-((x - location)/scale)^k) of exceeding x."""
     scale: float | None = None
-    """Of "weibull", SI."""
+    """For "weibull": scale in that probability, SI."""
     location: float | None = None
-    """Of "weibull": where it begins, SI; default 0."""
+    """For "weibull": smallest value, SI; default 0."""
     values: tuple[float, ...] | None = None
-    """Of "samples": measured values, each with equal chance, SI; in their place `file`, a CSV table beside the scene file, and
-    `column`, as its first row has it."""
+    """For "samples": measured values with equal probability, SI. Alternatively `file`, a CSV table beside the scene
+    file, and `column`, its heading."""
     fit: str | None = None
-    """Of "fit", the clearance of a bore and a pin that are made apart: a fit by ISO 286; left out, that of the joint."""
+    """For "fit", the clearance of an independent bore and pin: an ISO 286 fit; default: that of the joint."""
     bore: Tolerance | None = None
-    """Of "fit": how the bore is made; left out, normal within the limits of size of the fit, with cp = 1."""
+    """For "fit": distribution of the bore; default: normal within the tolerance of the fit, with cp = 1."""
     pin: Tolerance | None = None
-    """Of "fit": how the pin is made; left out, normal within the limits of size of the fit, with cp = 1."""
+    """For "fit": distribution of the pin; default: normal within the tolerance of the fit, with cp = 1."""
     cycles: Annotated[float, Quantity("", least=0)] | None = None
-    """Of "wear": the age in revolutions at which clearances of the lives in [wear] are taken."""
+    """For "wear": age in revolutions at which the clearances of the service lives are taken."""
     parameters: dict[str, float] | None = None
-    """Of distributions from elsewhere, which may stand beside the other entries, too: shapes, loc and scale of one of scipy's;
-    whatever a plug-in takes. Texts are converted to the unit of the input."""
+    """Parameters of a distribution of scipy (shapes, loc, scale) or of a plug-in. They may also be written beside the
+    other entries. Text with a unit is converted to the unit of the input."""
     relative: bool | None = None
-    """Whether `half_width` and `deviation` are shares of the design's value; `half_width = "3 %"` sets it where the study
-    varies that."""
+    """Whether `half_width` and `deviation` are fractions of the design's value. `half_width = "3 %"` enables it if the
+    study varies that value."""
     about_design: bool | None = None
-    """Of all but "uniform", "normal", "truncated-normal", "beta", "fit" and "wear": whether what scatters is the
-    difference from the design's value."""
+    """Whether the distribution is that of the difference from the design's value. Not for "uniform", "normal",
+    "truncated-normal", "beta", "fit" and "wear"."""
 
     @classmethod
     def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
@@ -175,7 +176,7 @@ class RandomInput(NamedInput):
         form = form_of(self.distribution, self.parameters or {})
         return form.law(self.model_dump(exclude_none=True))
 
-    def changed(self, entries: Mapping[str, Any]) -> quantiles.Quantiles:
+    def changed(self, entries: Mapping[str, object]) -> quantiles.Quantiles:
         """Its quantile function with other entries, such as {"half_width": 1e-5, "bore.cp": 1.3}; errors for validators."""
         own = self.model_dump(exclude_none=True)
         for key, value in entries.items():

@@ -10,9 +10,8 @@ Wave = Length
 
 
 class Waves(Table):
-    """How much deeper than round a surface lies, m: a sum of cosines and sines of whole multiples of the angle in its body.
-
-    The angle is counted from the x axis of the body, a slider-crank's from a link's first joint to its second.
+    """Depth of a surface below the round one, m: a Fourier series in the angle around it. The angle is measured from
+    the x axis of the body; in a slider-crank this axis points from the first joint of a link to its second.
     """
 
     cosine_1: Wave = 0.0
@@ -46,7 +45,7 @@ class Waves(Table):
 
 
 class OutOfRound(Table):
-    """Waves around the surfaces of a joint with clearance; one that is left out is round."""
+    """Waviness of the surfaces of a joint with clearance. A surface without an entry is round."""
 
     bearing: Waves | None = None
     journal: Waves | None = None

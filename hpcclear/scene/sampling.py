@@ -197,31 +197,22 @@ def monte_carlo(
     free = tuple(name for name in study.names if fixed is None or name in fixed)
     names = (*free, *(name for name in chosen if name not in free))
     paths = tuple(inputs[n].paths if n in chosen else study.variable(n).paths for n in names)
-    values = np.empty((count, len(names)))
     moving = [name for name in names if name in chosen or fixed is None]
     uniform = _chances(study.seed, purpose, moving, (first, count), replicate, stratified)
     if study.correlation is not None:
         uniform = _together(study.correlation, moving, chosen, uniform)
+    places = dict(zip(moving, uniform, strict=True))
+    values = np.empty((count, len(names)))
     for column, name in enumerate(names):
-        if name not in moving:
-            assert fixed is not None
-            values[:, column] = fixed[name]
-            continue
-        place = uniform[moving.index(name)]
-        if name in chosen:
-            continue  # by designs, below
-        lower, upper = study.variable(name).bounds
-        values[:, column] = lower + place * (upper - lower)
-        if (options := study.variable(name).options) is not None:
-            values[:, column] = _of_options(options, place)
+        if name not in chosen:
+            values[:, column] = _free(study, name, places[name]) if fixed is None else fixed[name]
     for name in chosen:
         column = names.index(name)
         centre = (fixed or {}).get(name, scene.number(paths[column][0]))
-        place = uniform[moving.index(name)]
         if fixed is not None or not study.moves(inputs[name]):
-            found = study.law(inputs[name], {**(fixed or {}), name: centre})(place)
+            found = study.law(inputs[name], {**(fixed or {}), name: centre})(places[name])
         else:
-            found = _by_designs(study, inputs[name], names, values, place, centre)
+            found = _by_designs(study, inputs[name], names, values, places[name], centre)
         values[:, column] = found if inputs[name].absolute else centre + found
     if fixed is None:
         for column, name in enumerate(names):
@@ -230,6 +221,15 @@ def monte_carlo(
     points = Points(names, values, paths)
     check_points(scene, points, lambda row: f"sample {first + row}")
     return points
+
+
+def _free(study: Study, name: str, place: Array) -> Array:
+    """A variable without a distribution, uniform over its range, at probabilities (n,)."""
+    variable = study.variable(name)
+    if variable.options is not None:
+        return _of_options(variable.options, place)
+    lower, upper = variable.bounds
+    return lower + place * (upper - lower)
 
 
 def _of_options(options: Sequence[float], place: Array) -> Array:

@@ -11,21 +11,21 @@ from hpcclear.base.errors import InputError, unboxed
 from hpcclear.plugins.sources import using
 from hpcclear.scene import citation, describing, domain
 from hpcclear.scene.choices import input_entry
+from hpcclear.scene.consistency import ConsistentTables
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, replace
 from hpcclear.scene.plugged import texts_of
-from hpcclear.scene.tables import SceneTables, plain
+from hpcclear.scene.tables import plain
 from hpcclear.scene.units import noting
 from hpcclear.scene.validation import check_path, validated
 from hpcclear.scene.variables import Variable
 
 
-class Scene(SceneTables):
-    """A scene file, validated: SI numbers, frozen, equal when its content is equal.
-
-    Make one with `load_scene`; change one with `with_`, which validates anew.
+class Scene(ConsistentTables):
+    """A validated scene file with SI numbers. It is immutable; scenes with equal content are equal. `load_scene` reads
+    one, and `with_` returns a changed copy, validated again.
     """
 
     _text: str = PrivateAttr("")
@@ -188,7 +188,7 @@ class Scene(SceneTables):
         """TOML text of the resolved content; loading it gives an equal scene."""
         return tomli_w.dumps(self.resolved(), multiline_strings=True)
 
-    def with_(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> "Scene":
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **more: object) -> "Scene":
         """A new, validated scene with some entries replaced.
 
         Parameters
@@ -219,14 +219,14 @@ class Scene(SceneTables):
         return hash(self.hash)
 
 
-def _unpickled(content: Mapping[str, Any], text: str, readings: tuple[str, ...]) -> Scene:
+def _unpickled(content: Mapping[str, object], text: str, readings: tuple[str, ...]) -> Scene:
     """A scene from what `Scene.__reduce__` gives."""
     scene = scene_of(content)
     scene._text, scene._readings = text, readings
     return scene
 
 
-def scene_of(content: Mapping[str, Any]) -> Scene:
+def scene_of(content: Mapping[str, object]) -> Scene:
     """The scene of a file's tables, with the readings of its units; errors as `load_scene`.
 
     Source text that it carries is run: `load_scene` sees to it that it may be.
@@ -242,7 +242,7 @@ def scene_of(content: Mapping[str, Any]) -> Scene:
     return scene
 
 
-def _placed(content: Mapping[str, Any], read: Mapping[str, str]) -> Iterator[str]:
+def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[str]:
     """A sentence for each entry with text that was read as `read` says."""
     for key, entry in flatten(content):
         level = [entry]
@@ -255,7 +255,7 @@ def _placed(content: Mapping[str, Any], read: Mapping[str, str]) -> Iterator[str
 
 
 def _check_corner(
-    content: Mapping[str, Any], entries: Mapping[str, float], key: str, words: str
+    content: Mapping[str, object], entries: Mapping[str, float], key: str, words: str
 ) -> None:
     """An error for validators unless the scene is one with other entries."""
     corner = content
@@ -271,7 +271,7 @@ def _check_corner(
         ) from None
 
 
-def _alike(one: Any, other: Any) -> bool:
+def _alike(one: object, other: object) -> bool:
     """Whether two entries are the same, numbers to their last digits."""
     if isinstance(one, float) and isinstance(other, float):
         return abs(one - other) <= 1e-9 * max(abs(one), abs(other))

@@ -99,7 +99,7 @@ def _as_written(definitions: dict[str, Any]) -> None:
 def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     """Rows of catalogues with paths beside their names, costs as lists and by IT grades."""
     row = definitions["Row"]
-    row["properties"]["name"] = {"type": "string", "description": "what the row is called"}
+    row["properties"]["name"] = {"type": "string", "description": "name of the row"}
     row["required"], row["additionalProperties"] = ["name"], True  # entries by their paths
     cost = definitions["Cost"]["properties"]
     for key in ("at", "scale"):
@@ -112,7 +112,7 @@ def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     ]  # fmt: skip
 
 
-def _with_files(schema: Any) -> Any:
+def _with_files(schema: object) -> Any:
     """A schema with references to `FileCurve` wherever a curve may come from a file."""
     if schema == OF_FILE:
         return {"$ref": "#/$defs/FileCurve"}
@@ -133,6 +133,27 @@ def scene_schema() -> dict[str, Any]:
     definitions["FileCurve"] = FileCurve.model_json_schema()
     _describe({**definitions, "Scene": schema})
     _as_written(definitions)
+    _inputs(definitions)
+    _rows_of_catalogues(definitions)
+    _cases(definitions)
+    for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
+        row = definitions[name]
+        row["required"] = [k for k in row["required"] if k not in ("clearance", "bearing_radius")]
+    effects = definitions["Effects"]["properties"]
+    for key in ("friction", "guide_friction"):  # one word switches them off
+        entry = effects[key]
+        choices = entry.get("anyOf", [{"$ref": entry.get("$ref")}])
+        kept = {word: entry[word] for word in ("description", "default") if word in entry}
+        effects[key] = {"anyOf": [*choices, {"const": "none"}], **kept}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "hpcclear scene",
+    }
+
+
+def _inputs(definitions: dict[str, Any]) -> None:
+    """Variables and random inputs of a study."""
     for name in ("Variable", "RandomInput"):
         entries = definitions[name]["properties"]
         # Entries whose unit depends on the path are converted before their fields see them.
@@ -141,23 +162,21 @@ def scene_schema() -> dict[str, Any]:
             entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
-    _rows_of_catalogues(definitions)
     entries = definitions["Tolerance"]["properties"]
     entries["range"] = {**_BOUNDS, "description": entries["range"]["description"]}
-    for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
-        required = definitions[name]["required"]
-        definitions[name]["required"] = [
-            k for k in required if k not in ("clearance", "bearing_radius")
-        ]
     definitions["RandomInput"]["additionalProperties"] = (
         True  # parameters of a distribution from elsewhere
     )
     entries = definitions["RandomInput"]["properties"]
     names = {"anyOf": [{"enum": list(OURS)}, {"type": "string"}]}
     entries["distribution"] = {**names, "description": entries["distribution"]["description"]}
-    for key, words in (("file", "in place of values: a CSV table, beside the scene file"),
-                       ("column", "the column of that file, by its name; needed if there are several")):  # fmt: skip
+    for key, words in (("file", "instead of values: a CSV table beside the scene file"),
+                       ("column", "heading of the column in that file; required if there are several")):  # fmt: skip
         entries[key] = {"type": "string", "description": words}
+
+
+def _cases(definitions: dict[str, Any]) -> None:
+    """Cases of a study with their objectives and constraints, and its accuracy."""
     for name in ("Goal", "Constraint"):
         entries = definitions[name]["properties"]
         for key in {"limit", "most"} & entries.keys():
@@ -171,18 +190,7 @@ def scene_schema() -> dict[str, Any]:
     }
     entries = definitions["Case"]["properties"]
     entries["objectives"] = {**goals, "description": entries["objectives"]["description"]}
-    effects = definitions["Effects"]["properties"]
-    for key in ("friction", "guide_friction"):  # one word switches them off
-        entry = effects[key]
-        choices = entry.get("anyOf", [{"$ref": entry.get("$ref")}])
-        kept = {word: entry[word] for word in ("description", "default") if word in entry}
-        effects[key] = {"anyOf": [*choices, {"const": "none"}], **kept}
     case = {"anyOf": [{"$ref": "#/$defs/Case"}, definitions["Case"]["properties"]["random"]]}
     study = definitions["Study"]["properties"]
     study["accuracy"]["anyOf"] = [*_NUMBER["anyOf"], *study["accuracy"]["anyOf"]]
     study["cases"]["additionalProperties"] = case
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **schema,
-        "title": "hpcclear scene",
-    }

@@ -20,8 +20,8 @@ from hpcclear.scene.planar import (
     PlanarJoint,
     PlanarRevolute,
     PlanarSlide,
-    Rubbing,
 )
+from hpcclear.scene.rubbing import Rubbing
 
 JOINTS = {"crank_rod": ("crank.b", "rod.a"), "rod_slider": ("slider.pin", "rod.b")}
 """Journal and bearing of the joints that may have clearance: O12, O23."""
@@ -56,7 +56,7 @@ _TABLES = {
     "drive": "mechanism.drives.drive",
     "effects.guide_friction": "mechanism.joints.guide.friction",
     "effects.slider_load": "mechanism.loads.load.size",
-    **{f"joints.{name}": f"mechanism.joints.{name}" for name in (*JOINTS, "guide")},
+    **{f"joints.{name}": f"mechanism.joints.{name}" for name in ("crank_frame", *JOINTS, "guide")},
 }
 
 
@@ -100,8 +100,9 @@ def linkage_of(scene: Any) -> Planar:
         **_loose(scene.joints.guide),
     )  # fmt: skip
     frame = PlanarRevolute.model_construct(
-        name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o"
-    )
+        name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o",
+        friction=getattr(scene.joints.crank_frame, "friction", None),
+    )  # fmt: skip
     loads: tuple[ForceLoad, ...] = ()
     if effects.slider_load is not None:
         loads = (
@@ -130,7 +131,7 @@ def _joint(scene: Any, name: str) -> PlanarJoint:
     joint, (journal, bearing) = getattr(scene.joints, name), JOINTS[name]
     places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
     if not isinstance(joint, ClearanceJoint):
-        return PlanarRevolute.model_construct(kind="revolute", **places)
+        return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
     x, y = joint.start_eccentricity
     return PlanarClearance.model_construct(
         **places, kind="clearance", clearance=joint.clearance, bearing_radius=joint.bearing_radius,

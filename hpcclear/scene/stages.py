@@ -26,42 +26,40 @@ class Sensitivity(Table):
     """Response surfaces and first-order sensitivities (the paper's sections 4.2 and 5)."""
 
     groups: tuple[Names, ...] | None = None
-    """Inputs that share a surface. Default: masses, mass centres and inertias of each two joined links, as far as they are
-    study variables; of a linkage, the variables of its bodies, two by two."""
+    """Groups of inputs, each with a response surface. Default: masses, mass centres and inertias of each pair of joined
+    links, if they are study variables; for a linkage the variables of each pair of bodies."""
     parameter: str | None = None
-    """The study variable that is fixed for each surface; default the one that drives clearances, if
-    there is just one."""
+    """Study variable with a fixed value in each surface; default: the one that sets clearances, if there is only one."""
     levels: Annotated[int, Count(1, 1000)] = 8
-    """Values of the parameter, evenly over its range."""
+    """Number of values of the parameter, evenly spaced over its range."""
     samples: Annotated[int, Count(1, 10**6)] = 45
-    """Points a surface is fitted to."""
+    """Number of points to which a surface is fitted."""
     test_samples: Annotated[int, Count(2, 10**6)] = 5
-    """Points it is tested on."""
+    """Number of points on which it is tested."""
     order: Annotated[int, Count(1, 6)] = 3
     """Order of the polynomial."""
     terms: Literal["all", "chosen"] | None = None
-    """Terms of each surface: "all" up to its order, or "chosen", all linear ones and those besides that its points speak for.
-    Default all where there are more points than terms, chosen elsewhere."""
+    """Terms of each surface: "all" up to its order, or "chosen": all linear terms and those that cross-validation
+    selects. Default: "all" if there are more points than terms, else "chosen"."""
     together_samples: Annotated[int, Count(1, 10**6)] = 150
-    """Points for the surface in all inputs at once."""
+    """Number of points for the surface in all inputs together."""
     together_order: Annotated[int, Count(1, 6)] = 2
     """Order of that surface."""
     r2: Accuracy = 0.9
-    """Least 1 - SSE/SST on the test points; below it the sample is raised."""
+    """Lowest acceptable R2 = 1 - SSE/SST on the test points. Below it more points are simulated."""
     rmae: Positive = 0.3
-    """Largest error on the test points, over their standard deviation."""
+    """Largest acceptable error on the test points, divided by their standard deviation."""
     resamplings: Annotated[int, Count(0, 20)] = 3
-    """How often the sample is doubled before a surface counts as not fitted."""
+    """Number of times the points are doubled before a surface is rejected."""
     shrink: Share = 0.3
-    """Share of its length by which every interval is shortened about its midpoint, from one round
-    of the convergence loop to the next."""
+    """Fraction by which each interval is shortened about its midpoint in a round of the convergence loop."""
     rounds: Annotated[int, Count(1, 50)] = 6
-    """Intervals looked at, the global one included."""
+    """Number of intervals, including the global one."""
     influence: Share = 0.1
-    """Inputs whose range times sensitivity reaches this share of the largest form X_G-I."""
+    """Inputs whose range times sensitivity is at least this fraction of the largest are selected (X_G-I in the paper)."""
     sobol_samples: Annotated[int, Count(0, 2**24)] = 2**10
-    """Base samples of the global indices, a power of two, each as many simulations as there are
-    variables and two more; 0 leaves the indices out."""
+    """Base samples of the Sobol indices, a power of two. Each requires as many simulations as there are variables, plus
+    two. 0: no indices."""
 
     def chooses(self, inputs: int, order: int, samples: int) -> bool:
         """Whether a surface of that order on so many samples chooses its terms."""
@@ -83,29 +81,29 @@ class Surrogate(Table):
     """Surrogates of the objective: Kriging models (the paper's section 4.2), or others in their place."""
 
     model: Annotated[str, PluginName(SURROGATES)] | None = None
-    """Default "kriging"; or "module:Name", anything with scikit-learn's `fit` and `predict` in a Python file beside the scene,
-    or the name that an installed package offers."""
+    """Surrogate model; default "kriging". Also "module:Name" of a Python file beside the scene (an object with the
+    `fit` and `predict` of scikit-learn), or the name that an installed package offers."""
     models: tuple[Names, ...] | None = None
-    """Inputs of each model; default each group of the sensitivity with its parameter."""
+    """Inputs of each model; default: each group of `sensitivity` with its parameter."""
     optimisation: Names | None = None
-    """The model the swarm searches; default all study variables."""
+    """Inputs of the model that the swarm searches; default: all study variables."""
     r2: Accuracy = 0.99
-    """Least 1 - SSE/SST on the test points."""
+    """Lowest acceptable R2 = 1 - SSE/SST on the test points."""
     rmae: Positive = 0.4
-    """Largest error on the test points, over their standard deviation."""
+    """Largest acceptable error on the test points, divided by their standard deviation."""
     resamplings: Annotated[int, Count(0, 20)] = 1
-    """How often the sample is doubled before an interval is cut."""
+    """Number of times the points are doubled before an interval is halved."""
     cuts: Annotated[int, Count(0, 6)] = 1
-    """How often an interval may be halved where a model is refused."""
+    """Number of times an interval may be halved if a model is rejected."""
     restarts: Annotated[int, Count(0, 100)] = 2
-    """Further starts of Kriging's likelihood search."""
+    """Number of additional starts of the search for the maximum likelihood."""
     kernel: Literal["squared-exponential", "matern-5/2"] | None = None
     """Covariance function: "squared-exponential", the default, for smooth f; or "matern-5/2", twice differentiable, for f with
     kinks. With the latter the swarm averages over 256 points of a Sobol sequence."""
     of: Literal["f", "statistics"] | None = None
-    """What adaptive refinement goes by: "f", designs of the swarm on the surrogate of f; or "statistics", models of each
-    objective and constraint over designs, by expected improvement. Default "f" where its surrogate has R2 of 0.9 or more on
-    fresh points, else "statistics"."""
+    """Basis of the adaptive refinement. "f": designs that the swarm finds on the surrogate of f. "statistics": models
+    of each objective and constraint over the designs, with expected improvement. Default: "f" if the surrogate of f has
+    R2 of at least 0.9 on new points, else "statistics"."""
 
 
 class CertificateOfEffects(Table):
@@ -114,7 +112,7 @@ class CertificateOfEffects(Table):
     tolerance: Annotated[float, Quantity("", above=0, below=1)] = 0.01
     """Largest relative change of mean and standard deviation of f that counts as negligible."""
     samples: Annotated[int, Count(64, 10**9)] | None = None
-    """Simulations of each variant at most; default as many as make a twentieth of the study."""
+    """Largest number of simulations of each variant; default: a twentieth of the study in total."""
     forces: Annotated[bool, Field(strict=True)] = False
     """Whether peak contact forces must stay within the tolerance, too."""
 
@@ -127,27 +125,27 @@ class Swarm(Table):
     """Multi-objective particle swarm (eqs. 22 and 23), or another search in its place."""
 
     algorithm: Annotated[str, PluginName(SEARCHES)] | None = None
-    """Default "swarm". Others: "pymoo:NSGA2" and more of pymoo, with their own settings (`pip install pymoo`);
-    "module:Name" of a Python file beside the scene; the name of an installed plug-in. Each evaluates `particles` designs
-    at a time, `iterations` times."""
+    """Search algorithm; default "swarm". Also "pymoo:NSGA2" and others of pymoo with their own settings (`pip install
+    pymoo`), "module:Name" of a Python file beside the scene, or the name of an installed plug-in. Each evaluates
+    `particles` designs per iteration."""
     particles: Annotated[int, Count(2, 10**6)] = 100
-    """Designs that are moved at a time."""
+    """Number of designs per iteration."""
     iterations: Annotated[int, Count(1, 10**6)] = 100
-    """How often they are moved."""
+    """Number of iterations of a run."""
     runs: Annotated[int, Count(1, 10**4)] = 4
-    """Independent runs of each case."""
+    """Number of independent runs of each case."""
     c1: Factor = 1.8
-    """Pull towards the particle's own best."""
+    """Coefficient of attraction to the particle's own best design."""
     c2: Factor = 1.8
-    """Pull towards a leader of the archive."""
+    """Coefficient of attraction to a leader of the archive."""
     inertia: tuple[Factor, Factor] = (1.2, 0.1)
-    """Inertia weight at the first and the last iteration, linear between."""
+    """Inertia weight at the first and at the last iteration; linear in between."""
     archive: Annotated[int, Count(2, 10**5)] = 100
-    """Solutions of a front."""
+    """Largest number of solutions of a front."""
     statistics: Literal["quadrature", "monte-carlo"] = "quadrature"
-    """How mean and standard deviation over the random inputs are computed."""
+    """Method for mean and standard deviation over the random inputs."""
     monte_carlo_samples: Annotated[int, Count(2, 10**7)] = 1000
-    """Samples a design, for "monte-carlo"."""
+    """Number of samples per design, for "monte-carlo"."""
 
     @model_validator(mode="after")
     def _enough(self) -> "Swarm":
@@ -165,19 +163,19 @@ class MomentAccuracy(Table):
     """Half-widths of confidence intervals, relative."""
 
     mean: Share = 0.002
-    """Of the mean."""
+    """Half-width of the mean, relative."""
     deviation: Share = 0.005
-    """Of the standard deviation."""
+    """Half-width of the standard deviation, relative."""
     quantile: Share | None = None
-    """Of quantiles, where a case has one; default that of the standard deviation."""
+    """Half-width of quantiles, relative, if a case has one; default: that of the standard deviation."""
     exceedance: Share | None = None
-    """Of the probability of exceeding a threshold, where a case has it: absolute; default 0.01."""
+    """Half-width of exceedance probabilities, absolute, if a case has one; default 0.01."""
 
 
 MOMENTS = ("mean", "deviation")
 
 
-def of_both(entry: Any) -> Any:
+def of_both(entry: object) -> Any:
     """A number as the accuracy of mean and standard deviation; of a table with one of them, the other is the same.
 
     Raises
@@ -206,7 +204,7 @@ class Verification(Table):
     """Full simulation of the selected designs."""
 
     method: Literal["qmc", "monte-carlo"] | None = None
-    """Sampling of the random inputs: "qmc", 16 randomised Sobol sequences, as long as `study.accuracy` requires; or
+    """Sampling of the random inputs: "qmc", 16 randomised Sobol sequences, of the length that `study.accuracy` requires; or
     "monte-carlo", `samples` independent draws. Default "qmc", unless `samples` is given."""
     least_samples: Annotated[int, Count(REPLICATES * 4, 2**30)] | None = None
     """First number of simulations of a design, from which its accuracy is estimated, for "qmc"; default 512, at most
@@ -214,38 +212,39 @@ class Verification(Table):
     most_samples: Annotated[int, Count(REPLICATES * 4, 2**30)] = 2**14
     """Largest number of simulations of a design, for "qmc"."""
     contest: Annotated[int, Count(1, 2**10)] = 4
-    """Factor on the simulations that the accuracy requires, for "qmc". Designs of the search may use
-    it while they may still be optimal within the confidence interval. Designs within 0.4 of the target of the lowest value do
-    not need it. 1: no factor."""
+    """Factor on the simulations that the accuracy requires, for "qmc". Designs that may still be optimal within their
+    confidence interval are simulated with up to this factor, unless they are within 0.4 of the target of the lowest
+    value. 1: no factor."""
     samples: Annotated[int, Count(2, 10**9)] | None = None
-    """Draws of a design, for "monte-carlo"; default 10 000."""
+    """Number of draws per design, for "monte-carlo"; default 10 000."""
     designs: Annotated[int, Count(0, 10**5)] = 10
-    """Designs along each front, besides alpha, beta and the baseline design."""
+    """Number of designs along each front, besides alpha, beta and the baseline design."""
     confidence: Share = 0.95
     """Level of the confidence intervals."""
     tolerance: Share = 0.02
     """Relative surrogate error of the mean of alpha and beta above which a warning is printed."""
     deviation_tolerance: Share = 0.05
-    """The same for the standard deviation."""
+    """Relative surrogate error of the standard deviation of alpha and beta above which a warning is printed."""
     infill_rounds: Annotated[int, Count(0, 100)] = 8
-    """Largest number of rounds of adaptive refinement: further designs are simulated where they decide the front.
+    """Largest number of rounds of adaptive refinement: further designs are simulated where they may change the front.
     0: only designs of the search are verified."""
     infill_designs: Annotated[int, Count(1, 10**4)] = 12
-    """Designs of a case in each round."""
+    """Number of designs of a case in each round."""
     infill_samples: Annotated[int, Count(REPLICATES * 2, 10**9)] = 256
-    """Largest number of simulations of each of these, by randomised Sobol sequences; at most `samples`, where that is given."""
+    """Largest number of simulations of each of these designs, by randomised Sobol sequences; at most `samples` if that
+    is given."""
     response_clearance: Annotated[float, Quantity("m", above=0)] | None = None
     """Clearance of all joints in the compared responses, m; default the clearances of scene and design."""
     response_revolutions: Annotated[int, Count(1, 1000)] = 2
-    """Steady revolutions of these responses."""
+    """Number of steady revolutions in each interval of these responses."""
     response_windows: Annotated[int, Count(2, 1000)] = 10
-    """Number of such intervals for averages, fluctuations and peaks, to estimate their scatter."""
+    """Number of intervals, to estimate the scatter of averages, fluctuations and peaks."""
     response_copies: Annotated[int, Count(2, 1000)] = 8
     """Replicas of each response with perturbed starts. If they differ, the motion is chaotic, and their scatter is the
     uncertainty of averages, fluctuations and peaks."""
     audit_samples: Annotated[int, Count(0, 10**6)] = 256
-    """Largest number of simulations of each of the paper's designs under each reading of its text (at least 16); 0: no
-    comparison."""
+    """Largest number of simulations of each of the paper's designs under each interpretation of its text (at least 16);
+    0: no comparison."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Verification":

@@ -38,22 +38,23 @@ class Study(Moving, Table):
     """Sampling and optimisation over a scene."""
 
     seed: Annotated[int, Count(0, 2**63 - 1)] = 0
-    """Every random number of the study follows from it."""
+    """Seed of all random numbers of the study."""
     method: Literal["lhs", "monte-carlo", "random-lhs", "qmc"] = "lhs"
-    """How `sample` draws its points. "lhs": a Latin hypercube over the ranges of the variables. By the distributions of the
-    random inputs: "monte-carlo", independent draws; "random-lhs", stratified; "qmc", a randomised Sobol sequence (use a power
-    of two)."""
+    """Sampling method of `sample`. "lhs": Latin hypercube over the ranges of the variables. The others use the
+    distributions of the random inputs: "monte-carlo", independent draws; "random-lhs", Latin hypercube of the
+    probabilities; "qmc", a randomised Sobol sequence (use a power of two)."""
     samples: Annotated[int, Count(1, 10**9)] = 200
-    """Points of a design: training points of each Kriging model, or what `sample` simulates."""
+    """Number of training points of each Kriging model, and of samples that `sample` simulates."""
     test_samples: Annotated[int, Count(0, 10**6)] = 50
-    """Fresh points each Kriging model is tested on."""
+    """Number of additional points on which each Kriging model is tested."""
     objective: Annotated[str, goals.ObjectiveName(OBJECTIVES)] = "mean-gap"
-    """The objective f to minimise: eq. 13, another response, or one of your own."""
+    """Objective f to minimise: the mean gap (eq. 13), another response, or an objective of your own."""
     accuracy: MomentAccuracy | None = None
-    """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: a number for
-    both, or a table. Each design is simulated until it meets them. They include the error of the integration tolerance,
-    measured by pairs of samples at a tighter tolerance. Left out: `mean = 0.002`, `deviation = 0.005` of the sampling error
-    alone; the intervals then contain the error of the tolerance too, from a few pairs."""
+    """Target half-widths of the confidence intervals of mean and standard deviation of verified designs, relative: one
+    number for both, or a table. Each design is simulated until it meets them. The half-widths include the error of the
+    integration tolerance, measured by pairs of samples at a tighter tolerance. Default: `mean = 0.002`, `deviation =
+    0.005` for the sampling error alone; the printed intervals then still include the error of the tolerance, from a few
+    pairs."""
     variables: Annotated[tuple[Variable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None
@@ -63,14 +64,14 @@ class Study(Moving, Table):
     swarm: Swarm = Swarm()
     verification: Verification = Verification()
     worst_case: Annotated[bool, Field(strict=True)] = False
-    """Whether the largest f within the bounds of the random inputs is searched for the best designs (at their corners and
-    inside); inputs without bounds are taken within three standard deviations."""
+    """Whether to search the largest f of the best designs within the bounds of the random inputs (corners and inside).
+    Inputs without bounds are taken within three standard deviations."""
     certificate: CertificateOfEffects | None = None
-    """Left out, the stage is."""
+    """Effect screening before the study. Without this table the stage is omitted."""
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, data: Any) -> Any:
+    def _fill_in(cls, data: object) -> Any:
         """Cases as plain lists of names, random inputs with the paths of the variable of that name,
         and the sensitivity's parameter."""
         if not isinstance(data, Mapping):
@@ -297,6 +298,11 @@ class Study(Moving, Table):
                 raise invalid(
                     "is a load case", "Remove it, or name another entry", f"random.{row.name}"
                 )
+        self._check_lists(of_loads)
+        self._check_groups()
+
+    def _check_lists(self, of_loads: list[str]) -> None:
+        """Names in lists of the study's variables."""
         lists: list[tuple[str, Iterable[str]]] = [
             ("surrogate.optimisation", self.surrogate.optimisation or ()),
             *(("surrogate.models", model) for model in self.surrogate.models or ()),
@@ -330,6 +336,9 @@ class Study(Moving, Table):
                 "Name one, or remove the empty list",
                 key="surrogate.models",
             )
+
+    def _check_groups(self) -> None:
+        """The fixed parameter of response surfaces."""
         if self.sensitivity.groups:
             if self.sensitivity.parameter is None:
                 raise invalid(
@@ -465,7 +474,7 @@ class Study(Moving, Table):
         )
 
 
-def _with_paths(row: Any, variable: Any) -> Any:
+def _with_paths(row: object, variable: object) -> Any:
     """A random input with the path or paths of the variable of the same name, unless it has its
     own."""
     if not isinstance(row, Mapping) or not isinstance(variable, Mapping):
@@ -475,7 +484,7 @@ def _with_paths(row: Any, variable: Any) -> Any:
     return {**{key: variable[key] for key in ("path", "paths") if key in variable}, **row}
 
 
-def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
+def _with_unit(row: object, random: Mapping[str, object]) -> Any:
     """A variable that drives a random input with an entry that has the same unit."""
     if not isinstance(row, Mapping) or "like" in row:
         return row
@@ -489,7 +498,7 @@ def _with_unit(row: Any, random: Mapping[str, Any]) -> Any:
     return row if own.get("relative") or not paths else {**row, "like": paths[0]}
 
 
-def _only_clearance(variables: Mapping[str, Any]) -> str | None:
+def _only_clearance(variables: Mapping[str, object]) -> str | None:
     """Name of the only study variable that drives clearances; None if there is none or another."""
     found = []
     for name, row in variables.items():

@@ -17,6 +17,7 @@ from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
 from hpcclear.scene.scene import Scene
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import validated
 
@@ -84,7 +85,7 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
             ideal = None
         elif isinstance(joint, PlanarClearance):
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
-        elif isinstance(joint, PlanarSlide):
+        elif isinstance(joint, (PlanarSlide, PlanarSlot)):
             kept = ("kind", "point", "line", "angle")
             ideal = {name: getattr(joint, name) for name in kept}
         yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
@@ -165,13 +166,9 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("slider load", {"effects.slider_load": None})
         turns = turns_of(scene.linkage)
         yield from _mean("slider load", "effects.slider_load", effects.slider_load, turns)
-    if effects.guide_friction is not None:
-        yield Switch("guide friction", {"effects.guide_friction": None})
+    for key, (words, _) in scene.joint_frictions().items():
+        yield Switch(words, {key: None})
     if isinstance(mechanism, Planar):
-        for joint in mechanism.joints:
-            if isinstance(joint, PlanarSlide) and joint.friction is not None:
-                key = f"mechanism.joints.{joint.name}.friction"
-                yield Switch(f"guide friction in {joint.name}", {key: None})
         for load in mechanism.loads:
             key = f"mechanism.loads.{load.name}"
             yield Switch(f"{load.kind} {load.name}", {key: None})
@@ -294,7 +291,7 @@ class Off:
         }
 
 
-def _correlated(table: Mapping[str, Any] | None, names: Mapping[str, Any]) -> dict[str, Any]:
+def _correlated(table: Mapping[str, Any] | None, names: Mapping[str, object]) -> dict[str, Any]:
     """The study's correlation among the random inputs that are left, if it has one."""
     rows = [] if table is None else [k for k, name in enumerate(table["inputs"]) if name in names]
     if table is None or len(rows) < 2:

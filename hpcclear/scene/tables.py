@@ -3,52 +3,52 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
-from hpcclear.base.outcome import MAX_BANDS, WIDEST
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
-from hpcclear.scene.bending import Bending, check_scene
+from hpcclear.scene.bending import Bending
 from hpcclear.scene.effects import Effects
-from hpcclear.scene.fields import NamedRows, Table, check_period, invalid, nearest
+from hpcclear.scene.fields import NamedRows, Table, nearest
 from hpcclear.scene.film import Film
-from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.guides import SliderGuide
-from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism, length_path
+from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
-from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.paths import PHYSICAL, flatten, quantities
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
+from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.study import Study
 from hpcclear.scene.wear import Lives
 
-Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide
+Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide | PlanarSlot
 """Tables of joints that may have clearance."""
 
 
 def _is_loose(joint: Any) -> bool:
     """Whether a joint of a linkage has clearance."""
-    slides = isinstance(joint, PlanarSlide)
+    slides = isinstance(joint, (PlanarSlide, PlanarSlot))
     return joint.clearance is not None if slides else isinstance(joint, PlanarClearance)
 
 
 class SceneTables(Table):
-    """The tables of a scene file, each valid and fitting the others; SI numbers, frozen."""
+    """The tables of a scene file, each valid by itself; SI numbers, frozen."""
 
     format_version: Literal[1, 2] = 1
-    """2 where the mechanism is a planar linkage."""
+    """Version of the format: 2 for a planar linkage, 1 for a slider-crank."""
     mechanism: Annotated[Mechanism | Planar, Field(discriminator="kind")]
     """A slider-crank, or any planar linkage."""
     # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.
     drive: Drive = cast(Any, None)
-    """Of a slider-crank, needed; a linkage has drives of its own."""
+    """Drive of a slider-crank, required there. A linkage has `mechanism.drives` instead."""
     joints: Joints = cast(Any, None)
-    """Of a slider-crank, needed; a linkage has joints of its own. The crank's on the frame is ideal."""
+    """Joints of a slider-crank, required there. A linkage has `mechanism.joints` instead. The joint of crank and frame
+    is always ideal."""
     effects: Effects = Effects()
     numerics: Numerics = Numerics()
     output: Output = Output()
@@ -65,206 +65,6 @@ class SceneTables(Table):
     _known_numbers: dict[str, float] | None = PrivateAttr(None)
     _known_hash: str | None = PrivateAttr(None)
     _linkage: Planar | None = PrivateAttr(None)
-
-    @field_validator("format_version", mode="before")
-    @classmethod
-    def _version_is_a_number(cls, value: Any) -> Any:
-        if isinstance(value, bool):  # equal to 1 in Python
-            raise invalid("true or false is not a version", "Write format_version = 1")
-        return value
-
-    @model_validator(mode="before")
-    @classmethod
-    def _kind_of_mechanism(cls, data: Any) -> Any:
-        """A slider-crank where no kind is named; a linkage brings its own drives and joints."""
-        mechanism = data.get("mechanism") if isinstance(data, Mapping) else None
-        if not isinstance(mechanism, Mapping):
-            return data
-        data = with_shares(with_fits_of_joints(data))
-        kind = mechanism.get("kind", "slider-crank")
-        for table in ("drive", "joints"):
-            if kind == "planar" and table in data:
-                own = "drives" if table == "drive" else table
-                raise invalid(
-                    "belongs to a slider-crank", f"Write [mechanism.{own}.NAME]", key=table
-                )
-        return {**data, "mechanism": {"kind": kind, **mechanism}}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _clearance_of_open_joints(cls, data: Any) -> Any:
-        """Without a path of its own, C drives the clearances there are."""
-        try:
-            if data["mechanism"].get("kind") == "planar":
-                rows = data["mechanism"]["joints"]
-                ideal = [name for name, row in rows.items() if _kind_of(rows, row) != "clearance"]
-                open_joints = [name for name in rows if name not in ideal]
-                paths = [f"mechanism.joints.{name}.clearance" for name in open_joints]
-                return _with_paths_of_clearance(data, paths) if paths else data
-            ideal = [
-                name
-                for name in ("crank_rod", "rod_slider")
-                if data["joints"][name]["kind"] == "ideal"
-            ]
-        except (AttributeError, KeyError, TypeError):
-            return data  # the models below say what is wrong with it
-        if len(ideal) != 1:
-            return data
-        paths = [path for path in SHORT_NAMES["C"] if f".{ideal[0]}." not in path]
-        return _with_paths_of_clearance(data, paths)
-
-    @model_validator(mode="after")
-    def _tables_fit_mechanism(self) -> Self:
-        for table in ("drive", "joints"):
-            if self.template is not None and getattr(self, table) is None:
-                raise invalid("is missing", "Add it", key=table, value=None)
-        for entry in ("slider_load", "guide_friction"):
-            value = getattr(self.effects, entry)
-            if self.template is None and value is not None:
-                raise invalid(
-                    "belongs to a slider-crank",
-                    "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
-                    key=f"effects.{entry}",
-                )
-        if self.template is not None and self.joints.guide is not None:
-            self._check_guide()
-        return self
-
-    def _check_guide(self) -> None:
-        """A slider with clearance tilts, and rubs at its corners."""
-        if self.slider_crank.slider.inertia is None:
-            raise invalid(
-                "a slider in a guide with clearance can turn, so it needs an inertia",
-                "Write its moment of inertia about its pin in kg m2",
-                key="mechanism.slider.inertia", value=None,
-            )  # fmt: skip
-        if self.effects.guide_friction is not None:
-            raise invalid(
-                "a guide with clearance rubs at the slider's corners, by the friction of all contacts",
-                "Remove it, and write effects.friction", key="effects.guide_friction", value=None,
-            )  # fmt: skip
-
-    @model_validator(mode="after")
-    def _curves_repeat(self) -> Self:
-        if self.template is not None:  # a linkage has looked at its own
-            curves = {
-                "drive.torque": getattr(self.drive, "torque", None),
-                "effects.slider_load": self.effects.slider_load,
-            }
-            for key, curve in curves.items():
-                if isinstance(curve, tuple):
-                    check_period(curve, self.drive.turns, key)
-        return self
-
-    @model_validator(mode="after")
-    def _effects_fit_joints(self) -> Self:
-        clearance = self.clearance_joints()
-        contact = self.effects.contact
-        if contact is not None and contact.has_length:
-            for name in clearance:
-                if length_path(self.clearance_joint(name)) is None:
-                    entry, part = (
-                        ("width", "slider") if name in self.guides() else ("length", "bearing")
-                    )
-                    raise invalid(
-                        f'the contact geometry "{contact.geometry}" needs the {entry} of the {part}',
-                        f'Add {entry} = "20 mm" or so to the joint', f"{self.joint_key(name)}.{entry}", None,
-                    )  # fmt: skip
-        if clearance and self.effects.contact is None:
-            raise invalid(
-                "a clearance joint needs a contact law",
-                'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
-                "or make the joints ideal",
-                key="effects.contact",
-                value=None,
-            )
-        if not clearance and self.effects.friction.law != "none":
-            raise invalid(
-                "friction acts in joints with clearance, but all joints are ideal",
-                'Set effects.friction.law = "none", or give a joint kind = "clearance"',
-                key="effects.friction.law",
-                value=self.effects.friction.law,
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _bending_fits(self) -> Self:
-        check_scene(self, self.bending())
-        return self
-
-    @model_validator(mode="after")
-    def _profiles_are_of_dry_joints(self) -> Self:
-        oiled = [name for name in self.worn_joints() if name in self.films()]
-        if self.wear is not None and self.wear.waves and oiled:
-            raise invalid(
-                f"joint {oiled[0]} has an oil film, which needs round surfaces",
-                'Set it to "uniform", or remove the film',
-                key="wear.profile",
-                value=self.wear.profile,
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _objective_s_joints_are_there(self) -> Self:
-        chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
-        clearance = dict.fromkeys((*self.clearance_joints(), *self.contact_labels()))
-        for joint in chosen:
-            if joint not in clearance:
-                raise invalid(
-                    f"{joint} is not a joint with clearance of this scene",
-                    nearest(joint, tuple(clearance)),
-                    key=key,
-                )
-        if len(set(self._contacts_in(chosen))) < len(self._contacts_in(chosen)):
-            raise invalid("a joint is named twice", "Name each once", key=key)
-        if self.study is not None and self.numerics.objective is not None:
-            raise invalid(
-                "a study names its objective itself",
-                "Write study.objective instead",
-                "numerics.objective",
-            )
-        if chosen and not self.objective.of_joints:
-            raise invalid(
-                f'study.objective = "{self.objective.name}" is of no joint',
-                "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
-                key=key,
-            )
-        if chosen and self.numerics.target_error is not None:
-            raise invalid(
-                "the confidence interval of a steady mean exists for the gaps of all joints only",
-                "Leave out the joints, or numerics.target_error",
-                key=key,
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _pressures_are_known(self) -> Self:
-        table: Any = self.effects.contact
-        geometry = None if table is None else table.declared.geometry
-        if geometry is not None and geometry.pressure is not None:
-            return self
-        for one in self._objectives():
-            if not one.asks.isdisjoint(WIDEST):
-                raise invalid(
-                    f"{one.name} needs a geometry of contact with a pressure",
-                    'Add geometry = "line" or "liner" to effects.contact', self.objective_key, one.name,
-                )  # fmt: skip
-        return self
-
-    @model_validator(mode="after")
-    def _levels_can_be_recorded(self) -> Self:
-        bands = self.bands()
-        key = "numerics.levels" if self.numerics.levels else self.objective_key
-        if bands and not self.clearance_joints():
-            raise invalid("force levels need a joint with clearance", "Remove it", key)
-        if bands and self.numerics.target_error is not None:
-            raise invalid(
-                "force levels are those of a given number of revolutions",
-                "Remove numerics.target_error, and set averaged_revolutions", key,
-            )  # fmt: skip
-        if len(bands) > MAX_BANDS:
-            raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)
-        return self
 
     @property
     def required_study(self) -> Study:
@@ -412,7 +212,8 @@ class SceneTables(Table):
         return tuple(joint.name for joint in self.linkage.joints if _is_loose(joint))
 
     def contact_labels(self) -> tuple[str, ...]:
-        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners."""
+        """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a
+        slot's walls."""
         return self._contacts_in(self.clearance_joints())
 
     def _contacts_in(self, joints: tuple[str, ...]) -> tuple[str, ...]:
@@ -428,7 +229,7 @@ class SceneTables(Table):
         return tuple(n for n in self.clearance_joints() if not self.clearance_joint(n).corners)
 
     def guides(self) -> tuple[str, ...]:
-        """Names of the guides with clearance."""
+        """Names of the guides and slots with clearance."""
         return tuple(n for n in self.clearance_joints() if self.clearance_joint(n).corners)
 
     @property
@@ -452,12 +253,20 @@ class SceneTables(Table):
         """Dotted path of the table that has the materials of a joint with clearance."""
         return self.joint_key(label) + (".materials" if self.template is None else "")
 
-    def guide_friction_keys(self) -> tuple[str, ...]:
-        """Dotted paths of the tables of friction in guides."""
-        rubs = [one for one in self.linkage.joints if getattr(one, "friction", None) is not None]
-        if self.template is not None:
-            return ("effects.guide_friction",) * len(rubs)
-        return tuple(f"mechanism.joints.{one.name}.friction" for one in rubs)
+    def joint_frictions(self) -> dict[str, tuple[str, float]]:
+        """Words and coefficient of friction in joints without clearance, by the dotted paths of its tables."""
+        found = {}
+        for one in self.linkage.joints:
+            if (rubs := getattr(one, "friction", None)) is not None:
+                guide = isinstance(one, PlanarSlide)
+                key, words = (
+                    f"{self.joint_key(one.name)}.friction",
+                    f"{'guide' if guide else 'pin'} friction in {one.name}",
+                )
+                if self.template is not None and guide:
+                    key, words = "effects.guide_friction", "guide friction"
+                found[key] = words, rubs.coefficient
+        return found
 
     def pin(self, name: str) -> ClearanceJoint | PlanarClearance:
         """The table of a pin in a bearing."""
@@ -542,23 +351,7 @@ class SceneTables(Table):
         return self._known_numbers
 
 
-def _kind_of(rows: Mapping[str, Any], row: Any) -> str:
-    """Kind of a joint of a linkage, which may be ``like`` another."""
-    return str(row.get("kind") or rows[row["like"]]["kind"])
-
-
-def _with_paths_of_clearance(data: Any, paths: list[str]) -> Any:
-    """The content with these paths for every C of the study that names none."""
-    study = data.get("study")
-    for key in ("variables", "random"):
-        table = study.get(key) if isinstance(study, Mapping) else None
-        row = table.get("C") if isinstance(table, Mapping) else None
-        if isinstance(row, Mapping) and "path" not in row and "paths" not in row:
-            data = replace(data, f"study.{key}.C", {**row, "paths": paths})
-    return data
-
-
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Models as dicts without unset entries, tuples as lists, named rows as a table by name."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]

@@ -22,7 +22,7 @@ _KINDS = {
     "drive": '"constant-speed" or "torque"',
     "joints.crank_rod": '"clearance" or "ideal"',
     "joints.rod_slider": '"clearance" or "ideal"',
-    "joints": '"revolute", "clearance", "slide" or "fixed"',
+    "joints": '"revolute", "clearance", "slide", "slot" or "fixed"',
     "drives": '"constant-speed", "harmonic" or "torque"',
     "loads": '"force", "torque" or "spring"',
 }
@@ -40,7 +40,7 @@ def check_path(path: object) -> None:
         raise InputError("path", path, "is not a dotted path", "Write, say, mechanism.rod.mass")
 
 
-def validated(model: type[Valid], content: Mapping[str, Any]) -> Valid:
+def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
     """SceneTables as a model of its kind.
 
     Raises
@@ -57,7 +57,7 @@ def validated(model: type[Valid], content: Mapping[str, Any]) -> Valid:
         raise _translated(details[0], content, more=len(details) - 1) from None
 
 
-def _check_depth(content: Mapping[str, Any]) -> None:
+def _check_depth(content: Mapping[str, object]) -> None:
     level: list[Any] = [content]
     for _ in range(DEEPEST):
         level = [
@@ -76,7 +76,7 @@ def _check_depth(content: Mapping[str, Any]) -> None:
     )
 
 
-def _translated(error: ErrorDetails, content: Mapping[str, Any], more: int) -> InputError:
+def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -> InputError:
     """A pydantic error as an InputError."""
     context = error.get("ctx", {})
     location = _untagged(error["loc"], error["type"])
@@ -115,7 +115,7 @@ def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ..
     return location
 
 
-def _follow(location: tuple[int | str, ...], content: Any) -> tuple[tuple[str, ...], Any]:
+def _follow(location: tuple[int | str, ...], content: object) -> tuple[tuple[str, ...], Any]:
     """The keys along a location, and what stands there in the raw content (None if nothing
     does)."""
     names: list[str] = []
@@ -134,7 +134,7 @@ def _follow(location: tuple[int | str, ...], content: Any) -> tuple[tuple[str, .
     return tuple(names), content
 
 
-def _explained(error: ErrorDetails, found: Any, path: str) -> tuple[str, str]:
+def _explained(error: ErrorDetails, found: object, path: str) -> tuple[str, str]:
     """Reason and remedy for the errors that pydantic finds by itself."""
     context = error.get("ctx", {})
     match error["type"]:

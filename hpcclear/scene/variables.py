@@ -19,35 +19,35 @@ LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
 
 
 class Variable(NamedInput):
-    """One column of a design: a name, the scene entries it drives, and its bounds in SI, or all that it may be."""
+    """A study variable: its name, the scene entries that it sets, and its bounds in SI or its allowed values."""
 
     range: Range | None = None
-    """Bounds, SI."""
+    """Lower and upper bound, SI."""
     ratio: Range | None = None
-    """For an inertia: bounds of r = I / (m L^2 / 12), sampled in place of I."""
+    """For an inertia: bounds of r = I / (m L^2 / 12), which is sampled instead of I."""
     step: float | None = None
-    """Beside `range`: only its lower bound and whole steps from there are designs, SI."""
+    """With `range`: designs have the lower bound plus whole multiples of this step, SI."""
     values: tuple[float, ...] | None = None
-    """In place of a range: the only values of a design, SI."""
+    """Instead of a range: the allowed values, SI."""
     fits: tuple[str, ...] | None = None
-    """In place of a range: fits by ISO 286, such as "20 H7/f7", of the joints in `path`, and of random inputs whose
-    distribution is "fit": `path = ["joints.crank_rod.fit", "random.C12.fit"]`."""
+    """Instead of a range: ISO 286 fits, such as "20 H7/f7", for the joints in `path` and for random inputs with the
+    distribution "fit": `path = ["joints.crank_rod.fit", "random.C12.fit"]`."""
     catalogue: tuple[Row, ...] | None = None
-    """In place of a range: rows, each with a name, perhaps a cost, and the same entries by their paths:
+    """Instead of a range: rows of a catalogue. Each has a name, the same entries by their paths, and optionally a cost:
     `{ name = "6204", cost = 3, "joints.crank_rod.bearing_radius" = "10 mm" }`."""
     follows: tuple[str, ...] = ()
-    """What it drives that is no number of the mechanism: fits of joints, and entries of random inputs such as
+    """Entries it sets that are not numbers of the mechanism: fits of joints, and entries of random inputs such as
     "random.C12.half_width". Written as `path` or `paths`."""
     like: str | None = None
-    """Entry whose unit it has, where it drives random inputs; found by the study."""
+    """Entry that determines its unit if it sets random inputs. The study determines it."""
     over: Literal["worst"] | tuple[Annotated[float, Quantity("", least=0)], ...] | None = None
-    """Of load cases: no design chooses it, but all are simulated at each of its values or rows, and f is the largest of them
-    ("worst"), or their mean by these weights, one for each."""
+    """For load cases: each design is simulated at all values or rows of this variable. f is the largest result
+    ("worst"), or the mean with these weights, one for each row."""
     cost: Cost | None = None
-    """What a design costs by its value, for the statistic "cost" of a case."""
+    """Cost of a design as a function of this value, for the statistic "cost" of a case."""
 
     @classmethod
-    def _without_numbers(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, Any]:
         if "catalogue" in data and "path" not in data:
             return {**data, "paths": texts_in(data.get("paths"))}
         given = data.get("paths", data.get("path", ()))

@@ -8,14 +8,15 @@ from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table, check_
 
 
 class WornSurface(Table):
-    """How fast one surface wears: a coefficient with a unit, or one without over the surface's hardness."""
+    """Wear coefficient of one surface: `coefficient` in m2/N, or `dimensionless` together with the `hardness` of the
+    surface."""
 
     coefficient: Annotated[float, Quantity("m**2/N", least=0)] | None = None
-    """k, worn volume over normal force times sliding distance, m2/N (Archard 1953)."""
+    """Wear coefficient k, m2/N: worn volume / (normal force x sliding distance) (Archard 1953)."""
     dimensionless: Annotated[float, Quantity("", least=0)] | None = None
-    """K; k = K / hardness."""
+    """Dimensionless wear coefficient K; k = K / hardness."""
     hardness: Annotated[float, Quantity("Pa", above=0)] | None = None
-    """H of this surface, Pa."""
+    """Hardness of this surface, Pa."""
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "WornSurface":
@@ -46,12 +47,13 @@ class Wear(Table):
     """Archard wear of a joint; a surface that is left out does not wear."""
 
     length: PositiveLength
-    """Of the bearing, at right angles to the plane, m."""
+    """Length of the bearing along its axis, m."""
     bearing: WornSurface | None = None
     journal: WornSurface | None = None
     running_in: RunningIn | None = None
     threshold: Annotated[float, Quantity("Pa", above=0)] | None = None
-    """Pressure (normal force over diameter times length) that wears nothing, Pa; from a tenth more on all of it counts."""
+    """Pressure below which there is no wear, Pa (normal force / (diameter x length)). The wear rate increases linearly
+    to its full value at 1.1 times this pressure."""
 
     @model_validator(mode="after")
     def _something_wears(self) -> "Wear":
@@ -66,14 +68,15 @@ class Wear(Table):
 
 
 class Limits(Table):
-    """What ends a life, whichever is passed first; a clearance of a quarter of its bearing's radius always does."""
+    """Thresholds that end a service life; the first one that is passed counts. A clearance of a quarter of the bearing
+    radius always ends it."""
 
     clearance: PositiveLength | None = None
-    """Of any worn joint, m."""
+    """Clearance of any worn joint, m."""
     peak_contact_force: Annotated[float, Quantity("N", above=0)] | None = None
-    """At any joint, N."""
+    """Peak contact force of any joint, N."""
     objective: Annotated[float, Quantity("", above=0)] | None = None
-    """f, SI."""
+    """Objective f, SI."""
 
     def given(self) -> dict[str, float]:
         """Those that are set, by name."""
@@ -91,11 +94,11 @@ class Lives(Table):
     tolerance: Annotated[float, Quantity("", above=0, most=0.2)] = 0.01
     """Relative error of an extrapolation jump, in each clearance and in f."""
     copies: Annotated[int, Count(2, 1024)] = 4
-    """Replicas at a state of wear, perturbed by 1e-9 of the clearance; they diverge if the motion is chaotic."""
+    """Number of replicas at a state of wear, perturbed by 1e-9 of the clearance. They diverge if the motion is chaotic."""
     most_copies: Annotated[int, Count(2, 1024)] = 32
     """Largest number of replicas, if the confidence intervals of wear rate and f exceed the tolerance."""
     profile: Literal["uniform", "angular"] = "uniform"
-    """Wear around the surfaces: uniform, or where they touch."""
+    """Distribution of wear around the surfaces: "uniform", or "angular" where they touch."""
     harmonics: Annotated[int, Count(1, 8)] = 3
     """Fourier components of an angular profile; more components resolve narrower grooves."""
     bins: Annotated[int, Count(4, 3600)] = 72
@@ -103,9 +106,10 @@ class Lives(Table):
     points: Annotated[int, Count(2, 10**4)] = 41
     """Number of ages at which curves are stored."""
     limit: Limits = Limits()
-    """Values that end a service life."""
+    """Thresholds that end a service life."""
     beyond_limit: bool = False
-    """Whether service lives continue beyond their limit, to `cycles` or to a clearance of a quarter of the bearing radius."""
+    """Whether service lives continue beyond the thresholds in `limit`, to `cycles` or to a clearance of a quarter of
+    the bearing radius."""
 
     @property
     def waves(self) -> int:

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.statistics.random.replicates import FEWEST, student
+from hpcclear.base.student import student
+from hpcclear.statistics.random.replicates import FEWEST
 
 REFERENCE = 1e-6
 """Force of 0 dB, N."""

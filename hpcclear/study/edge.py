@@ -5,6 +5,9 @@ A design of the search has some hundred simulations, from which a probability of
 is. So the best design that it allows is simulated until its probability is known, the model is shifted by what it was wrong
 there, and the best design is sought anew (sequential optimisation and reliability assessment).
 
+Along the edge an objective changes by little while designs change by much, and which way is better depends on the slopes of
+the constraint there. So the search ends with designs next to the edge, on both sides of each variable.
+
 Source: X. Du and W. Chen, "Sequential optimization and reliability assessment method for efficient probabilistic design",
 J. Mech. Design 126 (2004) 225-233, doi:10.1115/1.1649968.
 """
@@ -35,17 +38,23 @@ AIM, LESS = 0.8, 0.75
 """Probability that is sought, over the largest that is allowed: so much below it can be shown; and what is sought of that after
 a design that could not be decided."""
 
-NEAR = 0.65
-"""Of the allowed probability: a design that significantly keeps it and has more is near enough."""
+NEAR, CLOSE = 0.65, 0.9
+"""Of the allowed probability: a design that significantly keeps it and has between these is near enough. Nearer to it the
+verification, which has scatter of its own, may leave it open."""
 
-SMALL = 0.02
-"""Of the same for other statistics than probabilities: 0.4 % below the threshold is sought, then 0.8 % and more."""
+SMALL = 0.012
+"""Of the same for other statistics than probabilities: 0.24 % below the threshold is sought, then 0.5 % and more."""
+
+ASIDE = 0.15, 0.1, 0.03
+"""How far the designs next to the edge are from it, over each range, one turn after the other."""
 
 PARTICLES, ITERATIONS = 48, 60
-STEPS, LOCAL = (0.1, 0.03, 0.01, 0.003), 256
-"""Parts of each range that the best design is moved by at last, and how often."""
+STEPS, AGAIN, LOCAL = (0.1, 0.03, 0.01, 0.003, 0.001), 16, 128
+"""Parts of each range that the best design is moved by at last, how often it may be replaced at each, and by how many moves.
+Along the edge some percent of a variable change the first objective by a thousandth."""
 
 Judge = Callable[[Array], tuple[Array, Array]]
+Predict = Callable[[Array], Array]
 
 
 def cases_of(study: Study) -> list[Case]:
@@ -55,8 +64,6 @@ def cases_of(study: Study) -> list[Case]:
 
 def simulations(study: Study) -> int:
     """Simulations of all rounds, at most."""
-    if study.verification.infill_rounds == 0:
-        return 0
     each = truth.expected(study)
     return sum(
         ROUNDS * (each + verdicts.usual_in(case, study.verification)) for case in cases_of(study)
@@ -88,41 +95,90 @@ def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> 
     }
 
 
-def _of_case(
-    run: StudyRun, case: Case, coordinates: Array, values: Array, excess: Array
-) -> list[Choice]:
+def neighbours(
+    run: StudyRun, case: Case, aside: float, coordinates: Array, values: Array, excess: Array
+) -> Array:
+    """Designs next to the best one at the edge, on both sides of each design variable, (k, d), from what the search knows
+    (see `approach`).
+
+    Raises
+    ------
+    InputError
+        Too few designs that did not fail for a model.
+    """
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     names = run.study.design_variables(case.name)
-    region, rng = box(run.scene, names), run.rng("edge", case.name)
-    bounds = np.column_stack([region.lower, region.upper])
+    bounds, rng = _bounds(run, case), run.rng("edge", case.name, str(len(coordinates)))
+    with threadpool_limits(limits=1, user_api="blas"):
+        models = _models(run, case, coordinates, values, excess, rng)
+        judged = _judge(run, case, *models, _gap(case, AIM))
+        place = _best(judged, bounds, _first(coordinates, excess), rng)
+    moves = np.diag(aside * (bounds[:, 1] - bounds[:, 0]))
+    points = np.clip(np.vstack([place, place + moves, place - moves]), *bounds.T)
+    return np.unique(snapped(run.study, names, points), axis=0)
+
+
+def _bounds(run: StudyRun, case: Case) -> Array:
+    """Of design variables, in sampling coordinates, (d, 2)."""
+    region = box(run.scene, run.study.design_variables(case.name))
+    return np.column_stack([region.lower, region.upper])
+
+
+def _first(coordinates: Array, excess: Array) -> Array:
+    """Designs that a search begins with: those that break constraints least."""
+    return coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]]
+
+
+def _models(
+    run: StudyRun, case: Case, coordinates: Array, values: Array, excess: Array, rng: np.random.Generator
+) -> tuple[TwoScales, list[Predict]]:  # fmt: skip
+    """What steers to the constraints, and the first two objectives, as functions of designs."""
+    bounds = _bounds(run, case)
+    model = TwoScales(coordinates, excess, bounds, rng)
+    return model, [
+        exact or TwoScales(coordinates, column, bounds, rng).predict
+        for exact, column in zip(goals.exact_in(run.scene, case)[:2], values.T, strict=False)
+    ]
+
+
+def _judge(
+    run: StudyRun, case: Case, model: TwoScales, objectives: list[Predict], off: float
+) -> Judge:
+    """Objectives of designs and by how much they break the constraints, which are shifted by `off`."""
+    names = run.study.design_variables(case.name)
+
+    def judged(points: Array) -> tuple[Array, Array]:
+        points = snapped(run.study, names, points)
+        least = np.column_stack([one(points) for one in objectives])
+        return least, np.maximum(model.predict(points) + off, 0.0)
+
+    return judged
+
+
+def _of_case(
+    run: StudyRun, case: Case, coordinates: Array, values: Array, excess: Array
+) -> list[Choice]:
+    from threadpoolctl import threadpool_limits
+
+    names = run.study.design_variables(case.name)
+    bounds, rng = _bounds(run, case), run.rng("edge", case.name)
     kept: list[Choice] = []
     shift, aim = 0.0, AIM
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            model = TwoScales(coordinates, excess, bounds, rng)
-            objectives = [
-                exact or TwoScales(coordinates, column, bounds, rng).predict
-                for exact, column in zip(
-                    goals.exact_in(run.scene, case)[:2], values.T, strict=False
-                )
-            ]
+            model, objectives = _models(run, case, coordinates, values, excess, rng)
     except InputError:  # too few designs that did not fail for a model
         return kept
+    start = _first(coordinates, excess)
+    safe: tuple[Array, float] | None = None
+    beyond: tuple[Array, float] | None = None
     for _ in range(ROUNDS):
-
-        def judged(points: Array, off: float = shift + _gap(case, aim)) -> tuple[Array, Array]:
-            points = snapped(run.study, names, points)
-            least = np.column_stack([one(points) for one in objectives])
-            return least, np.maximum(model.predict(points) + off, 0.0)
-
+        judged = _judge(run, case, model, objectives, shift + _gap(case, aim))
         with threadpool_limits(limits=1, user_api="blas"):
-            place = _best(
-                judged,
-                bounds,
-                coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]],
-                rng,
-            )
+            place = _best(judged, bounds, start, rng)
+            if safe is not None and beyond is not None:
+                place = _between(safe, beyond, -_gap(case, aim))
             place = snapped(run.study, names, place[None])[0]
             guess = float(model.predict(place[None])[0])
         row = to_physical(run.scene, names, place[None])[0]
@@ -135,10 +191,21 @@ def _of_case(
         now = _precise(case, true)
         if standing < Standing.BROKEN:
             kept.append(choice)
-        if standing == Standing.KEPT and now > -_gap(case, NEAR):
+        clear = standing == Standing.KEPT and now <= -_gap(case, CLOSE)
+        if clear and now > -_gap(case, NEAR):
             break
+        if clear:
+            safe = place, now
+        else:
+            beyond = place, now
         shift, aim = now - guess, aim * (LESS if standing == Standing.UNDECIDED else 1.0)
     return kept
+
+
+def _between(safe: tuple[Array, float], beyond: tuple[Array, float], sought: float) -> Array:
+    """The design between two on both sides of the edge: what steers to the constraints is as sought there, if it is linear."""
+    part = (sought - safe[1]) / (beyond[1] - safe[1]) if beyond[1] > safe[1] else 0.5
+    return np.asarray(safe[0] + np.clip(part, 0.1, 0.9) * (beyond[0] - safe[0]))
 
 
 def _best(judged: Judge, bounds: Array, start: Array, rng: np.random.Generator) -> Array:
@@ -156,7 +223,7 @@ def _best(judged: Judge, bounds: Array, start: Array, rng: np.random.Generator) 
     points = np.concatenate([front.points, start])
     place = _least(judged, points)
     width = bounds[:, 1] - bounds[:, 0]
-    for step in STEPS:
+    for step in np.repeat(STEPS, AGAIN):
         moves = step * width * rng.uniform(-1.0, 1.0, (LOCAL, len(width)))
         moves *= rng.random(moves.shape) < 0.7  # along some axes only, so that bounds are kept
         place = _least(

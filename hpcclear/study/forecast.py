@@ -40,6 +40,9 @@ USUAL = {"verification": 0.8, "infill": 0.8}
 CONTESTED = 1.2
 """Times the simulations that an accuracy takes: what designs get beyond it while they may be the best."""
 
+SAFE = 0.5
+"""Of the simulations that decide a rare failure: what a design takes on average, since most are far from the threshold."""
+
 LONGEST = 10.0
 """Seconds that a pilot may take."""
 
@@ -90,7 +93,10 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
         each = np.mean([_of_case(run, case) for case in study.cases])
     except InputError:
         return sum(samples.values()), seconds
-    samples["verification"] = int(samples["verification"] * each / truth.expected(study))
+    rare = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
+    rare //= len(study.cases)
+    designs = samples["verification"] / (truth.expected(study) + rare)
+    samples["verification"] = int(designs * (each + SAFE * rare))
     for name, share in USUAL.items():
         samples[name] = int(share * samples[name])
     return sum(samples.values()), here.seconds / here.count

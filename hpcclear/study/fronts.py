@@ -9,7 +9,8 @@ from hpcclear.results import dataset
 from hpcclear.scene.domain import to_physical
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import most_of, names_of
-from hpcclear.study.optimisation import Choice, problem_of
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.problem import problem_of
 from hpcclear.study.run import Result, StudyRun
 
 

@@ -89,6 +89,14 @@ def simulations(study: Study) -> tuple[int, int]:
     return (extremes + spread + rays) * each, rounds * len(study.cases) * each
 
 
+def at_edges(study: Study) -> int:
+    """Simulations of designs at the edge of constraints and next to it, at most."""
+    if study.verification.infill_rounds == 0:
+        return 0
+    beside = sum(2 * len(study.design_variables(case.name)) + 1 for case in edge.cases_of(study))
+    return edge.simulations(study) + len(edge.ASIDE) * beside * length(study) * REPLICATES
+
+
 def length(study: Study) -> int:
     """Points of each replicate that a design of the search gets: fewer than verified ones, a power of two."""
     wanted = min(study.verification.infill_samples, study.verification.draws or truth.FIRST)
@@ -140,6 +148,8 @@ def search(
         for name, its in met.items()
         if not _stands(run, name, its, patience) and (won := _won(run, name, its[-2:]))
     ]
+    if not statistics:
+        _end_at_edges(run, met)
     named = [] if statistics else [choice for choice in start if choice.name]
     finalists = [
         one
@@ -151,6 +161,26 @@ def search(
         known = {name: (one.coordinates, one.values, one.excess) for name, one in last.items()}
         finalists += edge.choices_of(run, run.stage("edge", edge.approach, known))
     return finalists, remarks
+
+
+def _end_at_edges(run: StudyRun, met: Mapping[str, list[Tried]]) -> None:
+    """Add designs next to the edge of the constraints, whose slopes decide which design there is the best."""
+    names = [case.name for case in edge.cases_of(run.study)]
+    for turn, aside in enumerate(edge.ASIDE if names else ()):
+        going = {name: met[name][-1] for name in names}
+        found = run.stage(f"edge-{turn}", _beside, going, f"edge-{turn}", aside)
+        for name, before in going.items():
+            met[name].append(_tried(run, name, found, before))
+
+
+def _beside(run: StudyRun, tried: Mapping[str, Tried], stage: str, aside: float) -> Result:
+    """One of these turns."""
+    chosen = []
+    for name, one in tried.items():
+        with contextlib.suppress(InputError):  # too few designs that did not fail for a model
+            case, known = run.study.case(name), (one.coordinates, one.values, one.excess)
+            chosen += _choices(run, name, edge.neighbours(run, case, aside, *known))
+    return _simulated(run, chosen, stage)
 
 
 def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:

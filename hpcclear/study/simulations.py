@@ -17,6 +17,14 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
 from hpcclear.study import loads as loading
 
+SHOWN = {
+    "check": "designs of the search",
+    "infill": "refinement",
+    "pairs": "runs at two tolerances",
+    "chaos": "perturbed runs",
+}
+"""Names of stages on the progress display, where the stage has another one."""
+
 
 class Simulations:
     """Simulates batches of designs, numbered one after the other through the whole study.
@@ -134,7 +142,7 @@ class Simulations:
 
     def _records(self, points: Points, stage: str) -> np.ndarray:
         style = self.style if len(points) >= 1000 else "quiet"
-        progress = Progress(stage, style=style)
+        progress = Progress(SHOWN.get(stage.partition("-")[0], stage), style=style)
         records = sample_points(
             self.scene,
             points,

@@ -17,7 +17,6 @@ from hpcclear.study import (
     certificate,
     chaos,
     contributions,
-    edge,
     fronts,
     lives,
     optimisation,
@@ -174,7 +173,7 @@ def _of_surrogates(scene: Scene) -> dict[str, int]:
 
 def _of_search(scene: Scene) -> dict[str, int]:
     begun, rounds = refinement.simulations(scene.required_study)
-    return {"check": begun, "infill": rounds, "edge": edge.simulations(scene.required_study)}
+    return {"check": begun, "infill": rounds, "edge": refinement.at_edges(scene.required_study)}
 
 
 def _designs(scene: Scene) -> int:

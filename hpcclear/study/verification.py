@@ -14,7 +14,8 @@ from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import verdicts
 from hpcclear.study.goals import excess, most_of, names_of
-from hpcclear.study.optimisation import Choice, problem_of
+from hpcclear.study.optimisation import Choice
+from hpcclear.study.problem import problem_of
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
 

@@ -105,7 +105,7 @@ if [ -n "$lock" ]; then
     pip --require-hashes -r "$lock"
     pip --no-deps --no-build-isolation -e "$root"
 else
-    pip --upgrade --upgrade-strategy eager -e "$root[$extras]"
+    pip --upgrade --upgrade-strategy eager -e "${root}[$extras]"
 fi
 # Loading what commands load compiles it, once and for all ranks, and for those who may only read; what is wrong with it they say.
 (cd "$root" && env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -c "import hpcclear.study, hpcclear.report") >/dev/null 2>&1

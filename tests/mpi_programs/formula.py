@@ -97,6 +97,7 @@ infill_rounds = 1
 infill_designs = 6
 """
 
+CHUNK = 200  # samples that a call evaluates
 FIELD = ""  # of a record that gets the objective as well
 FAILS_ABOVE = np.inf
 BIAS = 0.0
@@ -121,24 +122,26 @@ class FormulaWorker:
         self._scene = load_scene(payload["scene"], trust=True)  # as the evaluators of the package
         self._objective = self._scene.objective
         self._paths = payload["paths"]
-        self._queue: list[tuple[int, np.ndarray]] = []
+        self._index, self._points = np.empty(0, int), np.empty((0, len(self._paths)))
 
     @property
     def pending(self) -> int:
-        return len(self._queue)
+        return len(self._index)
 
     def submit(self, index: np.ndarray, points: np.ndarray) -> None:
-        self._queue += zip(index.tolist(), points, strict=True)
+        self._index = np.concatenate([self._index, index])
+        self._points = np.concatenate([self._points, points])
 
     def advance(self, seconds: float) -> np.ndarray:
-        taken = [self._queue.pop() for _ in range(min(200, len(self._queue)))]
-        if not taken:
+        taken, values = self._index[-CHUNK:], self._points[-CHUNK:]
+        self._index, self._points = self._index[:-CHUNK], self._points[:-CHUNK]
+        if not len(taken):
             return np.zeros(0, OUTCOME)
-        values = np.array([point for _, point in taken])
         column = {path: np.full(len(taken), x) for path, x in numbers(self._scene).items()}
         for k, paths in enumerate(self._paths):
             column |= dict.fromkeys(paths, values[:, k])
-        records = np.concatenate([failed(index, Status.STEP_CAP) for index, _ in taken])
+        records = np.repeat(failed(0, Status.STEP_CAP), len(taken))
+        records["sample"] = taken
         fine = column["mechanism.slider.mass"] <= FAILS_ABOVE
         for name in ("objective", "objective_spread"):
             records[name][fine] = objective(column)[fine] if name == "objective" else 0.0

@@ -8,6 +8,7 @@ hangs up before that kills it.
 import atexit
 import contextlib
 import ctypes
+import gc
 import importlib
 import json
 import multiprocessing.synchronize  # noqa: F401 - nobody may not read it later
@@ -144,4 +145,6 @@ def load() -> None:
 
 if __name__ == "__main__":
     load()
+    gc.collect()
+    gc.freeze()  # programs look for unreachable objects among their own only, and copy no page to do so
     serve(sys.argv[1])

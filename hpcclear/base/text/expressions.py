@@ -259,11 +259,11 @@ class Expressions:
         )  # fmt: skip
 
     def attempt(
-        self, function: Any, arguments: list[Value], named: dict[str, Value]
+        self, function: object, arguments: list[Value], named: dict[str, Value]
     ) -> Value | None:
         """Write a call out; None where it has to stay a call."""
         raise NotImplementedError
 
-    def beside(self, function: Any, arguments: list[Value], named: dict[str, Value]) -> ast.expr:
+    def beside(self, function: object, arguments: list[Value], named: dict[str, Value]) -> ast.expr:
         """Call a function that stands beside this one."""
         raise NotImplementedError

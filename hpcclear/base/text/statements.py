@@ -26,7 +26,7 @@ class Writer(Expressions):
     # ---- calls ----------------------------------------------------------------------------------
 
     def attempt(
-        self, function: Any, arguments: list[Value], named: dict[str, Value]
+        self, function: object, arguments: list[Value], named: dict[str, Value]
     ) -> Value | None:
         """Write a call out; None where it has to stay a call."""
         if not self.guarded:
@@ -71,7 +71,7 @@ class Writer(Expressions):
         return ast.Name(leaves[-1], ast.Load())
 
     def function(
-        self, function: Any, name: str, arguments: list[Value], named: dict[str, Value]
+        self, function: object, name: str, arguments: list[Value], named: dict[str, Value]
     ) -> None:
         """Add a function to the module."""
         plain = getattr(function, "py_func", function)
@@ -87,7 +87,7 @@ class Writer(Expressions):
         made.body = self.block or made.body
         self.shared.functions.append((made, self.kind))
 
-    def write_out(self, function: Any, arguments: list[Value], named: dict[str, Value]) -> Value:
+    def write_out(self, function: object, arguments: list[Value], named: dict[str, Value]) -> Value:
         """Write a function's body where its call stands; what it returns."""
         plain = getattr(function, "py_func", function)
         scope = self.scope_of(plain, arguments, named)

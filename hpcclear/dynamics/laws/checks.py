@@ -121,62 +121,20 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
     """LawError unless each function, run on quantities, returns one of its own unit; `values` of the parameters, SI."""
     import pint
 
-    made = registry().Quantity
-    given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
-    given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
-    given["depth"] = made(1e-5, "m")
-    for one in law.parameters:
-        value = values[one.name]
-        try:
-            given[one.name] = (
-                tuple(made(v, one.unit) for v in value)
-                if isinstance(value, tuple)
-                else made(value, one.unit)
-            )
-        except (
-            pint.UndefinedUnitError,
-            pint.DefinitionSyntaxError,
-            ValueError,
-            AttributeError,
-            TypeError,
-        ) as error:
-            raise LawError(
-                f"the unit {one.unit!r} of {one.name} is not known ({error})", "Write, say, s/m"
-            ) from None
+    given = _quantities(law, values)
 
     def run(title: str, function: Callable[..., Any], unit: str) -> Any:
+        asked = (given[name] for name in law.arguments(function))
         try:
-            found = with_words(function, WORDS, {})(
-                *(given[name] for name in law.arguments(function))
-            )
-            return _expected(found, title, unit)
+            return _in_unit(law, with_words(function, WORDS, {})(*asked), title, unit)
         except (ZeroDivisionError, OverflowError):
-            raise LawError(
-                f"{title} is not finite", "Correct the formula, or the parameters"
-            ) from None
+            reason = f"{title} is not finite"
+            raise LawError(reason, "Correct the formula, or the parameters") from None
         except (pint.DimensionalityError, pint.OffsetUnitCalculusError) as error:
             raise LawError(
                 f"{title} does not fit its units: {error}",
                 "Correct the formula, or the unit of a parameter",
             ) from None
-
-    def _expected(found: Any, title: str, unit: str) -> Any:
-        if isinstance(found, Mapping):
-            missing = found.keys() - law.numbers.keys()
-            if len(law.worked_out()) == 1:
-                missing |= law.numbers.keys() - found.keys()
-            if missing:
-                raise LawError(
-                    f"once returns {', '.join(found)}, but numbers declares {', '.join(law.numbers) or 'none'}",
-                    "Declare each with its unit: numbers={...}",
-                )
-            return {
-                name: _expected(value, f"{title}: {name}", law.numbers[name])
-                for name, value in found.items()
-            }
-        if not hasattr(found, "magnitude"):
-            found = made(found, unit) if found == 0 else made(found, "")
-        return found.to(unit or "dimensionless")
 
     for made_once in law.worked_out():
         given |= run("once", made_once, "")
@@ -187,8 +145,55 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
         run("energy", law.energy, "J")
 
 
+def _quantities(law: Law, values: Mapping[str, Any]) -> dict[str, Any]:
+    """What a law's functions may require, with units."""
+    import pint
+
+    unknown = (
+        pint.UndefinedUnitError,
+        pint.DefinitionSyntaxError,
+        ValueError,
+        AttributeError,
+        TypeError,
+    )
+    made = registry().Quantity
+    given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
+    given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
+    given["depth"] = made(1e-5, "m")
+    for one in law.parameters:
+        value, several = values[one.name], isinstance(values[one.name], tuple)
+        try:
+            found = [made(v, one.unit) for v in (value if several else [value])]
+        except unknown as error:
+            raise LawError(
+                f"the unit {one.unit!r} of {one.name} is not known ({error})", "Write, say, s/m"
+            ) from None
+        given[one.name] = tuple(found) if several else found[0]
+    return given
+
+
+def _in_unit(law: Law, found: Any, title: str, unit: str) -> Any:
+    """What a function returned, in its unit; of ``once`` each number in its own."""
+    if isinstance(found, Mapping):
+        missing = found.keys() - law.numbers.keys()
+        if len(law.worked_out()) == 1:
+            missing |= law.numbers.keys() - found.keys()
+        if missing:
+            raise LawError(
+                f"once returns {', '.join(found)}, but numbers declares {', '.join(law.numbers) or 'none'}",
+                "Declare each with its unit: numbers={...}",
+            )
+        return {
+            name: _in_unit(law, value, f"{title}: {name}", law.numbers[name])
+            for name, value in found.items()
+        }
+    if not hasattr(found, "magnitude"):
+        found = registry().Quantity(found, unit if found == 0 else "")
+    return found.to(unit or "dimensionless")
+
+
 # ---- numbers --------------------------------------------------------------------------------------
-def check_numbers(law: Law, values: Mapping[str, Any]) -> None:
+def check_numbers(law: Law, values: Mapping[str, object]) -> None:
     """LawError unless the law is finite, of the right sign, and stores the energy it says, over depths, rates and speeds."""
     given = sample_numbers(law, {**TYPICAL, **values})
     for name in law.numbers:
@@ -230,16 +235,25 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
             f"the contact force pulls, F =  {force[pulls][0]:.3g} N, {where(pulls)}",
             "A contact under compression must not pull",
         )
-    at_rest = np.broadcast_to(
-        force[:, [list(RATES).index(0.0)]], (len(DEPTHS), 1, len(IMPACT_SPEEDS))
-    )
-    if np.ptp(at_rest, axis=2).max() > SAME * at_rest.max():
+    _check_stored(law, given, force[:, list(RATES).index(0.0)])
+    nothing = {**given, **varying, "depth": 0.0 * depth[:1]}
+    touching = np.abs(np.broadcast_to(force_of(law, nothing), (1, *shape[1:]))).max()
+    if not law.latched and not touching <= TOUCHING * elastic_at(law, DEPTHS, given).max():
+        raise LawError(
+            f"its force is {touching:.3g} N without contact (depth 0)",
+            "Make it vanish with the depth: multiply the damping by the elastic part",
+        )
+
+
+def _check_stored(law: ContactLaw, given: Mapping[str, Any], at_rest: Any) -> None:
+    """LawError unless the force at rest (depths, impact speeds), N, is the elastic part, and that the slope of the energy."""
+    if np.ptp(at_rest, axis=1).max() > SAME * at_rest.max():
         raise LawError(
             "the force at rest depends on the impact speed, but stored energy depends on the depth alone",
             "Let the impact speed scale the damping only",
         )
     elastic = np.broadcast_to(elastic_at(law, DEPTHS, given), DEPTHS.shape)
-    if not np.allclose(elastic, at_rest[:, 0, 0], rtol=SAME, atol=0.0):
+    if not np.allclose(elastic, at_rest[:, 0], rtol=SAME, atol=0.0):
         raise LawError(
             "elastic differs from the force at a rate of 0",
             "Correct one of the two, or leave elastic out",
@@ -247,13 +261,6 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
     if not (elastic > 0.0).all() or not (np.diff(elastic) > 0.0).all():
         raise LawError(
             "the elastic part does not increase with the depth", "The stiffness must be above 0"
-        )
-    nothing = {**given, **varying, "depth": 0.0 * depth[:1]}
-    touching = np.abs(np.broadcast_to(force_of(law, nothing), (1, *shape[1:])))
-    if not law.latched and not touching.max() <= TOUCHING * elastic.max():
-        raise LawError(
-            f"its force is {touching.max():.3g} N without contact (depth 0)",
-            "Make it vanish with the depth: multiply the damping by the elastic part",
         )
     step = 1e-4 * DEPTHS
     slope = (stored(law, DEPTHS + step, given) - stored(law, DEPTHS - step, given)) / (2.0 * step)
@@ -267,7 +274,7 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
         )
 
 
-def _check_friction(law: FrictionLaw, given: Mapping[str, Any]) -> None:
+def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
     varying = {
         "speed": SPEEDS,
         "force": np.ones_like(SPEEDS),
@@ -302,7 +309,7 @@ def _checked(law: Law, values: tuple[tuple[str, Any], ...]) -> None:
     check_numbers(law, dict(values))
 
 
-def check(law: Law, values: Mapping[str, Any]) -> None:
+def check(law: Law, values: Mapping[str, object]) -> None:
     """All of them, once for each law and values of its parameters.
 
     Raises

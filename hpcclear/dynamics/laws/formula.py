@@ -85,10 +85,10 @@ def _parsed(formula: str) -> ast.Expression:
         ) from None
 
 
-def function_of(text: str, name: str) -> Any:
-    """The function `name` of a text, whose lines `inspect` finds."""
+def function_of(text: str, name: str, around: Mapping[str, Any] | None = None) -> Any:
+    """The function `name` of a text, whose lines `inspect` finds; `around`: what it may use."""
     path = f"<formula {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
     linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
-    names: dict[str, Any] = {}
+    names: dict[str, Any] = {**(around or {})}
     exec(compile(text, path, "exec"), names)
     return names[name]

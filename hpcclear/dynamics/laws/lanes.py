@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from hpcclear.base.one_text import module_of
+from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.laws.declared import ContactLaw, Law
 from hpcclear.dynamics.laws.translate import written
 
@@ -94,6 +95,7 @@ def in_lanes(law: Law) -> InLanes:
 
 def text_of(law: Law) -> str:
     """The text of a law; raises LawError as `in_lanes`."""
+    law = with_constants(law)
     parts = [HEAD.format(title=f"The {law.kind} law {law.name}")]
     functions = law.functions()
     for name, function in functions.items():

@@ -25,7 +25,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 def with_words(
-    function: Callable[..., Any], words: Mapping[str, Any], own: Mapping[str, Any]
+    function: Callable[..., Any], words: Mapping[str, object], own: Mapping[str, object]
 ) -> Any:
     """The same function, and those of its module that it calls, with other functions for those of `math` and of Python."""
     if not isinstance(function, FunctionType):
@@ -54,7 +54,7 @@ def with_words(
     return result
 
 
-def evaluate(function: Callable[..., Any], given: Mapping[str, Any]) -> Any:
+def evaluate(function: Callable[..., Any], given: Mapping[str, object]) -> Any:
     """A function of arrays that broadcast, of any shape: an array, or a dict of such."""
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     values = [given[name] for name in names]
@@ -82,15 +82,15 @@ def _safely(function: Callable[..., Any], row: list[float]) -> Any:
         return math.nan
 
 
-def sample_numbers(law: Law, given: Mapping[str, Any]) -> dict[str, Any]:
+def sample_numbers(law: Law, given: Mapping[str, object]) -> dict[str, Any]:
     """All numbers of samples, (m,) each: the joint's, the parameters, and what the law works out once."""
     found = dict(given)
     for one in law.worked_out():
-        found |= evaluate(one, given)
+        found |= evaluate(one, found)
     return found
 
 
-def force_of(law: ContactLaw, given: Mapping[str, Any]) -> Any:
+def force_of(law: ContactLaw, given: Mapping[str, object]) -> Any:
     """Normal force before the cut, N; arrays that broadcast, of any shape."""
     if law.factor is None:
         return evaluate(law.force, given)
@@ -98,7 +98,7 @@ def force_of(law: ContactLaw, given: Mapping[str, Any]) -> Any:
     return evaluate(law.elastic, given) * evaluate(law.factor, given)
 
 
-def rows_of(law: Law, given: Mapping[str, Any], size: int) -> Array:
+def rows_of(law: Law, given: Mapping[str, object], size: int) -> Array:
     """The numbers that its functions read in the lanes, shape (m, at most `LAW_NUMBERS`), in the order of ``law.read``."""
     assert len(law.read) <= LAW_NUMBERS
     found = sample_numbers(law, given)
@@ -120,7 +120,7 @@ def elastic_at(law: ContactLaw, depth: Any, numbers: Mapping[str, Any]) -> Any:
     return force_of(law, {**at_rest, "impact_speed": one, "inverse_impact_speed": one})
 
 
-def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, Any]) -> Any:
+def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Any:
     """Energy stored at a depth >= 0, J, of its shape: declared, or the integral of the elastic part."""
     if law.energy is not None:
         return evaluate(law.energy, {**numbers, "depth": depth})
@@ -132,7 +132,7 @@ def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, Any]) -> Any:
     return total
 
 
-def swing(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> Any:
+def swing(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Any:
     """Stiffness dF/dd where the elastic part is `force` (m,), N/m."""
     if law.swing is not None:
         return evaluate(law.swing, {**numbers, "force": force})
@@ -140,13 +140,13 @@ def swing(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> Any:
     return _slope(law, depth, numbers)
 
 
-def _slope(law: ContactLaw, depth: Array, numbers: Mapping[str, Any]) -> Any:
+def _slope(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Any:
     step = 1e-5 * depth
     low, high = (elastic_at(law, depth + sign * step, numbers) for sign in (-1, 1))
     return (high - low) / (2.0 * step)
 
 
-def depth_at(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> Array:
+def depth_at(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Array:
     """Depth at which the elastic part is `force`, shape (m,), by halving on a scale of logarithms; at most 1 m."""
     low, high = np.full(np.shape(force), -30.0), np.zeros(np.shape(force))
     for _ in range(60):
@@ -156,7 +156,7 @@ def depth_at(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> Array
     return 10.0 ** (0.5 * (low + high))
 
 
-def shape_near(law: ContactLaw, force: Array, numbers: Mapping[str, Any]) -> tuple[Any, Any]:
+def shape_near(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> tuple[Any, Any]:
     """Exponent of the depth and factor of the rate (`latched`: over the impact speed), as F ~ d^n (1 + c d') where the elastic
     part is `force` (m,): what peaks between steps are found by."""
     if law.exponent is not None and law.damping is not None:

@@ -131,7 +131,7 @@ def _check_rate(objective: Objective) -> None:
     _fits(made, objective.unit_of_rate, f"what is made of its rate ({objective.made})")
 
 
-def _check_value(objective: Objective, numbers: Mapping[str, Any]) -> None:
+def _check_value(objective: Objective, numbers: Mapping[str, object]) -> None:
     """LawError unless the value is a number and has its unit."""
     units = {**RECORDED, "rate": objective.unit_of_rate}
     if objective.value is None:
@@ -152,7 +152,7 @@ def _check_value(objective: Objective, numbers: Mapping[str, Any]) -> None:
         _fits(made, objective.unit, "its value")
 
 
-def _with_unit(function: Callable[..., Any], given: Mapping[str, Any], title: str) -> Any:
+def _with_unit(function: Callable[..., Any], given: Mapping[str, object], title: str) -> Any:
     """A function of quantities; None where it is no arithmetic of these."""
     import pint
 

@@ -220,7 +220,7 @@ class _Writer:
         found = [f"({a} {signs[type(op)]} {b})" for a, op, b in pairs]
         return found[0] if len(found) == 1 else f"({' & '.join(found)})"
 
-    def number(self, value: Any) -> str:
+    def number(self, value: object) -> str:
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             raise LawError(f"{self.title} uses {value!r}, which is not a number")
         if not math.isfinite(value):

@@ -43,7 +43,7 @@ class Assembly:
     def report(self) -> list[str]:
         """A line for each body: its angle, and the estimate in the scene, in degrees."""
         return [
-            f"{body.name}: {_degrees(self.angle(body.name))} deg (estimate {_degrees(body.start_angle)})"
+            f"{body.name}: {_degrees(self.angle(body.name))} deg (start_angle {_degrees(body.start_angle)} deg)"
             for body in self.loops.mechanism.bodies
         ]
 

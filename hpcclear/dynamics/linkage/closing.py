@@ -11,12 +11,15 @@ from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vecto
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics, Point
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Aligned,
     ConstantSpeed,
     Drive,
     Fixed,
     Joint,
     Revolute,
+    RunUp,
     Slide,
+    Slot,
     split,
 )
 
@@ -49,6 +52,8 @@ class Closing:
             return self._pin(one)
         if isinstance(one, Slide):
             return self._guide(one)
+        if isinstance(one, Slot):
+            return self._guide(one)[:1]
         assert not isinstance(one, Fixed)
         return [self._driven(one)]
 
@@ -114,7 +119,7 @@ class Closing:
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
         return found
 
-    def _guide(self, joint: Slide) -> list[Row]:
+    def _guide(self, joint: Slide | Slot) -> list[Row]:
         """Across the line, and the angle of the body to it."""
         kin, write = self.kinematics, self.writer
         forest = kin.forest
@@ -163,7 +168,7 @@ class Closing:
             f"v_{joint.name}", speed
         )
 
-    def direction(self, joint: Slide) -> Vector:
+    def direction(self, joint: Aligned) -> Vector:
         """Unit vector of a guide's line, along the ground's axes."""
         carrier = split(joint.line)[0]
         forest, write = self.kinematics.forest, self.writer
@@ -174,6 +179,12 @@ class Closing:
             )
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
         return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
+
+    def run_up(self, drive: RunUp, speed: Term, rise: Term) -> Row:
+        """A free body's acceleration as its drive has it; what its speed is off by is fed back."""
+        own = self.kinematics.forest.frames[drive.body]
+        rate = self.kinematics.spin(own) - speed
+        return self._row(f"{drive.name}_angle", {Column("angle", own): ONE}, -rise, rate, ZERO)
 
     def _driven(self, drive: Drive) -> Row:
         kin, name = self.kinematics, f"{drive.name}_drive"

@@ -8,6 +8,7 @@ from types import ModuleType
 
 from hpcclear.base.one_text import module_of
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.generator import Motion
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
@@ -17,9 +18,7 @@ from numba import carray
 from hpcclear.base.bits import beyond
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-{geometries}from hpcclear.dynamics.linkage.elements import (
-    along, drag, harmonic, held_inverse, hinge, one_sided, sign_of, spring_force, table_value,
-)
+{geometries}from hpcclear.dynamics.linkage.elements import {elements}
 from hpcclear.dynamics.physics.angles import sincos
 from hpcclear.dynamics.physics.friction import saturated
 '''
@@ -50,7 +49,7 @@ BANK = 8
 """Lanes of an implicit step's motion."""
 
 _LOOK_UP = """    for i in range(W):
-{before}        work[{row} * W + i] = table_value(tables, {first}, at.CELLS, {angle})
+{before}        work[{row} * W + i] = {function}(tables, {first}, at.CELLS, {place})
 """
 
 
@@ -60,45 +59,22 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     looked_up = "".join(
         _LOOK_UP.format(
             row=row,
-            first=first,
-            before="".join(f"        {line}\n" for line in before),
-            angle=angle,
+            first=4 * at.CELLS * (row - at.CURVES),
+            before="".join(f"        {line}\n" for line in one.before),
+            function=one.function,
+            place=one.place,
         )
-        for row, first, (before, angle) in _curves(motion)
+        for row, one in ((row, motion.look_ups[name]) for name, row in motion.curves.items())
     )
     geometries = dict.fromkeys(c.geometry for c in motion.forest.mechanism.contacts)
+    called = [name for name in functions() if f" {name}(" in motion.source + looked_up]
     head = _HEAD.format(
-        geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries)
+        geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries),
+        elements=", ".join(called or ["table_value"]),
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"
     return f"{head}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
-
-
-Angle = tuple[tuple[str, ...], str]
-"""Statements and what is looked up at after them."""
-
-
-def _curves(motion: Motion) -> list[tuple[int, int, Angle]]:
-    """Rows of tabulated values, where their tables begin, and the angles that they are looked up at.
-
-    Tables that move bodies come first: the angle of loads may be theirs.
-    """
-    return [
-        (row, 4 * at.CELLS * (row - at.CURVES), _looked_up_at(motion, name))
-        for name, row in motion.curves.items()
-    ]
-
-
-def _looked_up_at(motion: Motion, name: str) -> Angle:
-    """Of a curve: the angle of the body whose turn is the revolution, or the time of a table that drives a body."""
-    drives = {drive.name: drive for drive in motion.forest.mechanism.drives}
-    drive = drives.get(name.partition(".")[0]) if "." in name else None
-    if drive is None:
-        return motion.turned
-    main = motion.forest.mechanism.period
-    share = main.seconds / drive.seconds / main.turns
-    return (), f"par[{at.SPEED} * W + i] * work[{at.STAGE_TIME} * W + i] * {share!r}"
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:

@@ -1,9 +1,12 @@
 """Functions of generated motions besides the contact law: springs, drives, tables, near-singular loops. Plain, of arrays."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from hpcclear.base.bits import no_more
 from hpcclear.base.jit import lane_function
 
 _TINY = 1e-300  # keeps the direction of a spring without length defined (and zero)
@@ -51,6 +54,13 @@ def along(ex, ey, vx, vy):
 
 
 @lane_function
+def unit_vector(x, y):
+    """Direction of a vector; 0 of one without length."""
+    inverse = 1.0 / np.sqrt(x * x + y * y + _TINY)
+    return x * inverse, y * inverse
+
+
+@lane_function
 def hinge(at, start, bend):
     """A line of slope `bend` beyond `start`, 0 before."""
     beyond = at - start
@@ -95,3 +105,18 @@ def table_value(table, first, cells, angle):
     s = x - cell
     k = first + 4 * cell
     return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+
+
+@lane_function
+def table_until(table, first, cells, share):
+    """The same of a table that does not repeat, at a share of its length not below 0; level beyond its end."""
+    x = no_more(share, 1.0) * cells
+    cell = min(int(x), cells - 1)
+    s = x - cell
+    k = first + 4 * cell
+    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+
+
+def functions() -> dict[str, Callable[..., Any]]:
+    """All of them by name, as ordinary Python."""
+    return {name: one.py_func for name, one in globals().items() if hasattr(one, "py_func")}

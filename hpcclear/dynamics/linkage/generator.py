@@ -6,7 +6,7 @@ contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
@@ -14,23 +14,32 @@ from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.guides import Guide, coupled
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.loads.writing import Writing
+from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Acting,
+    Aligned,
     Contact,
     Drive,
     Force,
     Revolute,
+    RunUp,
     Slide,
     Spring,
     Torque,
     TorqueDrive,
     split,
+)
+from hpcclear.dynamics.linkage.rows import Rows
+from hpcclear.dynamics.linkage.rubbing import (
+    RubbingGuide,
+    coupled,
+    rubbing_of,
+    ties_of,
 )
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
@@ -50,30 +59,6 @@ class On(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Where a text finds and leaves its numbers: first rows of `work`, rows of parameters, first row that is free."""
-
-    coordinates: int = at.QS
-    velocities: int = at.VS
-    accelerations: int = at.ACC
-    rates: int = at.RATE_NOW
-    time: int = at.STAGE_TIME
-    holds: int | None = None  # first of the multipliers, where they are asked for
-    parameters: Mapping[str, int] = field(default_factory=dict)
-    free: int = 0
-    curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
-
-    def behind(self, bristles: int) -> "Rows":
-        """The same of a motion whose coordinates come after so many of bristles."""
-        return replace(
-            self,
-            coordinates=self.coordinates + bristles,
-            velocities=self.velocities + bristles,
-            accelerations=self.accelerations + bristles,
-        )
-
-
-@dataclass(frozen=True)
 class Motion:
     """A text and what it needs."""
 
@@ -90,8 +75,8 @@ class Motion:
     """Names of the multipliers."""
     curves: Mapping[str, int] = field(default_factory=dict)
     """Rows of tabulated values, by drive or load."""
-    turned: tuple[tuple[str, ...], str] = ((), "")
-    """Statements, and the angle at which tables are looked up after them, divided by the turns of a revolution."""
+    look_ups: Mapping[str, LookUp] = field(default_factory=dict)
+    """Where each of them is looked up; those that move bodies first, since the angle of loads may be theirs."""
 
 
 def generate(
@@ -131,42 +116,29 @@ class _Generator:
             self._contact(k, contact)
         for load in self.mechanism.loads:
             self._load(load)
-        torques = [self._torque(d) for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
+        free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
+        torques = [self._torque(d) for d in free if not isinstance(d, RunUp)]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
+        for drive in free:
+            if isinstance(drive, RunUp):
+                given = (self._turned(f"{drive.name}.{part}") for part in drive.curves)
+                self.constraints.append(self.closing.run_up(drive, *given))
         found = self._solved(torques)
         self._store(found, dict(torques))
         lines = "\n".join(f"    {line}" for line in (self._described(), *self.writer.lines))
-        turned, looking = self._looked_up_at()
-        read = self.writer.read | looking.read
-        names = {k: row for k, row in looking.rows.items() if k in read}
+        look_ups = LookUps(self.forest, self.rows, self.writer)
+        read = self.writer.read | look_ups.read
+        names = {k: row for k, row in look_ups.rows.items() if k in read}
         return Motion(
             f"def lane(effects, joints, work, par, i, W):\n{lines}\n",
             self.forest,
             names,
             {name: text for name, text in self.writer.derived.items() if name in names},
-            tuple(self.writer.inputs | looking.inputs),
+            tuple(self.writer.inputs | look_ups.inputs),
             tuple(row.name for row in self.constraints),
             self.rows.curves,
-            turned,
+            look_ups.found,
         )
-
-    def _looked_up_at(self) -> tuple[tuple[tuple[str, ...], str], Writer]:
-        """`Motion.turned`: the angle of the body whose turn is the revolution, from the x axis. It has a writer of its own,
-        since tables are looked up before the lane's text runs."""
-        rows, drive = self.rows, self.mechanism.period
-        write = Writer(self.writer.rows, self.writer.free, hoist=False)
-        if not any(
-            getattr(one, "table", False) for one in (*self.mechanism.drives, *self.mechanism.loads)
-        ):
-            return ((), ""), write
-        kin = Kinematics(
-            self.forest, write, rows.coordinates, rows.velocities, rows.time, rows.curves
-        )
-        angle = kin.angle(drive.body)
-        if drive.turns != 1:
-            angle = angle * named(repr(1.0 / drive.turns))
-        text = write.text(angle)
-        return (tuple(write.lines), text), write
 
     def _described(self) -> str:
         """First line of the text: what is integrated, where the contacts are, what closes loops."""
@@ -212,7 +184,8 @@ class _Generator:
         """What a geometry requires besides: the unit vector from a guide's line to the face, or cosines and sines of the
         angles of both bodies, which waves around their surfaces turn with."""
         kin, found = self.kinematics, []
-        if isinstance(contact.joint, Slide):
+        if contact.geometry.along_a_line:
+            assert isinstance(contact.joint, Aligned)
             across = self.closing.direction(contact.joint).across()
             found = [*(across if contact.side > 0.0 else -across)]
             return f"({', '.join(self.writer.text(term) for term in found)})"
@@ -262,7 +235,7 @@ class _Generator:
 
     def _turned(self, name: str) -> Term:
         """What the curve of a drive or load says at the stage."""
-        turned = f"turned_{name}"
+        turned = f"turned_{name.replace('.', '_')}"
         self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
 
@@ -330,15 +303,12 @@ class _Generator:
         for column, torque in torques:
             right[self.number[column]] = right[self.number[column]] + torque
         right |= {r: -row.asked for r, row in enumerate(self.constraints, n)}
-        self.guides = [
-            Guide(joint, self.balance, self.closing, self.columns, self.constraints)
-            for joint in _rubbing(self.mechanism)
-        ]
+        self.rubbing = rubbing_of(self)
+        # friction that moves nothing is worked out last, by those texts that ask for moments or losses
+        self.late = [one for one in self.rubbing if not one.moved]
+        self.early = [one for one in self.rubbing if one.moved]
         found: dict[int, Term] = {}
-        ties = {
-            (guide.place, k) for guide in self.guides for k in (*guide.normal, *guide.influence)
-        }
-        for block in blocks(range(n + len(self.constraints)), matrix, ties):
+        for block in blocks(range(n + len(self.constraints)), matrix, ties_of(self.early)):
             found |= self._block(block, matrix, right, n)
         return {k: self._accelerated(k, term) for k, term in sorted(found.items())}
 
@@ -363,15 +333,19 @@ class _Generator:
     def _block(
         self, block: list[int], matrix: Matrix, right: dict[int, Term], n: int
     ) -> dict[int, Term]:
-        rubbing = [guide for guide in self.guides if guide.place in block]
+        rubbing = [one for one in self.early if one.touched[0] in block]
         held = sum(k >= n for k in block)
-        for guide in rubbing:
-            guide.measure()
-            if not guide.normal:
-                guide.known(right)
-        moving = [guide for guide in rubbing if guide.normal]
+        for one in rubbing:
+            one.measure()
+            if not one.depends:
+                one.known({})
+                for k, term in one.moved.items():
+                    right[k] = right[k] - one.force * term
+        moving = [one for one in rubbing if one.depends]
         if len(block) == 2 and not held and len(moving) == 1:
-            return moving[0].paired(block, matrix, right)
+            (guide,) = moving
+            if isinstance(guide, RubbingGuide):
+                return guide.paired(block, matrix, right)
         factored = Elimination(self.writer, matrix, block, held, self.inverse, self._passed(block))
         found = factored.solve(right)
         return coupled(moving, factored, found) if moving else found
@@ -400,6 +374,9 @@ class _Generator:
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
         if on.energies or on.series or on.responses or on.objective:
+            for rub in self.late:
+                rub.measure()
+                rub.known(found)
             moments = [self._moment(drive, found, torques) for drive in self._drives()]
             if on.series or on.responses or on.objective:
                 self._rate(at.DRIVE_MOMENT, moments[0])
@@ -415,8 +392,8 @@ class _Generator:
             loss = ZERO
             for one in self.losses:
                 loss = loss + one
-            for guide in self.guides:
-                loss = loss + guide.force * guide.speed
+            for rub in self.rubbing:
+                loss = loss + rub.force * rub.speed
             for bend in self.kinematics.bends.values():
                 loss = loss + bend.loss()
             self._rate(at.DISSIPATION, loss)
@@ -514,15 +491,14 @@ class _Generator:
             total = total + self.balance.mass(column, one) * found[k]
         for r, row in enumerate(self.constraints, len(self.columns)):
             total = total - row.others.get(column, ZERO) * found[r]
+        for rub in self.rubbing:
+            if column in rub.influence:
+                total = total + rub.force * rub.influence[column]
         return total - self.balance.force(column)
 
     def _rate(self, row: int, term: Term) -> None:
         text = self.writer.text(term)
         self.writer.line(f"work[{self.rows.rates + row} * W + i] = {text}")
-
-
-def _rubbing(mechanism: Mechanism) -> list[Slide]:
-    return [j for j in mechanism.joints if isinstance(j, Slide) and j.friction is not None]
 
 
 def _guide_of(mechanism: Mechanism, body: str) -> Slide:

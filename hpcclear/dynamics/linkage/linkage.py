@@ -12,13 +12,13 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
-from hpcclear.dynamics.linkage.generator import Motion, On, Rows, generate
+from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import TableDrive
+from hpcclear.dynamics.linkage.parts import curves_of
 from hpcclear.dynamics.linkage.poses import Pose, Poses
-from hpcclear.dynamics.linkage.table_drive import PARTS
+from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
@@ -62,13 +62,7 @@ class Linkage:
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        for energies in (False, True):
-            for series in (False, True):
-                for responses in (False, True):
-                    self._text(
-                        self._on._replace(energies=energies, series=series, responses=responses)
-                    )
-        self._text(_with_impacts(self._on))
+        self._whole = self._text(_with_impacts(self._on))  # has the rows of all others
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -97,7 +91,9 @@ class Linkage:
             rows = rows.behind(self._bristles)
             text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
             self._texts[on] = text
-            self._take({text.derived.get(name, name): row for name, row in text.parameters.items()})
+            taken = {text.derived.get(name, name): row for name, row in text.parameters.items()}
+            assert len(self._texts) == 1 or taken.keys() <= self._given.keys(), on
+            self._take(taken)
         return self._texts[on]
 
     def _take(self, rows: dict[str, int]) -> None:
@@ -135,7 +131,7 @@ class Linkage:
         tabled = [
             name
             for one in (*self.mechanism.drives, *self.mechanism.loads)
-            for name in _curves_of(one)
+            for name in curves_of(one)
         ]
         if len(tabled) > at.MAX_CURVES:
             raise InputError(
@@ -157,9 +153,8 @@ class Linkage:
     ) -> None:
         """Write the rows of its own into parameters (m, PARAMETERS), of a mechanism with numbers (m,) or single ones."""
         base = values(sample, self.cartesian, gravity=gravity, feedback=feedback)
-        for text in self._texts.values():
-            for row, value in row_of(text, base).items():
-                par[:, row] = value
+        for row, value in row_of(self._whole, base).items():
+            par[:, row] = value
         for name, row in self._given.items():
             if name in base:
                 par[:, row] = base[name]
@@ -220,10 +215,3 @@ class Linkage:
 def _with_impacts(on: On) -> On:
     """What a text that measures impacts has: all that is measured, so that there is one of them."""
     return on._replace(energies=True, series=True, responses=True, impacts=True)
-
-
-def _curves_of(part: object) -> list[str]:
-    """Names of the curves that a drive or load has."""
-    if isinstance(part, TableDrive):
-        return [f"{part.name}.{one}" for one in PARTS]
-    return [part.name] if getattr(part, "table", False) else []  # type: ignore[attr-defined]

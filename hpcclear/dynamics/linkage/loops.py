@@ -35,14 +35,9 @@ def saturated(value: Any) -> Any:
     return np.clip(value, -1.0, 1.0)
 
 
-WORDS: dict[str, Callable[..., Any]] = {
+WORDS: dict[str, Callable[..., Any]] = elements.functions() | {
     "sincos": sincos,
     "sign_of": sign_of,
-    "harmonic": elements.harmonic.py_func,
-    **{
-        name: getattr(elements, name).py_func
-        for name in ("spring_force", "one_sided", "along", "hinge", "drag")
-    },
     "saturated": saturated,
 }
 """What texts call, for arrays."""

@@ -19,9 +19,12 @@ from hpcclear.dynamics.linkage.parts import (
     Load,
     Loose,
     LooseSlide,
+    LooseSlot,
     Pair,
     Revolute,
+    RunUp,
     Slide,
+    Slot,
     TableDrive,
     TorqueDrive,
     split,
@@ -84,14 +87,21 @@ class Mechanism:
     @property
     def free(self) -> bool:
         """Whether torques alone drive it."""
-        return all(isinstance(drive, TorqueDrive) for drive in self.drives)
+        return all(type(drive) is TorqueDrive for drive in self.drives)
+
+    @property
+    def clocked(self) -> bool:
+        """Whether a load or drive goes by the time since the start."""
+        by = [getattr(load, "by", None) for load in self.loads]
+        timed = any(one is not None and one.seconds for one in by)
+        return timed or any(isinstance(drive, RunUp) for drive in self.drives)
 
     def drive_of(self, body: str) -> Drive | None:
         """What drives a body."""
         return next((drive for drive in self.drives if drive.body == body), None)
 
 
-def with_numbers(mechanism: Mechanism, **tables: Any) -> Mechanism:
+def with_numbers(mechanism: Mechanism, **tables: object) -> Mechanism:
     """A mechanism with other numbers, arrays among them, which its checks are not made for."""
     made = object.__new__(Mechanism)
     for one in fields(Mechanism):
@@ -104,6 +114,12 @@ def straight(mechanism: Mechanism) -> Mechanism:
     if all(body.bending is None for body in mechanism.bodies):
         return mechanism
     bodies = tuple(replace(body, bending=None) for body in mechanism.bodies)
+    return with_numbers(mechanism, bodies=bodies)
+
+
+def uncentred(mechanism: Mechanism) -> Mechanism:
+    """The same with mass centres at the origins of the bodies' axes: where it stands does not depend on masses."""
+    bodies = tuple(replace(body, center=(0.0, 0.0)) for body in mechanism.bodies)
     return with_numbers(mechanism, bodies=bodies)
 
 
@@ -177,6 +193,7 @@ def _places(m: Mechanism) -> None:
                     f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
                 )  # fmt: skip
     _turned(m)
+    _looked_up(m)
     for joint in m.joints:
         first, second = (split(place)[0] for place in joint.places)
         if first == second:
@@ -220,6 +237,19 @@ def _turned(m: Mechanism) -> None:
                 )  # fmt: skip
 
 
+def _looked_up(m: Mechanism) -> None:
+    """Bodies whose angles tables go by can turn."""
+    still = next(names for names in joined(m, (Slide, Fixed)) if GROUND in names)
+    known = {body.name for body in m.bodies} - still
+    for load in m.loads:
+        by = getattr(load, "by", None)
+        if by is not None and not by.seconds and by.body not in known:
+            raise InputError(
+                f"loads.{load.name}.angle_of", by.body, "there is no such body that can rotate",
+                f"Known are: {', '.join(sorted(known))}",
+            )  # fmt: skip
+
+
 def _numbers(m: Mechanism) -> None:
     """Masses, inertias, clearances and the numbers of drives that have to be positive."""
     turns = turning(m)
@@ -237,6 +267,7 @@ def _numbers(m: Mechanism) -> None:
     positive = {
         Clearance: ("clearance", "bearing_radius", "stiffness"),
         LooseSlide: ("clearance", "length", "height", "corner_radius", "stiffness"),
+        LooseSlot: ("clearance", "pin_radius", "stiffness"),
         Harmonic: ("frequency",),
     }
     for key, one in _records(m):
@@ -251,6 +282,12 @@ def _numbers(m: Mechanism) -> None:
                 raise InputError(
                     f"{key}.{entry}", 0.0, "there would be no motion", "Write a speed or amplitude"
                 )
+    for joint in m.ideal:
+        if isinstance(joint, Revolute) and joint.friction is not None and modes_of(m):
+            raise InputError(
+                f"joints.{joint.name}.friction", joint.friction.coefficient,
+                "reactions of pins are not modelled where a bar bends", "Remove it, or bending",
+            )  # fmt: skip
     for joint in m.clearances:
         if isinstance(joint, Clearance) and joint.clearance >= joint.bearing_radius:
             raise InputError(
@@ -334,7 +371,7 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {Revolute: 2, Slide: 2, Fixed: 3, Clearance: 0, LooseSlide: 0}
+    taken = {Revolute: 2, Slide: 2, Slot: 1, Fixed: 3, Clearance: 0, LooseSlide: 0, LooseSlot: 0}
     ideal = sum(taken[type(joint)] for joint in m.joints)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 
@@ -355,6 +392,6 @@ def _sizes(m: Mechanism) -> None:
         )
     if len(m.contacts) > MOST_CONTACTS:
         raise InputError(
-            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints with clearance (four in each guide)",
+            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints (four in a guide, two in a slot)",
             "Make some of the joints ideal",
         )  # fmt: skip

@@ -12,10 +12,10 @@ from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Acting,
+    Aligned,
     ConstantSpeed,
     Force,
     Harmonic,
-    Slide,
     Spring,
     TableDrive,
     Torque,
@@ -37,12 +37,14 @@ def values(
         found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
     _bodies(trees, found)
     for joint in mechanism.joints:
-        if isinstance(joint, Slide):
+        if isinstance(joint, Aligned):
             angle = trees.offsets[split(joint.line)[0]] + joint.angle
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
-            if joint.friction is not None:
-                found[f"{joint.name}_coefficient"] = joint.friction.coefficient
-                found[f"{joint.name}_inverse_ramp"] = 1.0 / joint.friction.ramp_speed
+        rubs = getattr(joint, "friction", None)
+        if rubs is not None:
+            radius = getattr(rubs, "radius", 1.0)  # of a pin: torques and speeds of turning
+            found[f"{joint.name}_coefficient"] = rubs.coefficient * radius
+            found[f"{joint.name}_inverse_ramp"] = radius / rubs.ramp_speed
     _outside(trees, found)
     return found
 

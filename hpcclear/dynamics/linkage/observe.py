@@ -12,17 +12,17 @@ from hpcclear.dynamics.linkage.rhs import run_motion
 
 
 def observe(
-    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: Array, out: Array,
-    width: int = 1,
+    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: tuple[Array, Array],
+    out: Array, width: int = 1,
 ) -> None:  # fmt: skip
     """Fill `out` (instants, n + RATES) with accelerations and rates.
 
     `motion`: address of a motion of so many lanes; `states` (instants, 2 n): coordinates, then velocities;
-    `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times` (instants,): since the start of the revolution;
-    `tables`: as `Problem.tables`.
+    `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times`, each (instants,): since the start of the
+    revolution, and when that was; `tables`: as `Problem.tables`.
     """
     lanes = np.repeat(new_lane(par), width)
-    _observe(motion, width, lanes, tables, states, contacts, times, out)
+    _observe(motion, width, lanes, tables, states, contacts, *times, out)
 
 
 def new_lane(par: Array) -> Array:
@@ -31,13 +31,14 @@ def new_lane(par: Array) -> Array:
 
 
 @scalar_function
-def _observe(motion, W, lanes, tables, states, contacts, times, out):
+def _observe(motion, W, lanes, tables, states, contacts, times, began, out):
     """`observe` by free lanes; those that are left over at the end repeat the last instant."""
     n, count = states.shape[1] // 2, len(times)
     for first in range(0, count, W):
         for i in range(W):
             row = min(first + i, count - 1)
             put_state(lanes, contacts[row], times[row], states[row], n, W, i)
+            lanes[at.BEGAN * W + i] = began[row]
         run_motion(motion, lanes, tables)
         for i in range(min(W, count - first)):
             for k in range(n):
@@ -49,7 +50,7 @@ def _observe(motion, W, lanes, tables, states, contacts, times, out):
 def observing_code() -> None:
     """Compile what `observe` calls, before there is anything to observe."""
     row, table = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
-    _observe.compile((types.int64, types.int64, row, row, table, table, row, table))
+    _observe.compile((types.int64, types.int64, row, row, table, table, row, row, table))
 
 
 @scalar_function

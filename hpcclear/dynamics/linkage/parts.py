@@ -11,7 +11,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from hpcclear.base.outcome import CORNERS
+from hpcclear.base.outcome import CORNERS, WALLS
+from hpcclear.dynamics.contacts import pin_in_slot
 from hpcclear.dynamics.contacts.declared import Geometry
 from hpcclear.dynamics.contacts.guide import corner, gap_of
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
@@ -67,12 +68,22 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True)
+class PinFriction:
+    """Friction of a pin over its reaction, radius (m), and sliding speed (m/s) below which it falls linearly to 0."""
+
+    coefficient: float
+    radius: float
+    ramp_speed: float
+
+
+@dataclass(frozen=True)
 class Revolute:
     """A pin without clearance between two places."""
 
     name: str
     journal: str
     bearing: str
+    friction: PinFriction | None = field(default=None, kw_only=True)
     contacts: ClassVar[tuple[Contact, ...]] = ()
 
     @property
@@ -177,7 +188,7 @@ class LooseSlide(Slide):
         """What the constraints of a guide without clearance are at the start: offset, sine of the tilt."""
         return self.start_offset, np.sin(self.start_tilt)
 
-    def corners(self, middle: Any) -> dict[str, tuple[Any, Any]]:
+    def corners(self, middle: object) -> dict[str, tuple[Any, Any]]:
         """Points of the slider that are centres of its corners, `middle` its place in the slider's axes."""
         size = self.length, self.height
         return {
@@ -192,12 +203,54 @@ class LooseSlide(Slide):
 
 
 @dataclass(frozen=True)
+class Slot(Aligned):
+    """A pin in a slot: the point moves along the line, and its body turns freely."""
+
+
+@dataclass(frozen=True)
+class LooseSlot(Slot):
+    """A pin, its centre at the point, in a slot that is wider by twice the clearance; all in m.
+
+    At the start it is offset to the left of the line.
+    """
+
+    clearance: float = 0.0
+    pin_radius: float = 0.0
+    stiffness: float = 0.0
+    start_offset: float = 0.0
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:  # type: ignore[override]
+        """One a wall, in the order of `WALLS`."""
+        slot = GEOMETRIES["pin_in_slot"]
+        return tuple(
+            Contact(f"{self.name}.{word}", self, self.point, self.line, slot, side)
+            for word, side in WALLS.items()
+        )
+
+    @property
+    def gaps(self) -> tuple[Any, ...]:
+        """Of its contacts at the start, m, below 0 in flight."""
+        return tuple(pin_in_slot.gap_of(self, word, self.start_offset) for word in WALLS)
+
+    @property
+    def start_eccentricity(self) -> tuple[Any]:
+        """What the constraint of a slot without clearance is at the start: the offset."""
+        return (self.start_offset,)
+
+    @property
+    def without_clearance(self) -> Slot:
+        """The same without clearance."""
+        return Slot(self.name, self.point, self.line, self.angle)
+
+
+@dataclass(frozen=True)
 class Fixed(Aligned):
     """A body held on the ground: the point stays where the line begins."""
 
 
-Joint = Revolute | Clearance | Slide | LooseSlide | Fixed
-Loose = Clearance | LooseSlide
+Joint = Revolute | Clearance | Slide | LooseSlide | Slot | LooseSlot | Fixed
+Loose = Clearance | LooseSlide | LooseSlot
 
 
 @dataclass(frozen=True)
@@ -258,6 +311,8 @@ class TableDrive:
     period: bool = False
     prescribed: ClassVar[bool] = True
     turns: ClassVar[int] = 1
+    curves: ClassVar[tuple[str, ...]] = ("angle", "spin", "turn")
+    """Angle but for what it gains evenly (rad), and its first and second derivative (rad/s, rad/s2)."""
 
     @property
     def seconds(self) -> float:
@@ -308,12 +363,39 @@ class TorqueDrive:
         return 2 * math.pi * self.turns
 
 
+@dataclass(frozen=True)
+class RunUp(TorqueDrive):
+    """A body whose angle is free turns at speeds given by rows (s, rad/s), smooth and level beyond, whatever torque that takes.
+
+    `cells`: of its `curves`, as the kernel reads them.
+    """
+
+    rows: tuple[Pair, ...] = ()
+    cells: Any = field(default=None, compare=False, repr=False)
+    curves: ClassVar[tuple[str, ...]] = ("speed", "rise")
+
+    @property
+    def length(self) -> float:
+        """Until the speed stays as it is, s."""
+        return self.rows[-1][0]
+
+
 Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 
 @dataclass(frozen=True)
+class By:
+    """What a load's table goes by in place of the angle of the period's body: that of another, or the time where it has a
+    length in s; then it repeats, or stays level."""
+
+    body: str = ""
+    seconds: float = 0.0
+    repeats: bool = False
+
+
+@dataclass(frozen=True)
 class Force:
-    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body.
+    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body, or `by`.
 
     `follows`: along the axes of its body instead.
     """
@@ -323,16 +405,18 @@ class Force:
     force: Pair
     table: bool = False
     follows: bool = False
+    by: By | None = None
 
 
 @dataclass(frozen=True)
 class Torque:
-    """A torque on a body, N m; `table` as of a force."""
+    """A torque on a body, N m; `table` and `by` as of a force."""
 
     name: str
     body: str
     torque: float
     table: bool = False
+    by: By | None = None
 
 
 @dataclass(frozen=True)
@@ -363,7 +447,7 @@ class Acting:
     """Whether it goes by the angle of a body, which must not go round with the revolutions."""
 
     @classmethod
-    def of(cls, table: Any) -> Self:
+    def of(cls, table: object) -> Self:
         """That of a table of the scene, whose entries have the names of the fields."""
         return cls(**{one.name: getattr(table, one.name) for one in fields(cls)})
 
@@ -377,6 +461,13 @@ class Acting:
 
 
 Load = Force | Torque | Spring | Acting
+
+
+def curves_of(part: Drive | Load) -> list[str]:
+    """Names of the tabulated curves that a drive or load has."""
+    if isinstance(part, (TableDrive, RunUp)):
+        return [f"{part.name}.{one}" for one in part.curves]
+    return [part.name] if getattr(part, "table", False) else []
 
 
 def split(place: str) -> tuple[str, str]:

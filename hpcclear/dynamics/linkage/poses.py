@@ -1,5 +1,6 @@
 """Where all bodies of a linkage are, and how fast they move, from the coordinates that are integrated; and the way back."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -12,7 +13,7 @@ from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import WORDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Slide, as_complex, split
+from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide, as_complex, split
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -57,7 +58,7 @@ class Poses:
             places = contact.journal, contact.bearing
             journal, bearing = (kin.position(kin.point(place)) for place in places)
             apart = journal - bearing
-            if isinstance(contact.joint, Slide):  # the part across the line
+            if isinstance(contact.joint, Aligned):  # the part across the line
                 across = Closing(kin, writer).direction(contact.joint).across()
                 apart = across.times(dot(apart, across))
             for axis, part in enumerate(apart):
@@ -105,18 +106,36 @@ def _needed(kin: Kinematics, frame: str) -> Term:
     return named(f"angle_{frame}") if drive is None else kin.driven(drive, frame)[0]
 
 
-def coordinates(forest: Forest, assembly: Assembly) -> tuple[Array, Array]:
+def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tuple[Array, Array]:
     """Coordinates and velocities (n,) of a forest, of a linkage put together; (n, m) of samples.
 
     Journals stand where the assembly has them; a coordinate along a guide is read off the poses of both bodies.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Of the mechanism, or of `hpcclear.dynamics.linkage.mechanism.uncentred`.
+    mechanism : Mechanism
+        Where the mass centres are: single ones, or those of samples (m,).
     """
-    q, v = np.zeros((2, len(forest.coordinates), *assembly.q.shape[1:]))
-    for k, one in enumerate(forest.coordinates):
+    found: list[tuple[Any, Any]] = []
+    for one in forest.coordinates:
+        place = assembly.loops.forest.index(one.kind, one.body)
         if one.kind == "slide":
-            q[k], v[k] = _along(forest, assembly, one.body)
-        elif (place := assembly.loops.forest.index(one.kind, one.body)) is not None:
-            q[k], v[k] = assembly.q[place], assembly.v[place]
-    return q, v
+            found.append(_along(forest, assembly, one.body))
+        elif place is None:
+            found.append((0.0, 0.0))
+        elif one.kind == "angle":
+            found.append((assembly.q[place], assembly.v[place]))
+        else:
+            body = mechanism.body(one.body)
+            here, speed, _, _ = placed(assembly, f"{body.name}.{CENTER}", body.center)
+            found.append((here.real, speed.real) if one.kind == "x" else (here.imag, speed.imag))
+    rows = np.broadcast_arrays(*itertools.chain(*found))
+    both = np.array(rows, float).reshape(
+        -1, 2, *np.shape(rows[0]) if rows else assembly.q.shape[1:]
+    )
+    return both[:, 0], both[:, 1]
 
 
 def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Any, Any]:
@@ -137,15 +156,18 @@ def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Any, Any]:
     )
 
 
-def placed(assembly: Assembly, place: str) -> tuple[Any, Any, Any, Any]:
-    """Position and velocity (complex) of a place of an assembly, angle and angular velocity of its body."""
+def placed(
+    assembly: Assembly, place: str, at: tuple[Any, Any] | None = None
+) -> tuple[Any, Any, Any, Any]:
+    """Position and velocity (complex) of a place of an assembly, or of one `at` the body's own axes; angle and angular velocity
+    of its body."""
     mechanism: Mechanism = assembly.loops.mechanism
     name, point = split(place)
     if name == GROUND:
         return as_complex(mechanism.ground[point]), 0j, 0.0, 0.0
     body, forest = mechanism.body(name), assembly.loops.forest
     places = {**body.points, CENTER: body.center}
-    here = as_complex(places[point])
+    here = as_complex(places[point] if at is None else at)
     hang = forest.hangs[name]
     if hang.joint is not None:  # held on the ground
         angle = forest.offsets[name]

@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks
-from hpcclear.dynamics.linkage.generator import On, Rows, generate
+from hpcclear.dynamics.linkage.generator import On, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import WORDS, Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
@@ -24,6 +24,7 @@ from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Node, Passage, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates, placed
+from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.table_drive import words_of
 
 DIVERGING = 1e-6
@@ -67,7 +68,7 @@ def prescribed_motion(
     curves: Mapping[str, Callable[[Array], Array]] | None = None,
 ) -> Prescribed:
     """Motion and reactions at instants (t,), s, which rise from 0; `curves`: tabulated loads by name, each as a function of the
-    angle (t,) of the body that gives the period, rad; 1 for those left out.
+    angle (t,), rad, or time (t,), s, that it goes by; 1 for those left out.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage
     """
     mechanism = assembly.loops.mechanism
     main, loops = mechanism.period, Loops(mechanism, trees=True)
-    start, _ = coordinates(loops.forest, assembly)
+    start, _ = coordinates(loops.forest, assembly, mechanism)
     found = walked(loops, start, main.seconds, getattr(main, "turns", 1), rounds)
     for change in found.changes:
         if freedom(mechanism) == 0 and _diverges(assembly, found, change, gravity):
@@ -259,8 +260,8 @@ def _reactions(
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
     holds = 3 * n + 1
     rates = holds + len(assembly.loops.owners)
-    tabled = [load.name for load in mechanism.loads if getattr(load, "table", False)]
-    curves = {name: rates + at.RATES + k for k, name in enumerate(tabled)}
+    tabled = [load for load in mechanism.loads if getattr(load, "table", False)]
+    curves = {load.name: rates + at.RATES + k for k, load in enumerate(tabled)}
     rows = Rows(0, n, 2 * n, rates, 3 * n, holds, curves=curves)
     on = On(gravity=gravity != 0.0, energies=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
@@ -268,10 +269,12 @@ def _reactions(
     exec(text.source, names)
     work = np.zeros((rates + at.RATES + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times
-    turned = assembly.loops.forest.index("angle", mechanism.period.body)
-    assert turned is not None  # every body turns by itself here
-    for name, row in curves.items():
-        work[row] = tabulated.get(name, np.ones_like)(work[turned])
+    for load in tabled:
+        by = load.by  # type: ignore[union-attr]
+        body = mechanism.period.body if by is None else by.body
+        turned = assembly.loops.forest.index("angle", body)  # every body turns by itself here
+        place = times if by is not None and by.seconds else work[turned]
+        work[curves[load.name]] = tabulated.get(load.name, np.ones_like)(place)
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     names["lane"](None, (), work, par, 0, 1)
     from_row = {name: work[holds + r] for r, name in enumerate(text.constraints)}

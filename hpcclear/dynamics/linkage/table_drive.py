@@ -9,14 +9,11 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import TableDrive
 
-PARTS = ("angle", "spin", "turn")
-"""Angle but for what it gains evenly (rad), and its first and second derivative (rad/s, rad/s2)."""
-
 Given = Callable[[Array], tuple[Array, Array, Array]]
 
 
 def words_of(mechanism: Mechanism) -> dict[str, Given]:
-    """What texts for numpy call for each table: ``table_of_NAME(time)``, the three `PARTS` at times of any shape."""
+    """What texts for numpy call for each table: ``table_of_NAME(time)``, its `curves` at times of any shape."""
     return {
         f"table_of_{drive.name}": _given(drive)
         for drive in mechanism.drives

@@ -11,7 +11,16 @@ from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Drive, Fixed, Joint, Revolute, Slide, split
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Drive,
+    Fixed,
+    Joint,
+    Revolute,
+    Slide,
+    Slot,
+    split,
+)
 
 
 class Coordinate(NamedTuple):
@@ -99,7 +108,10 @@ def _spanning(m: Mechanism) -> tuple[list[Joint], list[Joint]]:
     edges: list[Joint] = []
     closures: list[Joint] = []
     order = {Fixed: 0, Slide: 1, Revolute: 2}
-    for joint in sorted(m.ideal, key=lambda joint: order[type(joint)]):
+    for joint in sorted(m.ideal, key=lambda joint: order.get(type(joint), len(order))):
+        if isinstance(joint, Slot):  # nothing hangs by one constraint alone
+            closures.append(joint)
+            continue
         one, two = (group[split(place)[0]] for place in joint.places)
         if one == two:
             closures.append(joint)

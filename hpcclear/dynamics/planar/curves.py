@@ -83,7 +83,9 @@ def _straight(
 
 @lru_cache(maxsize=16)
 def angle_cells(rows: Rows) -> Array:
-    """Cells of `table_drive.PARTS` over the time until a table (s, rad) repeats, shape (3, 4 CELLS); not to be written to.
+    """Cells of `parts.TableDrive.curves` over the time until a table (s, rad) repeats, shape (3, 4 CELLS).
+
+    Not to be written to.
 
     A periodic spline, but for what it gains evenly, and its exact derivatives, so that what is integrated belongs to where
     things are.
@@ -102,6 +104,44 @@ def angle_cells(rows: Rows) -> Array:
     spin = np.column_stack([c1, 2 * c2, 3 * c3, none]) / length
     turn = np.column_stack([2 * c2, 6 * c3, none, none]) / length**2
     return np.stack([angle.ravel(), spin.ravel(), turn.ravel()])
+
+
+@lru_cache(maxsize=16)
+def level_cells(rows: Rows, interpolation: str = "smooth") -> tuple[Array, Array]:
+    """Cells (flat) of a table over times from 0 to its last, and of its derivative by the time; not to be written to.
+
+    As `periodic_cells`, but level before the first and behind the last pair, which it leaves and meets without a kink.
+    """
+    times, values = np.array(rows).T
+    length = times[-1]
+    grid = np.linspace(0.0, length, at.CELLS + 1)
+    beside = length * np.array([1.0, 2.0])
+    if interpolation == "linear":
+        value = np.interp(grid, times, values)
+        step = np.diff(value)
+        c0, c1, c2, c3 = value[:-1], step, 0.0 * step, 0.0 * step
+    else:
+        x = np.concatenate([times[0] - beside[::-1], times, length + beside])
+        y = np.concatenate([values[[0, 0]], values, values[[-1, -1]]])
+        value, slope = _monotone(x, y, grid)
+        m = slope * (length / at.CELLS)
+        c0, c1, c2, c3 = _hermite(value[:-1], value[1:], m[:-1], m[1:])
+    rise = np.column_stack([c1, 2 * c2, 3 * c3, 0.0 * c3]) * (at.CELLS / length)
+    return np.column_stack([c0, c1, c2, c3]).ravel(), rise.ravel()
+
+
+def level_at(rows: Rows, time: Array, interpolation: str = "smooth") -> Array:
+    """A table at times (n,) from 0 on, as the kernel reads it."""
+    place = np.minimum(time / rows[-1][0], 1.0) * at.CELLS
+    cell = np.minimum(place.astype(int), at.CELLS - 1)
+    s = place - cell
+    c0, c1, c2, c3 = level_cells(rows, interpolation)[0].reshape(-1, 4)[cell].T
+    return np.asarray(c0 + s * (c1 + s * (c2 + s * c3)))
+
+
+def as_angles(rows: Rows) -> Rows:
+    """A table over times that repeats at its last one, over the angle of a turn in place of the time."""
+    return tuple((at.TURN * time / rows[-1][0], value) for time, value in rows)
 
 
 def curve_at(curve: Curve, angle: Array, turns: int = 1, interpolation: str = "smooth") -> Array:

@@ -7,9 +7,9 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import stored_energy
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.views import Outcome, Parameters, Start
 from hpcclear.scene import Scene
 
 

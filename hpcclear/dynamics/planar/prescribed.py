@@ -13,7 +13,6 @@ from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import Revolute, Slide, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
-from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.path import rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, scene_of
 from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved
@@ -59,10 +58,10 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
 
 
 def _curves(scene: Scene) -> dict[str, Any]:
-    """Tabulated loads by name, each as a function of the angle of the body that gives the period."""
-    turns, interpolation = turns_of(scene.linkage), scene.numerics.interpolation
+    """Tabulated loads by name, each as a function of the angle or time that it goes by."""
+    interpolation = scene.numerics.interpolation
     return {
-        name: partial(curve_at, curve, turns=turns, interpolation=interpolation)
+        name: partial(curve.at, interpolation=interpolation)
         for name, curve in curves_of(scene.linkage).items()
     }
 

@@ -29,7 +29,7 @@ PLACEHOLDER = 1e-3
 NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
                 "torque", "no_load_speed", "flywheel_inertia", "stiffness", "damping", "size", "direction",
                 "linear", "quadratic", "stop_stiffness",
-                "coefficient", "ramp_speed")  # fmt: skip
+                "coefficient", "radius", "ramp_speed")  # fmt: skip
 """Entries that no sample's start depends on."""
 
 

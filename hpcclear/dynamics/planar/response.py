@@ -9,13 +9,13 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import stored_energy
+from hpcclear.dynamics.layout.views import Parameters, Rates
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, as_complex, split
+from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, LooseSlot, as_complex, split
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.views import Parameters, Rates
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -158,7 +158,7 @@ def mode_series(modes: int, q: Array, v: Array, strain: Array) -> dict[str, Arra
 
 def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     """Series (t, guides) of the guides with clearance: how far the slider is to the left of the line, and its tilt."""
-    guides = [joint for joint in mechanism.clearances if isinstance(joint, LooseSlide)]
+    guides = [joint for joint in mechanism.clearances if isinstance(joint, (LooseSlide, LooseSlot))]
     if not guides:
         return {}
     found = []

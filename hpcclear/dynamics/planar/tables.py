@@ -1,7 +1,7 @@
 """From the tables of a linkage to the mechanism as data."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,11 +15,19 @@ from hpcclear.dynamics.laws.hertz_contact import (
 from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.loads import KINDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
-from hpcclear.dynamics.planar.curves import angle_cells
+from hpcclear.dynamics.planar.curves import (
+    angle_cells,
+    as_angles,
+    curve_at,
+    level_at,
+    level_cells,
+    periodic_cells,
+)
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,
     PlanarHarmonic,
+    PlanarRunUp,
     PlanarSpeed,
     PlanarTable,
     PlanarTorque,
@@ -32,8 +40,10 @@ from hpcclear.scene.planar import (
     PlanarClearance,
     PlanarRevolute,
     PlanarSlide,
+    turns_of,
 )
 from hpcclear.scene.points import Points
+from hpcclear.scene.slots import PlanarSlot
 
 
 def mechanism_of(planar: Planar) -> Mechanism:
@@ -118,7 +128,9 @@ def _compliances(both: Materials) -> tuple[float, float]:
 
 def _joint(joint: Any) -> parts.Joint:
     if isinstance(joint, PlanarRevolute):
-        return parts.Revolute(joint.name, joint.journal, joint.bearing)
+        return parts.Revolute(
+            joint.name, joint.journal, joint.bearing, friction=_rubbing(joint.friction)
+        )
     if isinstance(joint, PlanarClearance):
         both, start = joint.materials, joint.start_eccentricity
         stiffness = contact_stiffness(*_compliances(both), joint.bearing_radius, joint.clearance)
@@ -128,11 +140,21 @@ def _joint(joint: Any) -> parts.Joint:
         )  # fmt: skip
     if isinstance(joint, PlanarSlide) and joint.clearance is not None:
         return _loose_slide(joint)
+    if isinstance(joint, PlanarSlot):
+        return _slot(joint)
     if isinstance(joint, PlanarSlide):
-        rubs = joint.friction
-        friction = None if rubs is None else parts.GuideFriction(rubs.coefficient, rubs.ramp_speed)
+        friction = _rubbing(joint.friction)
         return parts.Slide(joint.name, joint.point, joint.line, joint.angle, friction)
     return parts.Fixed(joint.name, joint.point, joint.line, joint.angle)
+
+
+def _rubbing(table: Any) -> Any:
+    """Friction of a guide, or of a pin, which has a radius."""
+    if table is None:
+        return None
+    if (radius := getattr(table, "radius", None)) is None:
+        return parts.GuideFriction(table.coefficient, table.ramp_speed)
+    return parts.PinFriction(table.coefficient, radius, table.ramp_speed)
 
 
 def _loose_slide(joint: Any) -> parts.LooseSlide:
@@ -146,7 +168,16 @@ def _loose_slide(joint: Any) -> parts.LooseSlide:
     )  # fmt: skip
 
 
-def _drive(drive: Any) -> parts.Drive:
+def _slot(joint: Any) -> parts.Slot:
+    places = (joint.name, joint.point, joint.line, joint.angle)
+    if joint.clearance is None:
+        return parts.Slot(*places)
+    stiffness = sphere_stiffness(*_compliances(joint.materials), joint.pin_radius)
+    offset = 0.0 if joint.start_offset is None else joint.start_offset
+    return parts.LooseSlot(*places, joint.clearance, joint.pin_radius, stiffness, offset)
+
+
+def _drive(drive: object) -> parts.Drive:
     if isinstance(drive, PlanarSpeed):
         return parts.ConstantSpeed(drive.name, drive.body, drive.speed, drive.period, drive.turns)
     if isinstance(drive, PlanarHarmonic):
@@ -158,6 +189,13 @@ def _drive(drive: Any) -> parts.Drive:
         return parts.TableDrive(
             drive.name, drive.body, drive.angle, angle_cells(drive.angle), drive.period
         )
+    if isinstance(drive, PlanarRunUp):
+        rows = drive.speed_by_time
+        top = max(speed for _, speed in rows)
+        return parts.RunUp(
+            drive.name, drive.body, 0.0, rows[0][1], drive.flywheel_inertia, False, drive.period,
+            drive.turns, top, rows=rows, cells=level_cells(rows),
+        )  # fmt: skip
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
     torque = 1.0 if table or drive.torque is None else drive.torque
@@ -173,14 +211,15 @@ def _load(load: Any) -> parts.Load:
         if load.force is not None:
             pair = (load.force.x, load.force.y)
             return parts.Force(load.name, load.place, pair, follows=load.follows)
-        table = isinstance(load.size, tuple)
+        table = isinstance(load.size, tuple) or load.size is None
         size: Any = 1.0 if table else load.size
         # a quarter turn is one, to the last bit
         cosine, sine = (
             np.where(np.abs(part) < 1e-15, 0.0, part)[()]
             for part in (np.cos(load.direction), np.sin(load.direction))
         )
-        return parts.Force(load.name, load.place, (size * cosine, size * sine), table, load.follows)
+        pair = (size * cosine, size * sine)
+        return parts.Force(load.name, load.place, pair, table, load.follows, _by(load))
     if isinstance(load, SpringLoad):
         return parts.Spring(
             load.name, load.first, load.second, load.stiffness, load.length, load.damping,
@@ -188,17 +227,50 @@ def _load(load: Any) -> parts.Load:
         )  # fmt: skip
     if load.kind in KINDS:
         return KINDS[load.kind].of(load)
-    table = isinstance(load.torque, tuple)
-    return parts.Torque(load.name, load.body, 1.0 if table else load.torque, table)
+    table = isinstance(load.torque, tuple) or load.torque is None
+    return parts.Torque(load.name, load.body, 1.0 if table else load.torque, table, _by(load))
 
 
-def curves_of(planar: Planar) -> dict[str, Any]:
+def _by(load: Any) -> parts.By | None:
+    rows = load.size_by_time if isinstance(load, ForceLoad) else load.torque_by_time
+    if rows is not None:
+        return parts.By(seconds=rows[-1][0], repeats=load.repeats)
+    return None if load.angle_of is None else parts.By(load.angle_of)
+
+
+class Tabled(NamedTuple):
+    """A table of a drive or load: its rows, by angles (rad) of so many turns, or where there are none by the time (s)."""
+
+    rows: Any
+    turns: int
+    repeats: bool = True
+
+    def cells(self, interpolation: str) -> Array:
+        """As the kernel reads it."""
+        if self.turns:
+            return periodic_cells(self.rows, turns=self.turns, interpolation=interpolation)
+        if self.repeats:
+            return periodic_cells(as_angles(self.rows), interpolation=interpolation)
+        return level_cells(self.rows, interpolation)[0]
+
+    def at(self, place: Array, interpolation: str) -> Array:
+        """The same at places (n,)."""
+        if self.turns:
+            return curve_at(self.rows, place, self.turns, interpolation)
+        if self.repeats:
+            angle = place * (2 * np.pi / self.rows[-1][0])
+            return curve_at(as_angles(self.rows), angle, 1, interpolation)
+        return level_at(self.rows, place, interpolation)
+
+
+def curves_of(planar: Planar) -> dict[str, Tabled]:
     """Tables of drives and loads, by name."""
-    found = {}
+    found, turns = {}, turns_of(planar)
     for row in (*planar.drives, *planar.loads):
-        curve = (
-            getattr(row, "torque", None) if hasattr(row, "torque") else getattr(row, "size", None)
-        )
-        if isinstance(curve, tuple):
-            found[row.name] = curve
+        for entry in ("torque", "size"):
+            if isinstance(curve := getattr(row, entry, None), tuple):
+                by_another = getattr(row, "angle_of", None) is not None
+                found[row.name] = Tabled(curve, 1 if by_another else turns)
+            if (curve := getattr(row, f"{entry}_by_time", None)) is not None:
+                found[row.name] = Tabled(curve, 0, row.repeats)  # type: ignore[union-attr]
     return found

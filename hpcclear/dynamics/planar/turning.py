@@ -168,7 +168,7 @@ def loops_of(structure: Mechanism) -> Loops | None:
 
 
 class Made(Protocol):
-    """Samples (m) put together, as `hpcclear.dynamics.start.Samples` has them."""
+    """Samples (m) put together, as `hpcclear.dynamics.setup.start.Samples` has them."""
 
     numbers: Mechanism
     closed: Booleans

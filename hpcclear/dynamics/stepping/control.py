@@ -11,7 +11,7 @@ from numba import njit
 from hpcclear.base.bits import no_less, rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
+from hpcclear.dynamics.layout.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
 
 SHRINK = 0.2
 """What a rejected step shrinks to at most."""

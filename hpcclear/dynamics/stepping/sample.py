@@ -5,7 +5,7 @@ import math
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.settings import (
+from hpcclear.dynamics.layout.settings import (
     AVERAGED,
     CHOSEN,
     CYCLE,
@@ -211,6 +211,7 @@ def end_revolution(lane, W, work, book, settings):
     for r in range(int(settings[PROFILED])):
         work[(at.INTEGRAL + at.PROFILES + r) * W + lane] = 0.0
     work[at.TIME * W + lane] = 0.0
+    work[at.BEGAN * W + lane] += time
     for k in range(JOINTS):
         work[(at.ENDED + k) * W + lane] = 0.0
     work[at.ENDING * W + lane] = 0.0

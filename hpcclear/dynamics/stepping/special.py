@@ -13,8 +13,7 @@ from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
-from hpcclear.dynamics.stepping.settings import (
+from hpcclear.dynamics.layout.settings import (
     ASKED,
     COORDINATES,
     COUNTERS,
@@ -27,6 +26,7 @@ from hpcclear.dynamics.stepping.settings import (
     WIDTH,
     rules_in,
 )
+from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 from hpcclear.dynamics.stepping.stops import (
     integrate_gap,
     stop_at_impacts,

@@ -3,6 +3,13 @@
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.settings import (
+    ANGLE_TOLERANCE,
+    AT_REST,
+    CYCLE,
+    GAP_TOLERANCE,
+    IMPACT_FLOOR,
+)
 from hpcclear.dynamics.stepping.control import FIRST_PART, SHRINK
 from hpcclear.dynamics.stepping.events import (
     KINK_REACH,
@@ -11,13 +18,6 @@ from hpcclear.dynamics.stepping.events import (
     root,
     zero_at_end,
     zero_at_start,
-)
-from hpcclear.dynamics.stepping.settings import (
-    ANGLE_TOLERANCE,
-    AT_REST,
-    CYCLE,
-    GAP_TOLERANCE,
-    IMPACT_FLOOR,
 )
 
 OK = int(Status.OK)

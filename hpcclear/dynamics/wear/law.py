@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.parameters import Numbers
+from hpcclear.dynamics.setup.parameters import Numbers
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -35,7 +35,7 @@ class Joints:
     fading: Array
     """excess and fading: a - 1 and W0, J, of running in; 0 and 1 without."""
 
-    def __getitem__(self, life: Any) -> "Joints":
+    def __getitem__(self, life: object) -> "Joints":
         return Joints(*(array[life] for array in vars(self).values()))
 
     @property

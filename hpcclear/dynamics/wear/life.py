@@ -21,11 +21,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Status
+from hpcclear.base.student import student
 from hpcclear.dynamics.wear.curves import THROUGH, first_passed, local_bounds
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.record import Life, Node
 from hpcclear.dynamics.wear.relief import FLAT, Relief
-from hpcclear.statistics.random.replicates import student
 
 FIRST_GROWTH = 0.1
 """Of the clearance, relative, by the first jump."""

@@ -46,7 +46,9 @@ def shown(value: float, limit: float) -> str:
         return "-"
     value, limit = 100.0 * value, 100.0 * limit
     digits = int(np.clip(1 - np.floor(np.log10(max(limit, 1e-2))), 0, 2))
-    return f"{value:+.{digits}f} ± {limit:.{digits}f} %"
+    number = f"{value:+.{digits}f}"
+    number = number[1:] if float(number) == 0.0 else number
+    return f"{number} ± {limit:.{digits}f} %"
 
 
 def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> str:

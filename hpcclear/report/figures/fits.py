@@ -32,8 +32,8 @@ def verdict(r2: float) -> str:
     if not np.isfinite(r2):
         return "R² not known"
     if r2 < 0.0:
-        return f"R² = {r2:.2g}: worse than a constant"
-    return f"R² = {r2:.2f}: indicative only" if r2 < LOW else ""
+        return f"R² = {r2:.2g}, worse than a constant"
+    return f"R² = {r2:.2f}, indicative only" if r2 < LOW else ""
 
 
 def warnings(kind: str, content: xr.Dataset | None) -> list[str]:
@@ -53,7 +53,7 @@ def mark(axes: "Axes", r2: float, height: float = 0.5) -> None:
     """Write across a panel what is wrong with the fit that it shows, at this height of it."""
     if text := verdict(r2):
         box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5}
-        words = text.replace(": ", ":\n").replace("R²", "$R^2$")
+        words = text.replace(", ", ":\n").replace("R²", "$R^2$")
         axes.text(
             0.5, height, words, transform=axes.transAxes, ha="center", va="center", zorder=6,
             color=style.PALETTE["vermilion"], fontsize=style.NORMAL, bbox=box,

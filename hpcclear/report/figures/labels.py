@@ -74,13 +74,20 @@ def scale(units: str, values: ArrayLike) -> Scale:
     return Scale(10.0 ** (-exponent * power), pretty(_PREFIXES[exponent] + units))
 
 
+PLAIN = 1e6
+"""Numbers below it are printed without an exponent."""
+
+
 def quantity(value: float, units: str, digits: int = 4) -> str:
     """A number with its unit in a readable size, a dash where there is none."""
     if not np.isfinite(value):
         return "–"
     chosen = scale(units, value)
     unit = "" if chosen.unit == "–" else f" {chosen.unit}"
-    return f"{value * chosen.factor:.{digits}g}{unit}"
+    shown = f"{value * chosen.factor:.{digits}g}"
+    if "e+" in shown and abs(float(shown)) < PLAIN:
+        shown = f"{float(shown):.0f}"
+    return f"{shown}{unit}"
 
 
 def value(one: xr.DataArray) -> str:
@@ -104,17 +111,21 @@ def with_half_width(value: float, half_width: float, units: str) -> str:
     if not np.isfinite(half_width):
         return f"{quantity(value, units)}, {NOT_CHECKED}"
     chosen = scale(units, value)
-    shown, width = value * chosen.factor, half_width * chosen.factor
     unit = "" if chosen.unit == "–" else f" {chosen.unit}"
+    return f"{paired(value * chosen.factor, half_width * chosen.factor)}{unit}"
+
+
+def paired(value: float, half_width: float) -> str:
+    """Two finite numbers as "20.9 ± 1.2": no more digits than two of the half-width, which is rounded up."""
 
     def places(number: float, digits: int) -> int:
         return digits - 1 - int(np.floor(np.log10(number))) if number > 0.0 else digits
 
-    least = places(abs(shown), _MOST_DIGITS)
-    decimals = max(min(places(width, 2), least) if width > 0.0 else least, 0)
+    least = places(abs(value), _MOST_DIGITS)
+    decimals = max(min(places(half_width, 2), least) if half_width > 0.0 else least, 0)
     step = 10.0**-decimals
-    rounded = abs(np.ceil(width / step - 1e-9)) * step  # up: it is no narrower than it is
-    return f"{shown:.{decimals}f} ± {rounded:.{decimals}f}{unit}"
+    rounded = abs(np.ceil(half_width / step - 1e-9)) * step  # up: it is no narrower than it is
+    return f"{value:.{decimals}f} ± {rounded:.{decimals}f}"
 
 
 def between(low: float, high: float, units: str) -> str:

@@ -218,19 +218,22 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
             f"{placed} {(np.degrees(poses[body.name][2]) + 180.0) % 360.0 - 180.0:.4g}°"
         )
     for joint in mechanism.joints:
-        if joint.name in scene.guides():
+        if joint.kind == "slot" and joint.clearance is not None:
+            sizes = [q(getattr(joint, name), "m") for name in ("pin_radius", "clearance")]
+            lines.append(f"{joint.name}: pin R {sizes[0]} in a slot, {sizes[1]} on either side")
+        elif joint.name in scene.guides():
             sizes = [q(getattr(joint, name), "m") for name in ("length", "height", "clearance")]
             lines.append(f"{joint.name}: slider {' x '.join(sizes[:2])}, {sizes[2]} on either side")
         if joint.kind == "clearance":
             lines.append(
                 f"{joint.name}: radial clearance {q(joint.clearance, 'm')}, bearing R {q(joint.bearing_radius, 'm')}"
             )
-    named = {"constant-speed": "turns at", "harmonic": "swings at", "torque": "torque on"}
+    named = {"constant-speed": "turns at", "harmonic": "swings at", "run-up": "runs up"}
     for drive in mechanism.drives:
         rate = getattr(drive, "speed", None)
         how = f" {60.0 * rate / (2.0 * np.pi):.5g} rpm" if rate is not None else ""
         how = f" {drive.frequency:.4g} Hz" if drive.kind == "harmonic" else how
-        what = f"{named[drive.kind]}{how}" if drive.kind != "torque" else "is driven by a torque"
+        what = f"{named[drive.kind]}{how}" if drive.kind in named else "is driven by a torque"
         lines.append(f"{drive.name}: {drive.body} {what}")
     lines += [f"{load.name}: {load.kind}{_range(load)}" for load in mechanism.loads]
     if scene.effects.gravity > 0.0:
@@ -238,7 +241,7 @@ def key(scene: Scene, poses: Mapping[str, Pose]) -> list[str]:
     return lines
 
 
-def _range(load: Any) -> str:
+def _range(load: object) -> str:
     """Of a force: its size, or the range of its table."""
     size = getattr(load, "size", None)
     if size is None:

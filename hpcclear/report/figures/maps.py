@@ -1,5 +1,6 @@
 """Maps of periodic and chaotic motion (kind ``samples``), and bifurcation figures."""
 
+import itertools
 import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 _PERIODS = (0.5, 1.5, 2.5, 4.5, 8.5, 20.5)
 _REGIMES = [regime for regime in Regime if regime is not Regime.UNJUDGED]
+_PERIOD = "period (revolutions)\nwhite: none found"
 _EXPONENT = "largest Lyapunov exponent\nper revolution"
 
 
@@ -59,7 +61,7 @@ def _plane(cells: xr.Dataset, names: list[str]) -> "Figure":
     panels: tuple[tuple[str, Array, dict[str, Any]], ...] = (
         (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -most, "vmax": most}),
         (
-            "period (revolutions)",
+            _PERIOD,
             cells["period"].to_numpy().T,
             {"cmap": "viridis", "norm": boundaries(_PERIODS, 256)},
         ),
@@ -75,7 +77,12 @@ def _plane(cells: xr.Dataset, names: list[str]) -> "Figure":
     for panel, (words, values, options) in zip(axes[:, 0], panels, strict=True):
         drawn = panel.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
         bar = figure.colorbar(drawn, ax=panel, label=words)
-        if words == "regime":
+        if words == _PERIOD:
+            pairs = list(itertools.pairwise(_PERIODS))
+            spans = [(int(low + 0.5), int(high - 0.5)) for low, high in pairs]
+            middles = [0.5 * sum(pair) for pair in pairs]
+            bar.set_ticks(middles, labels=[f"{a}" if a == b else f"{a} to {b}" for a, b in spans])
+        elif words == "regime":
             bar.set_ticks(
                 [float(one) for one in _REGIMES], labels=[one.name.lower() for one in _REGIMES]
             )

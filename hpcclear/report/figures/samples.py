@@ -69,7 +69,7 @@ def samples_figure(samples: xr.Dataset) -> "Figure":
         panel.tick_params(labelleft=i % 2 == 0)
         panel.set_xlabel(labels.of(variable).label(symbol(variable)))
         panel.set_ylabel(unit.label("$f$") if i % 2 == 0 else "")
-        style.settle([panel])
+        style.settle([panel], 3)
     if others:
         bar = figure.colorbar(drawn, cax=figure.add_subplot(cells[-1]), orientation="horizontal")
         bar.set_label("colour of the points: " + labels.of(main).label(symbol(main)))

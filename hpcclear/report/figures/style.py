@@ -117,7 +117,7 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
     """
 
     @functools.wraps(function)
-    def styled(*args: Any, ax: Any = None, **kwargs: Any) -> "Figure":
+    def styled(*args: object, ax: object = None, **kwargs: object) -> "Figure":
         token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
         try:
             with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
@@ -146,7 +146,7 @@ def page(height: float) -> "Figure":
     return figure
 
 
-def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
+def grid(rows: int, columns: int, height: float, **options: object) -> "tuple[Figure, np.ndarray]":
     """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`.
 
     Raises

@@ -46,7 +46,10 @@ def fan_figure(wear: xr.Dataset) -> "Figure":
                 cycles, value[low], value[high], color=style.PALETTE["blue"], alpha=alpha, lw=0
             )
         panel.plot(
-            cycles, value[2], color=style.PALETTE["blue"], label="median, 50 and 90 % of lives"
+            cycles,
+            value[2],
+            color=style.PALETTE["blue"],
+            label="median, 50 and 90 % of service lives",
         )
         limit = wear.attrs.get(f"limit_{name}")
         if limit is not None:

@@ -23,7 +23,7 @@ _CAPTIONS = {
 
 
 def accuracy(content: Content) -> list[object] | None:
-    """Cheapest settings for three errors in words and in one figure, then the sources of error, folded."""
+    """Cheapest settings for three errors in one figure and in words, then the sources of error, folded."""
     found = content.get("accuracy")
     if found is None:
         return None
@@ -50,8 +50,8 @@ def accuracy(content: Content) -> list[object] | None:
     ranks = drawn.pop("parallel")
     sources: list[object] = [cheapest, others, *(one for one in drawn.values() if one)]
     return [
-        *targets.sentences(found),
         *([total] if total else []),
+        *targets.sentences(found),
         note,
         folded("Sources of error, one by one", sources),
         *([folded("Ranks", [ranks])] if ranks else []),

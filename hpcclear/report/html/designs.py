@@ -137,7 +137,7 @@ def _within_intervals(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: 
     case = str(one["case"].item()) if "case" in one else ""
     rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
     less = any(float(rival[f"{what}_true"]) < float(one[f"{what}_true"]) for rival in rivals)
-    return " within the confidence intervals" if less else ""
+    return " (or is statistically indistinguishable from the lowest)" if less else ""
 
 
 def _table(
@@ -160,11 +160,10 @@ def _table(
     for k, words in enumerate(shown.values()):
         row: list[object] = [words]
         for scale, (variable, _) in zip(scales, known, strict=True):
-            text = number(float(variable[k]) * scale.factor)
             if variable.attrs.get("options") and np.isfinite(variable[k]):
                 row.append(labels.value(variable[k]))
                 continue
-            row.append(Number(text + _half_width(chosen.isel(design=k), str(variable.name), scale)))
+            row.append(Number(_cell(chosen.isel(design=k), str(variable.name), scale)))
         rows.append([*row, *_goals(chosen.isel(design=k), asked)])
     return Table(header, rows, caption)
 
@@ -185,10 +184,10 @@ def _goals(one: xr.Dataset, names: Sequence[str]) -> list[object]:
     return [*cells, "; ".join(constraints(one)) or "none"]
 
 
-def _half_width(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
-    """Half-width of the confidence interval of a simulated value, as text behind it."""
-    word = name.removesuffix("_true")
+def _cell(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
+    """A value, if it was simulated with the half-width of its confidence interval."""
+    value, word = float(one[name]) * scale.factor, name.removesuffix("_true")
     if f"{word}_lower" not in one or f"{word}_upper" not in one:
-        return ""
+        return number(value)
     half = 0.5 * (float(one[f"{word}_upper"]) - float(one[f"{word}_lower"])) * scale.factor
-    return f" ± {half:.2g}" if np.isfinite(half) else ""
+    return labels.paired(value, half) if np.isfinite([value, half]).all() else number(value)

@@ -15,24 +15,12 @@ _NO_ANGLE = "A dash instead of an angle: the peak lies between two stored instan
 
 
 def loads(content: Content) -> list[object] | None:
-    """Return a table of the bearings of every stored response, torque and validity, then the remarks; None without any."""
+    """Return tables of the bearings of every stored response, torque and validity, impacts, then remarks; None without any."""
     valid = {
         name: one for name, one in content.responses.items() if Status(int(one["status"])).valid
     }
     found = {name: bearings.bearings(one) for name, one in valid.items()}
     parts: list[object] = []
-    impacts = [
-        [name, joint, *map(Number, cells)]
-        for name, one in valid.items()
-        for joint, *cells in noise.joints(one)
-    ]
-    if impacts:
-        parts.append(Table(["response", *noise.HEADER], impacts, noise.TITLE))
-        parts += [
-            f"{name}: " + "; ".join(f"{words} {text}" for words, text in frame) + "."
-            for name, one in valid.items()
-            if (frame := noise.frame(one))
-        ]
     if any(found.values()):
         parts.append(_bearings(found))
     if any(bearings.degrees(one) == "–" for each in found.values() for one in each):
@@ -41,6 +29,20 @@ def loads(content: Content) -> list[object] | None:
         header = ["response", "largest torque", "mean torque", "objective f", "contact model"]
         rows = [_whole(name, one) for name, one in valid.items()]
         parts.append(_table(header, rows, "Drive, objective, and validity of the contact model"))
+    impacts = [
+        [_title(name), joint, *map(Number, cells)]
+        for name, one in valid.items()
+        for joint, *cells in noise.joints(one)
+    ]
+    if impacts:
+        parts.append(_table(["response", *noise.HEADER], impacts, noise.TITLE))
+        parts += [
+            f"{_title(name)}: " * (len(valid) > 1)
+            + "; ".join(f"{words} {text}" for words, text in frame)
+            + "."
+            for name, one in valid.items()
+            if (frame := noise.frame(one))
+        ]
     for name, one in content.responses.items():
         status = Status(int(one["status"]))
         if not status.valid:

@@ -1,17 +1,18 @@
 """The sections of the page on where results come from: effects, time of the ranks, how to do it again."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.report.figures import labels
 from hpcclear.report.figures.timing import timing_figure
 from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, folded, number, preformatted
 from hpcclear.scene.loading import parse
+from hpcclear.scene.paths import quantities
 
 _PARTS = ("busy", "idle", "compile", "write")
 """What a rank spends time on, variables of kind ``timing``."""
@@ -36,13 +37,20 @@ def effects(content: Content) -> list[object] | None:
     return [*first, folded("The whole scene file", [preformatted(scene)])]
 
 
-def _flat(value: Any, path: str) -> Iterator[list[object]]:
+def _flat(value: object, path: str) -> Iterator[list[object]]:
     """Entries of nested tables, a row each."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
             yield from _flat(inner, f"{path}.{key}")
     elif value is not None:
-        yield [path, str(value)]
+        yield [path, f"{value} {_unit(path, value)}".rstrip()]
+
+
+def _unit(path: str, value: object) -> str:
+    """SI unit of a plain number of a scene, "" where its text has one or it has none."""
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    unit = quantities()[path].unit if plain and path in quantities() else ""
+    return labels.pretty(unit) if unit else ""
 
 
 def timing(content: Content) -> list[object] | None:
@@ -113,5 +121,5 @@ def reproduce(content: Content) -> list[object]:
         if content.attribute(name)
     ]
     if rows:
-        steps += [words, Table(["what", "value"], rows, "Origin of these files")]
+        steps += [words, Table(["item", "value"], rows, "Origin of these files")]
     return steps

@@ -56,7 +56,9 @@ def _lives_words(content: Content) -> list[str]:
             )
     if any(name.startswith("limit_") for name in lives.attrs):
         interval = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
-        words.append(f"Survival: {float(last['survival']):.0%} (95 % CI {interval}).")
+        words.append(
+            f"Survival after {cycles:.4g} revolutions: {float(last['survival']):.0%} (95 % CI {interval})."
+        )
     return words
 
 

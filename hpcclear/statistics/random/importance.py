@@ -21,7 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.statistics.random.replicates import Limited, spread, student
+from hpcclear.base.student import student
+from hpcclear.statistics.random.replicates import Limited, spread
 
 REPEATS = 16
 """Independent repeats, whose disagreement is the error."""

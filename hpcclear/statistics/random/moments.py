@@ -99,10 +99,10 @@ class RobustObjective:
         Needed only where a derived input depends on a random one.
     tolerance : float
         Absolute error allowed in the integral of any kernel (at most 1) over one random input.
-    draws : (int, numpy Generator), mapping of str to array (s,), or callable, optional
-        Monte Carlo in place of quadrature: how many draws, and what makes them; or the draws themselves, of each random input,
-        which may vary together then. All designs see the same ones, so that their ranking is not noise. Of distributions that
-        depend on the design a function of designs (n, k) that returns draws (n or 1, s) of each.
+    draws : (int, numpy Generator) or callable, optional
+        Monte Carlo in place of quadrature: how many draws, and what makes them; or a function of designs (n, k) that returns
+        draws (n or 1, s) of each random input, which may vary together then. Designs that see the same ones are ranked without
+        noise.
     joint : callable, optional
         Of inputs that vary together, independent draws of them all: (count, numpy Generator) to a mapping of str to
         array (count,).
@@ -130,20 +130,19 @@ class RobustObjective:
         derived: Sequence[Derived] = (),
         probes: np.ndarray | None = None,
         tolerance: float = 1e-8,
-        draws: tuple[int, np.random.Generator] | Mapping[str, np.ndarray] | Drawn | None = None,
+        draws: tuple[int, np.random.Generator] | Drawn | None = None,
         joint: Callable[[int, np.random.Generator], Mapping[str, np.ndarray]] | None = None,
     ) -> None:
         self.model = model
         self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
-        self._draws: Mapping[str, np.ndarray] | Drawn | None = None
+        self._draws: Drawn | None = None
         self._rules: tuple[TensorRule, ...] = ()
         self._joint = joint
-        if isinstance(draws, Mapping):
-            self._draws = {name: np.asarray(draws[name])[None] for name in self._wiring.random}
-        elif callable(draws):
+        if callable(draws):
             self._draws = draws
         elif draws is not None:
-            self._draws = self._drawn(*draws)
+            drawn = self._drawn(*draws)
+            self._draws = lambda designs: drawn
         elif not model.separable:
             label = model.leaves[0].label
             raise InputError(
@@ -162,8 +161,7 @@ class RobustObjective:
     def __call__(self, designs: np.ndarray) -> np.ndarray:
         designs = self._checked(designs)
         if self._draws is not None:
-            drawn = self._draws(designs) if callable(self._draws) else self._draws
-            return self._averaged(designs, drawn)
+            return self._averaged(designs, self._draws(designs))
         share, mean, variance = (np.zeros((len(self._rules), len(designs))) for _ in range(3))
         for k, rule in enumerate(self._rules):
             share[k], mean[k], variance[k] = rule.moments(designs)

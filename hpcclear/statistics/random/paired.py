@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.statistics.random.replicates import FEWEST, spread, student
+from hpcclear.base.student import student
+from hpcclear.statistics.random.replicates import FEWEST, spread
 
 LEAST_KNOWN = 0.9
 """Share of the pairs that must have a value on both sides: those that fail may be the ones that differ."""

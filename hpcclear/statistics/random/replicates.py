@@ -19,6 +19,7 @@ import numpy as np
 import scipy  # its part `special` is loaded at first use: a fifth of a start
 
 from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.student import student
 
 FEWEST = 4
 """Replicates, or values, from which on an error is reported."""
@@ -81,11 +82,6 @@ def spread(shifts: Array) -> Array:
     squares = np.where(known, shifts, 0.0) ** 2
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(count > 1, np.sqrt(squares.sum(axis=1) / (count * (count - 1.0))), np.nan)
-
-
-def student(confidence: float, freedom: int) -> float:
-    """Two-sided quantile of Student's t."""
-    return float(scipy.special.stdtrit(freedom, 0.5 + confidence / 2.0))
 
 
 def moments(values: Array) -> tuple[Estimate, Deviation]:
@@ -205,10 +201,7 @@ def _interval_of_share(
     total = int(counts.sum())
     error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
     # as many independent draws, fewer for an error of few degrees of freedom
-    worth = (
-        scipy.special.stdtrit(total - 1, 0.5 + confidence / 2)
-        / student(confidence, int((counts > 0).sum()) - 1)
-    ) ** 2
+    worth = (student(confidence, total - 1) / student(confidence, int((counts > 0).sum()) - 1)) ** 2
     draws = share * (1.0 - share) / error**2 * worth if 0.0 < share < 1.0 else float(total)
     hits, tail = share * draws, (1.0 - confidence) / 2.0
     lower = float(scipy.special.betaincinv(hits, draws - hits + 1.0, tail)) if share > 0.0 else 0.0

@@ -98,12 +98,12 @@ class Pymoo:
         self._algorithm.tell(infills=asked)
 
 
-def is_algorithm(source: Any) -> bool:
+def is_algorithm(source: object) -> bool:
     """Whether something is an algorithm of pymoo, or a class of them: they are set up before they return designs."""
     return all(hasattr(source, name) for name in ("setup", "ask", "tell"))
 
 
-def adapted(source: Any, task: Task) -> Pymoo:
+def adapted(source: object, task: Task) -> Pymoo:
     """The search of an algorithm of pymoo, or of a class of them that needs no arguments."""
     return Pymoo(source() if isinstance(source, type) else copy.deepcopy(source), task)
 

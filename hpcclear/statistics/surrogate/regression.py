@@ -166,7 +166,7 @@ class Regression:
         """
         return self._predicted(self._model, inside(points, self.names, self.lower, self.upper))
 
-    def _predicted(self, model: Any, points: Array) -> Array:
+    def _predicted(self, model: object, points: Array) -> Array:
         mean, scale = self._scale
         found = _ask(model, self.label, "predict", self._to_unit(points))
         return mean + scale * _numbers(found, (len(points),), self.label, "predict")
@@ -216,7 +216,7 @@ class Regression:
         return {name: np.asarray(getattr(self, name)) for name in FIELDS}
 
 
-def restored(arrays: Mapping[str, np.ndarray], source: Any = None) -> Regression:
+def restored(arrays: Mapping[str, np.ndarray], source: object = None) -> Regression:
     """Return the model of stored arrays, shapes as in `FIELDS`; without a source it does not predict."""
     found = {
         name: np.asarray(arrays[name], np.float64)
@@ -237,7 +237,7 @@ def restored(arrays: Mapping[str, np.ndarray], source: Any = None) -> Regression
     )
 
 
-def made(source: Any, label: str, seed: int) -> Any:
+def made(source: object, label: str, seed: int) -> Any:
     """A regressor that is not fitted yet.
 
     Raises
@@ -264,7 +264,7 @@ def made(source: Any, label: str, seed: int) -> Any:
     return model
 
 
-def _called(source: Any, label: str, seed: int) -> Any:
+def _called(source: object, label: str, seed: int) -> Any:
     """What a class or a function makes."""
     if not callable(source):
         reason = "is no class, no function and has no predict"
@@ -278,7 +278,7 @@ def _called(source: Any, label: str, seed: int) -> Any:
         raise raised(KEY, label, "could not be made", error) from error
 
 
-def _ask(model: Any, label: str, what: str, *arguments: Array) -> Any:
+def _ask(model: object, label: str, what: str, *arguments: Array) -> Any:
     """What a method of the regressor returns, with one thread: more would change last bits."""
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
@@ -289,7 +289,7 @@ def _ask(model: Any, label: str, what: str, *arguments: Array) -> Any:
         raise raised(KEY, label, f"failed in {what}", error) from error
 
 
-def _numbers(found: Any, shape: tuple[int, ...], label: str, what: str) -> Array:
+def _numbers(found: object, shape: tuple[int, ...], label: str, what: str) -> Array:
     """What a method returned, as finite numbers of this shape."""
     remedy = f"Let it return an array of shape {shape}, finite everywhere in the unit cube"
     try:

@@ -27,7 +27,11 @@ LAW = ContactLaw(
         Parameter("exponent", "", "exponent of the depth", above=0, example="1.5"),
         Parameter("greatest_damping", "N*s/m", "largest damping", least=0, example='"50 N*s/m"'),
         Parameter(
-            "full_depth", "m", "depth from where on damping is largest", above=0, example='"1 um"'
+            "full_depth",
+            "m",
+            "depth from which the damping has its largest value",
+            above=0,
+            example='"1 um"',
         ),
     ),
     force=force,

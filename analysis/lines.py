@@ -1,0 +1,196 @@
+"""The lines of the package by the feature that they serve, then and now; a table of docs/architecture.md comes from here.
+
+    python analysis/lines.py            # print the tables
+    python analysis/lines.py --write    # renew those in docs/architecture.md
+
+A module belongs to the first feature one of whose patterns it matches; what no pattern names is the core: scenes, mechanisms,
+kernel, sampling, statistics, surrogates, the search and its verification, ranks, files, the report's frame.
+"""
+
+import argparse
+import re
+import tempfile
+from collections import Counter
+from fnmatch import fnmatch
+from pathlib import Path
+
+from structure import PACKAGE, ROOT, checkout
+
+AIM_COMMIT, AIM = "2e8158b", 46_000
+"""Where the aim was set, and the aim."""
+
+PAGE = ROOT / "docs" / "architecture.md"
+FIRST, LAST = "<!-- analysis/lines.py: first -->", "<!-- analysis/lines.py: last -->"
+
+FEATURES = {
+    "unknowns of a machine from measured signals":
+        "identify/* */identified.py cli/identify.py",
+    "laws, objectives, distributions, searches of a user":
+        "plugins/* dynamics/laws/checks.py dynamics/laws/translate.py dynamics/laws/formula.py "
+        "dynamics/laws/constant.py scene/plugged.py scene/formula.py cli/laws.py statistics/search/foreign.py "
+        "statistics/search/asking.py",
+    "wear and service lives":
+        "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/wear.py cli/wear.py report/figures/wear.py "
+        "study/lives.py statistics/random/survival.py dynamics/stepping/profile.py",
+    "steady means to a target error, chaos, maps":
+        "dynamics/evaluation/steady/* dynamics/steady/* ensemble/maps.py ensemble/bifurcation.py "
+        "report/figures/maps.py report/figures/portraits.py study/chaos.py base/asking.py",
+    "which effects can be neglected":
+        "ensemble/certificate.py ensemble/trial.py ensemble/effects.py cli/effects.py study/certificate.py "
+        "scene/switches.py report/figures/effects.py statistics/random/paired.py",
+    "the paper's study: its numbers and claims":
+        "study/paper/* study/claims.py study/printed.py study/readings.py",
+    "rare failures, worst cases, constraints tested":
+        "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
+        "study/worst.py ensemble/corners.py cli/corners.py",
+    "curves, tables and workbooks in; tables out":
+        "scene/sheets.py scene/workbook.py scene/file_curves.py scene/measured.py scene/table.py report/tables.py "
+        "report/export.py report/xlsx.py cli/results.py",
+    "comparison with measurements":
+        "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
+        "report/scatter.py",
+    "fits of ISO 286, catalogues, costs":
+        "scene/iso286.py scene/fits.py scene/fitted.py scene/costs.py scene/choices.py scene/materials.py "
+        "report/html/costs.py report/figures/catalogue.py report/html/designs.py",
+    "oil films":
+        "dynamics/laws/film/* dynamics/physics/film.py dynamics/contacts/lubrication.py scene/film.py "
+        "report/bearings.py dynamics/lubrication/*",
+    "bars that bend":
+        "dynamics/linkage/bending.py scene/bending.py dynamics/planar/swings.py dynamics/bending.py",
+    "guides with clearance, friction of other joints":
+        "dynamics/contacts/guide.py scene/guides.py scene/rubbing.py dynamics/linkage/rubbing.py "
+        "dynamics/linkage/guides.py report/figures/guides.py scene/moving.py",
+    "shapes of contact, roundness":
+        "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
+    "impact and noise, loads on bearings":
+        "dynamics/evaluation/recorded/impacts.py statistics/spectra.py report/noise.py report/html/loads.py study/loads.py "
+        "scene/loads.py",
+    "implicit steps of stiff samples":
+        "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
+    "the compiler's text, cache and widths":
+        "base/text/* base/one_text.py base/cached.py base/code_folder.py base/beside.py base/width.py base/bits.py "
+        "base/jit.py base/unrolled.py base/numbered.py ensemble/compiling.py base/hashing.py",
+    "error against run time, plans of jobs":
+        "accuracy/* cli/accuracy.py cli/plan.py report/figures/accuracy.py study/forecast.py study/tolerance.py "
+        "study/launched.py base/host.py",
+    "statistics of millions of samples, parts of arrays":
+        "statistics/streams/* ensemble/statistics.py ensemble/raw.py ensemble/split.py ensemble/parts.py "
+        "ensemble/bundles.py",
+    "killed runs, lost ranks, damaged files":
+        "ranks/watch.py ranks/mailbox.py results/lock.py results/faults.py results/checkpoint.py base/private.py "
+        "results/places.py",
+    "surrogates beside Kriging":
+        "statistics/surrogate/regression.py statistics/surrogate/leaf.py statistics/surrogate/piecewise.py "
+        "statistics/surrogate/response_surface.py statistics/surrogate/surface_search.py "
+        "statistics/surrogate/term_choice.py statistics/surrogate/polynomial.py",
+    "sensitivities":
+        "statistics/sensitivity/* study/sensitivities.py study/contributions.py",
+    "distributions of random inputs":
+        "scene/distributions.py scene/correlation.py scene/random_inputs.py base/quantiles.py statistics/random/rules.py",
+    "a front searched by simulations, judged with intervals":
+        "statistics/search/improvement.py statistics/search/infill.py statistics/search/certainty.py study/refinement.py "
+        "study/truth.py study/verification.py",
+    "contact and friction laws, built in":
+        "dynamics/laws/normal/* dynamics/laws/friction/* dynamics/laws/hertz_contact.py scene/laws.py "
+        "dynamics/physics/contact.py",
+    "linkages from points; templates": "scene/points_of_linkage.py scene/slider_crank.py",
+    "figures and animation":
+        "report/figures/*",
+    "the page and its gallery":
+        "report/html/* report/answer.py report/targets.py report/spread.py report/failures.py",
+    "archives, citation, schema, other units":
+        "results/crate.py results/provenance.py scene/citation.py cli/cite.py scene/schema.py scene/unit_names.py "
+        "scene/plausibility.py scene/former.py",
+}  # fmt: skip
+
+
+def feature_of(path: str) -> str:
+    """The feature of a module, by its path within the package; "" of the core."""
+    return next(
+        (
+            name
+            for name, patterns in FEATURES.items()
+            if any(fnmatch(path, pattern) for pattern in patterns.split())
+        ),
+        "",
+    )
+
+
+def lines_of(root: Path) -> dict[str, int]:
+    """Lines of every module, by its path within the package."""
+    package = root / PACKAGE
+    return {
+        str(path.relative_to(package)): len(path.read_text(encoding="utf-8").splitlines())
+        for path in sorted(package.rglob("*.py"))
+    }
+
+
+def by(sizes: dict[str, int], key: object) -> Counter[str]:
+    """Lines summed up by what `key` makes of a path."""
+    total: Counter[str] = Counter()
+    for path, size in sizes.items():
+        total[key(path)] += size  # type: ignore[operator]
+    return total
+
+
+MOVED = {
+    "explicit": "stepping",
+    "implicit": "stepping",
+    "collocation": "stepping",
+    "steady": "evaluation",
+}
+"""Packages of `dynamics` by where they, or what replaced them, are now."""
+
+
+def package_of(path: str) -> str:
+    """Package of a module; packages with packages of their own by these."""
+    parts = path.split("/")[:-1]
+    if parts[:1] == ["dynamics"] and len(parts) > 1:
+        parts[1] = MOVED.get(parts[1], parts[1])
+    return "/".join(parts[:2]) or "(itself)"
+
+
+def table(title: str, before: Counter[str], now: Counter[str], rest: str = "") -> list[str]:
+    """Rows of a table, the largest first, and their sum."""
+    rows = [f"| {title} | {AIM_COMMIT} | now | change |", "| --- | ---: | ---: | ---: |"]
+    for name in sorted(before | now, key=lambda one: (one == rest, -now[one], one)):
+        then, today = before[name], now[name]
+        words = "core: all the rest" if name == "" else name
+        rows.append(f"| {words} | {then} | {today} | {today - then:+d} |")
+    then, today = before.total(), now.total()
+    return [*rows, f"| **all** | {then} | {today} | {today - then:+d} |"]
+
+
+def text() -> str:
+    """Both tables, and what is above the aim."""
+    now = lines_of(ROOT)
+    with tempfile.TemporaryDirectory() as place:
+        before = lines_of(checkout(AIM_COMMIT, Path(place)))
+    features = table("feature", by(before, feature_of), by(now, feature_of), "")
+    packages = table("package", by(before, package_of), by(now, package_of), "(itself)")
+    total, core = sum(now.values()), by(now, feature_of)[""]
+    words = (
+        f"The package has {total} lines, docstrings included. The aim of commit {AIM_COMMIT} was {AIM}. "
+        f"The core has {core}, less than that; the features below have the other {total - core}, and are the reasons for "
+        f"the {total - AIM} above the aim."
+    )
+    return "\n".join([words, "", *features, "", *packages])
+
+
+def main() -> None:
+    """Print the tables, or write them into the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--write", action="store_true", help="renew the page")
+    found = text()
+    if parser.parse_args().write:
+        page = PAGE.read_text(encoding="utf-8")
+        made = f"{FIRST}\n\n{found}\n\n{LAST}"
+        PAGE.write_text(
+            re.sub(f"{FIRST}.*{LAST}", lambda _: made, page, flags=re.S), encoding="utf-8"
+        )
+    else:
+        print(found)
+
+
+if __name__ == "__main__":
+    main()

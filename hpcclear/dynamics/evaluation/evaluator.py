@@ -1,0 +1,369 @@
+"""Points to outcome records, in this process: what every rank runs, and what a script calls without MPI."""
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Booleans, Integers, Records
+from hpcclear.base.cache import first_level_cache
+from hpcclear.base.errors import InputError
+from hpcclear.base.jit import doubles_in_a_vector
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
+from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.joint_laws import has_pressure, widest_contact
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
+from hpcclear.dynamics.linkage.mechanism import modes_of
+from hpcclear.dynamics.planar import energy
+from hpcclear.dynamics.setup.parameters import Numbers, parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
+from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+VECTORS = 4
+"""Vectors that the lanes of an ensemble fill at most: enough for the processor to work on one while another waits for a root or
+a quotient, few enough for a first-level cache of 48 KiB. There 16 to 48 lanes are within 3 to 10 %, 8 are left scalar."""
+
+CACHE_OF_A_VECTOR = 12 * 1024
+"""Bytes of the first-level cache for each of them: in 32 KiB 16 lanes take 0.84 of the time of 32, whose states, stages and
+parameters do not fit."""
+
+LEAST_LANES = 16
+"""Shorter loops the compiler does not vectorise where it must check at run time whether arrays overlap."""
+
+
+def default_lanes() -> int:
+    """Lanes of an ensemble on this processor, or as many as ``HPCCLEAR_LANES`` says; no result depends on them.
+
+    Raises
+    ------
+    InputError
+        If that is not a whole number from 1 to 1024.
+    """
+    asked = os.environ.get("HPCCLEAR_LANES", "")
+    if not asked:
+        vectors = min(VECTORS, first_level_cache() // CACHE_OF_A_VECTOR)
+        return max(LEAST_LANES, vectors * doubles_in_a_vector())
+    if not (asked.isdecimal() and 1 <= int(asked) <= 1024):
+        raise InputError(
+            "HPCCLEAR_LANES",
+            asked,
+            "is not a number of lanes",
+            "Set it to a whole number from 1 to 1024, or not at all",
+        )
+    return int(asked)
+
+
+DEFAULT_LANES = default_lanes()
+"""Lanes of an ensemble in this process; root's are everybody's."""
+
+PERTURBATION = 1e-10
+"""Relative size of the perturbations to the start of a sample's copies."""
+
+PERTURBATIONS = (0, 1, -1)
+"""Signs of the perturbations to copies of a response at a tight tolerance."""
+
+PERTURBATIONS_ALONE = (*PERTURBATIONS, 10, -10, 100, -100, 1000, -1000)
+"""Perturbations of the replicas of a single response, which take lanes that would stay empty. With the larger ones chaotic
+replicas separate before the average begins; none is beyond `PERTURBATION_OF_TOLERANCE`."""
+
+PERTURBATION_OF_TOLERANCE = 0.1
+"""Largest perturbation over the relative tolerance: errors of the sample's own steps are larger."""
+
+
+def alone(rtol: float) -> tuple[int, ...]:
+    """Perturbations of replicas of a single response: `PERTURBATIONS_ALONE`, or `PERTURBATIONS` at tight tolerances."""
+    large = (
+        max(map(abs, PERTURBATIONS_ALONE)) * PERTURBATION > 1.001 * PERTURBATION_OF_TOLERANCE * rtol
+    )
+    return PERTURBATIONS if large else PERTURBATIONS_ALONE
+
+
+STRICTER = 300.0
+"""Tolerance of a sample over that of its copies, whose own errors then count for little."""
+
+TIGHTEST = 1e-14
+"""Tolerance of a copy at least: beyond it all is rounding."""
+
+COVERAGE = 1.7
+"""Stated uncertainty over the distance of the farthest copy; `analysis/uncertainty.py` measures its width and how often it
+holds. Copies no stricter than the sample would add errors of their own in nearly regular motion: equally reliable
+intervals were up to 12 times the error there."""
+
+COVERAGE_ALONE = 1.25
+"""The same factor for the replicas of a single response: of normal variates, one more differs from the first by more than this
+times the largest difference of nine others in 4 % of cases, by more than 1.7 times that of three others in 8 %."""
+
+
+class Evaluator:
+    """Simulates points of one scene as a stream: submit some, advance, submit more while others run.
+
+    Parameters
+    ----------
+    columns : Points
+        Points (perhaps none) whose names and paths all submitted values share.
+    lanes : int, optional
+        Samples of a batch.
+    perturbations : sequence of int, optional
+        In units of `PERTURBATION`, of replicas at a tighter tolerance that run beside each sample and give its objective a
+        half-width, as `alone` gives those of a single response; none by default.
+    objective : Objective
+        Of which that half-width is.
+    recorder : Lanes, optional
+        By which samples are simulated, instead of lanes of its own.
+
+    Raises
+    ------
+    InputError
+        If the scene requires what the kernel cannot do.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        columns: Points,
+        lanes: int = DEFAULT_LANES,
+        perturbations: Sequence[int] = (),
+        objective: Objective = MEAN_GAP,
+        recorder: Lanes | None = None,
+    ) -> None:
+        self.scene = scene
+        self.lanes = lanes
+        self._columns = columns
+        self._perturbations = tuple(perturbations)
+        self._copies = 1 + len(self._perturbations)
+        self._objective = objective
+        problem = problem_of(scene)
+        if recorder is not None:
+            self._lanes: Lanes | PrescribedSamples = recorder
+        else:
+            self._lanes = (
+                Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
+            )
+        self._problem = problem
+        self._pressed = has_pressure(scene)
+        self._starts: dict[int, float] = {}  # energy of what runs, J
+        self._values: dict[int, Array] = {}  # of what runs, for its pressures
+        self._partial: dict[int, Records] = {}
+
+    @property
+    def pending(self) -> int:
+        """Samples submitted and not finished (copies count for a share)."""
+        return -(-self._lanes.pending // self._copies)
+
+    def submit(self, index: Integers, points: Array) -> None:
+        """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
+        made = Points(self._columns.names, points, self._columns.paths)
+        par = parameters(self.scene, made)
+        self.queue(index, par, start_states(self.scene, par, made), points)
+
+    def queue(self, index: Integers, par: Array, start: Start, points: Array | None = None) -> None:
+        """Queue samples by their indices (m,), kernel parameters (m, PARAMETERS), m starts, and their values (m, d) if any."""
+        labels = np.asarray(index, np.int64) * self._copies
+        if self._pressed and points is not None:
+            for k in range(self._copies):
+                self._values.update(zip((labels + k).tolist(), points, strict=True))
+        if self._copies > 1:
+            par, start, labels = with_copies(
+                par, start, labels, self.scene.numerics.rtol, self._perturbations
+            )
+        if self._problem.effects.energies and self._problem.coordinates:
+            before = energy.of_starts(self.scene, par, start, self._problem.coordinates)
+            self._starts.update(zip(labels.tolist(), before.tolist(), strict=True))
+        self._lanes.queue(par, start, labels)
+
+    def advance(self, seconds: float) -> Records:
+        """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
+        self._lanes.advance(seconds)
+        labels, outcome, par = self._lanes.collect()
+        effects = self._problem.effects
+        responses = responses_reported(self._problem)
+        records = outcome_records(
+            labels, outcome, par, responses, bool(effects.wear), self.scene.objective
+        )
+        if self._pressed:
+            nothing = np.zeros(len(self._columns.names))
+            values = [self._values.pop(label, nothing) for label in labels.tolist()]
+            with_pressures(self.scene, self._columns, values, records)
+        if self._starts and len(labels):
+            before = np.array([self._starts.pop(label) for label in labels.tolist()])
+            off = energy.errors(self.scene, par, before, outcome, self._problem.coordinates)
+            valid = np.isfinite(records["objective"])
+            records["energy_error"] = np.where(valid, off, np.nan)
+        return records if self._copies == 1 else self._join(records)
+
+    def _join(self, records: Records) -> Records:
+        """Records of samples whose copies are all in, with the uncertainty these state."""
+        done = []
+        for record in records:
+            sample, copy = divmod(int(record["sample"]), self._copies)
+            group = self._partial.setdefault(sample, np.zeros(self._copies, OUTCOME))
+            group[copy] = record
+            group["flags"][copy] |= _ARRIVED
+            if (group["flags"] & _ARRIVED).all():
+                done.append(joined(sample, self._partial.pop(sample), self._objective))
+        return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
+
+
+def with_pressures(
+    scene: Scene, columns: Points, values: Sequence[Array], records: Records
+) -> Records:
+    """Records (m,) with pressures and angles of contact at their peak forces filled in; `values`: m rows (d,) of `columns`."""
+    points = np.reshape(values, (len(records), len(columns.names)))
+    made = Points(columns.names, points, columns.paths)
+    forces = records["peak_contact_force"]
+    for name, found in widest_contact(scene, Numbers(scene, made), forces).items():
+        records[name] = found
+    return records
+
+
+def responses_reported(problem: Problem) -> tuple[str, ...]:
+    """Which of `RESPONSES` samples record: those requested, of a slider or a point only where one is followed."""
+    if not problem.effects.responses:
+        return ()
+    linkage, impacts = problem.linkage, impacts_reported(problem)
+    if linkage.follow and not linkage.follows_a_point:
+        return (*impacts, *(name for name in RESPONSES if "point" not in name))
+    followed = "point" if linkage.follows_a_point else "nothing"
+    names = (name for name in RESPONSES if followed in name or "acceleration" not in name)
+    return (*impacts, *names)
+
+
+def impacts_reported(problem: Problem) -> tuple[str, ...]:
+    """Which of `IMPACTS` samples report: the force on the frame is that of rigid bodies only."""
+    rigid = modes_of(problem.linkage.mechanism) == 0
+    asked = IMPACTS if problem.effects.impacts else ()
+    return tuple(name for name in asked if rigid or name != "rms_frame_force")
+
+
+_ARRIVED = np.int8(64)  # marks a copy that has come in; never leaves the evaluator
+
+
+def with_copies(
+    par: Array,
+    start: Start,
+    labels: Integers,
+    rtol: float,
+    perturbations: Sequence[int] = PERTURBATIONS,
+) -> tuple[Array, Start, Integers]:
+    """Each sample followed by its copies: perturbed starts, and stricter tolerances."""
+    sizes = np.array([0, *perturbations])
+    count = len(sizes)
+    strict = np.array([1.0] + len(perturbations) * [max(1.0, min(STRICTER, rtol / TIGHTEST))])
+    par, start = np.repeat(par, count, axis=0), Start(np.repeat(start.rows, count, axis=0))
+    Parameters(par).strictness = np.tile(strict**2, len(labels))
+    # Signs alternate over the coordinates, so that the perturbation is no motion of the mechanism as a whole.
+    signs = np.where(np.arange(at.MAX_COORDINATES) % 2 == 0, 1.0, -1.0)
+    pattern = np.concatenate([signs, -signs])  # of coordinates, then of velocities
+    start.moving *= 1.0 + PERTURBATION * np.tile(sizes, len(labels))[:, None] * pattern
+    copies = (labels[:, None] + np.arange(count)).ravel()
+    return par, start, copies
+
+
+def joined(sample: int, group: Records, objective: Objective = MEAN_GAP) -> Records:
+    """One record from a sample (first) and its copies: its own numbers, and how far they can be trusted."""
+    record = group[0].copy()
+    record["sample"] = sample
+    record["flags"] &= ~_ARRIVED
+    values = objective.of(group)
+    # A copy that failed leaves the uncertainty unknown, and NaN says so.
+    coverage = COVERAGE if len(group) == 1 + len(PERTURBATIONS) else COVERAGE_ALONE
+    record["objective_uncertainty"] = coverage * np.max(np.abs(values[1:] - values[0]))
+    return record
+
+
+NO_RATE = -1e299
+"""A place whose largest rate is below this has none."""
+
+
+def outcome_records(
+    labels: Integers, outcome: Outcome, par: Array, responses: Sequence[str] = (), worn: bool = False,
+    objective: Objective = MEAN_GAP,
+) -> Records:  # fmt: skip
+    """Outcomes (m) and parameters (m, PARAMETERS) as records.
+
+    Numbers of failed samples are NaN, and so are those that were not requested: the further responses unless
+    `responses` (as of `responses_reported`), sliding work unless `worn`,
+    what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
+    """
+    records = unknown(len(labels))
+    records["sample"] = labels
+    records["status"] = outcome.status
+    records["rhs_evaluations"] = outcome.evaluations
+    valid = np.isin(records["status"], [status for status in Status if status.valid])
+    known = {
+        "objective": outcome.objective, "objective_spread": outcome.spread,
+        "mean_gap": outcome.mean_gap, "peak_contact_force": outcome.peak_force,
+    }  # fmt: skip
+    made = {**_responses(outcome), **measures(outcome)}
+    known |= {name: one for name, one in made.items() if name in responses}
+    if worn:
+        known |= {
+            "sliding_work": sliding_work(outcome),
+            "sliding_waves": outcome.profile * _revolution(outcome),
+        }
+    if objective.rate is not None:
+        largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
+        known[RATE] = objective.made_of(outcome.mean_rate, largest, _revolution(outcome))
+    for name, values in known.items():
+        records[name][valid] = values[valid]
+    latched = outcome.latched == 1.0
+    records["latched"] = latched & valid[:, None]
+    flags = int(Flag.LATCHED) * latched.any(axis=1)
+    flags += int(Flag.BEYOND_HERTZ) * beyond_hertz(outcome, par)
+    flags += int(Flag.STIFF) * (outcome.stiff_steps > 0.0)
+    records["flags"] = np.where(valid, flags, 0)
+    return records
+
+
+def _responses(outcome: Outcome) -> dict[str, Array]:
+    """Values of `RESPONSES`."""
+    scatter = outcome.acceleration_deviation
+    return {
+        "mean_contact_force": outcome.mean_force, "peak_crank_moment": outcome.peak_moment,
+        "slider_acceleration_deviation": scatter, "point_acceleration_deviation": scatter,
+        "peak_point_acceleration": outcome.peak_acceleration,
+    }  # fmt: skip
+
+
+def measures(outcome: Outcome) -> dict[str, Array]:
+    """Measures of impact and noise (`IMPACTS`) over the averaged revolutions, shape (m, MAX_JOINTS) or (m,).
+
+    Angles without contact go by time.
+    """
+    period = outcome.period[:, None]
+    mean_square = (outcome.frame_force**2).sum(axis=1)
+    return {
+        "impacts": outcome.begun * period,
+        "impact_energy": outcome.impact_power * period,
+        "contact_impulse": outcome.mean_force * period,
+        "contact_loss": outcome.flight * outcome.cycle[:, None],
+        "rms_contact_force": np.sqrt(np.maximum(outcome.square_force, 0.0)),
+        "rms_frame_force": np.sqrt(np.maximum(outcome.square_frame_force - mean_square, 0.0)),
+    }
+
+
+def sliding_work(outcome: Outcome) -> Array:
+    """Normal force times sliding distance in a revolution, J, shape (m, MAX_JOINTS).
+
+    Of the averaged revolutions; one of a crank that is free lasts as long as all do on average.
+    """
+    work: Array = outcome.sliding_power * _revolution(outcome)
+    return work
+
+
+def _revolution(outcome: Outcome) -> Array:
+    """How long one lasts, s, (m, 1)."""
+    duration: Array = (outcome.time / outcome.revolutions)[:, None]
+    return duration
+
+
+def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
+    """Whether a penetration in the averaged revolutions left the range of its law, shape (m,)."""
+    # places without a joint have no penetration
+    beyond: Booleans = np.any(outcome.deepest > Parameters(par).deepest_valid, axis=1)
+    return beyond

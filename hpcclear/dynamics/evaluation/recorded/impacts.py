@@ -1,0 +1,97 @@
+"""Measures of impact and noise of one response: by revolution, and means with confidence intervals."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluation.recorded.steps import Steps
+from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.scene import Scene
+from hpcclear.statistics import spectra
+
+
+def _columns(first: int, size: int = at.MAX_JOINTS) -> slice:
+    start = int(np.flatnonzero(first == rec.MEASURES)[0])
+    return slice(start, start + size)
+
+
+@dataclass
+class Turns:
+    """Integrals of the measures at the ends of revolutions, from steps as they come."""
+
+    ends: dict[int, tuple[float, Array]] = field(default_factory=dict)
+    """Time and integrals since the start, by the revolutions finished."""
+
+    def take(self, steps: Steps) -> None:
+        """Note the revolutions that end between rows of these steps."""
+        closing = np.flatnonzero(np.diff(steps.revolution) > 0)
+        for k in closing:
+            self.ends[int(steps.revolution[k]) + 1] = (steps.time[k], steps.measures[k].copy())
+
+    def finish(self, steps: Steps) -> None:
+        """Note that the last revolution ends with the last of these steps."""
+        last = int(steps.revolution[-1]) + 1
+        self.ends[last] = (steps.time[-1], steps.measures[-1].copy())
+
+    def averaged(self, transient: int) -> tuple[Array, Array]:
+        """Lengths (r,) of the revolutions after the transient, and integrals over them (r, measures)."""
+        numbers = [n for n in sorted(self.ends) if n >= transient]
+        start = (0.0, np.zeros(len(rec.MEASURES)))
+        ends = [self.ends.get(transient, start), *(self.ends[n] for n in numbers if n > transient)]
+        times = np.array([time for time, _ in ends])
+        return np.diff(times), np.diff(np.array([one for _, one in ends]), axis=0)
+
+
+def by_revolution(
+    periods: Array, integrals: Array, cycle: float, joints: int, *, rigid: bool
+) -> dict[str, Array]:
+    """Measures of each revolution, (r, joints) or (r,), by the names of `hpcclear.base.outcome.IMPACTS`.
+
+    Lengths (r,) and integrals (r, measures) of revolutions, the angle in rad of one, and how many joints there are. The force
+    on the frame is left out where bodies are not `rigid`.
+    """
+    mean = integrals / periods[:, None]
+
+    def of(row: int) -> Array:
+        return np.asarray(integrals[:, _columns(row, joints)])
+
+    found = {
+        "impacts": of(at.BEGUN),
+        "impact_energy": of(at.IMPACT_POWERS),
+        "contact_impulse": of(at.FORCE),
+        "contact_loss": of(at.FLIGHTS) / periods[:, None] * cycle,
+        "rms_contact_force": np.sqrt(np.maximum(mean[:, _columns(at.FORCE_SQUARES, joints)], 0.0)),
+    }
+    if rigid:
+        frame = mean[:, _columns(at.FRAME_X, 2)]
+        square = mean[:, _columns(at.FRAME_SQUARE, 1)][:, 0] - (frame**2).sum(axis=1)
+        found["rms_frame_force"] = np.sqrt(np.maximum(square, 0.0))
+    return found
+
+
+def measured_of(
+    scene: Scene, problem: Problem, periods: Array, integrals: Array
+) -> dict[str, Array]:
+    """What `by_revolution` gives as the file has it: of each revolution (r, joints), of all of them (joints,), and half-widths.
+
+    Lengths (r,) and integrals (r, measures) of revolutions.
+    """
+    cycle, joints = abs(problem.cycle) or at.TURN, len(scene.joint_labels)
+    rigid = not scene.modes
+    each = by_revolution(periods, integrals, cycle, joints, rigid=rigid)
+    together = by_revolution(
+        periods.mean(keepdims=True),
+        integrals.mean(axis=0, keepdims=True),
+        cycle,
+        joints,
+        rigid=rigid,
+    )
+    result = {}
+    for name, values in each.items():
+        result[f"{name}_by_revolution"] = values
+        result[name] = together[name][0]
+        result[f"{name}_limit"] = spectra.half_width(values)
+    return result

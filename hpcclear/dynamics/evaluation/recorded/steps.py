@@ -1,0 +1,292 @@
+"""The accepted steps of samples as they come, and the states at the output's instants between them.
+
+Steps are worked off revolution by revolution, so that memory goes with the instants and not with the steps: whatever a light
+body does, at most `most_kept` steps of an unfinished revolution are held.
+"""
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpcclear.base.arrays import Array, Booleans, Records
+from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.outcome import failed
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator, with_pressures
+from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
+from hpcclear.dynamics.joint_laws import has_pressure
+from hpcclear.dynamics.layout.views import Rates, Start
+from hpcclear.dynamics.planar.problem import refused_of
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import effects_of, problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping import record as rec
+from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+ITSELF = Points((), np.empty((1, 0)), ())
+"""A scene as its only design."""
+
+CHUNK = 8192
+"""Accepted steps between two visits to the stepper."""
+
+LEAST_KEPT = 1 << 16
+"""Steps of an unfinished revolution that are held before any is dropped."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Accepted steps of one response in their order; arrays over steps (s,)."""
+
+    time: Array
+    turn_time: Array  # since the start of the revolution
+    revolution: Array
+    contacts: Array  # (s, 2 MAX_JOINTS): active flags, then 1/d'_0, valid until the next step
+    works: Array  # (s, 4): driving work, its absolute value, dissipated, load work, J
+    measures: Array  # (s, measures): integrals of `record.MEASURES` since the start
+    q: Array  # (s, n)
+    v: Array
+    a: Array
+
+    @classmethod
+    def of(cls, rows: Array) -> "Steps":
+        """Those of rows of the record (s, columns)."""
+        s, n = rec.STATE, (rows.shape[1] - rec.STATE) // 3
+        return cls(
+            rows[:, rec.TIME],
+            rows[:, rec.TURN_TIME],
+            rows[:, rec.REVOLUTION],
+            rows[:, rec.CONTACTS : rec.DRIVE_WORK],
+            rows[:, rec.DRIVE_WORK : rec.MEASURED],
+            rows[:, rec.MEASURED : rec.STATE],
+            rows[:, s : s + n],
+            rows[:, s + n : s + 2 * n],
+            rows[:, s + 2 * n :],
+        )
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One of the samples of a recording.
+
+    Attributes
+    ----------
+    par : ndarray, shape (PARAMETERS,)
+        Kernel parameters.
+    """
+
+    problem: Problem
+    par: Array
+    _lanes: Lanes
+    _start: Start
+
+    def observe(
+        self, states: Array, contacts: Array, turn_time: Array, began: Array
+    ) -> tuple[Array, Rates]:
+        """Accelerations (t, n) and rates at states (t, 2 n), contacts (t, 2 MAX_JOINTS), times in the revolution (t,) and when
+        that began (t,)."""
+        out = self._lanes.observe(self.par, states, contacts, turn_time, began)
+        n = self.problem.coordinates
+        return out[:, :n], Rates(out[:, n:])
+
+    def first_row(self) -> Array:
+        """The row (1, columns) of the start."""
+        n = self.problem.coordinates
+        row = np.zeros((1, rec.columns(n)))
+        contacts = slice(rec.CONTACTS, rec.DRIVE_WORK)
+        row[0, contacts] = self._start[0].contacts
+        row[0, rec.STATE : rec.STATE + 2 * n] = self._start[0].state(n)
+        states = row[:, rec.STATE : rec.STATE + 2 * n]
+        none = np.zeros(1)
+        row[:, rec.STATE + 2 * n :] = self.observe(states, row[:, contacts], none, none)[0]
+        return row
+
+
+class Recording:
+    """Samples in the lanes of an ensemble, their accepted steps kept.
+
+    Parameters
+    ----------
+    scene : Scene
+    copy : int
+        Perturb the start in the direction of this number (`hpcclear.dynamics.evaluation.steady.copies`); 0 does not.
+    perturbations, objective
+        Replicas beside it, and what they give a half-width, as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`.
+    beside : sequence of Scene
+        Others with the same problem, which are recorded as well; without replicas, and all of them can turn.
+    design : Points
+        One point of the first, by default the scene itself.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        copy: int = 0,
+        perturbations: Sequence[int] = (),
+        objective: Objective = MEAN_GAP,
+        beside: Sequence[Scene] = (),
+        design: Points = ITSELF,
+    ) -> None:
+        self.problem = problem_of(scene)
+        alone = not design.names
+        par = [parameters(scene, design), *map(parameters, beside)]
+        start = [start_states(scene, par[0], design, walk=not alone)]
+        start += [
+            start_states(one, own, walk=False) for one, own in zip(beside, par[1:], strict=True)
+        ]
+        self._beside, self._values = beside, design.values
+        self._refused = refused_of(scene) if alone else None
+        if copy:
+            start = [perturbed(start[0], scales(scene), range(copy, copy + 1))]
+        kept = len(par)
+        buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
+        observed = effects_of(scene, series=True, energies=True, impacts=True)
+        self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed, kept)
+        self._evaluator = Evaluator(
+            scene, design, perturbations=perturbations, objective=objective, recorder=self._lanes
+        )
+        self._done: list[Records] = []
+        self.samples = [
+            Recorded(self.problem, own[0], self._lanes, begin)
+            for own, begin in zip(par, start, strict=True)
+        ]
+        self._par = np.concatenate(par)
+        self._start = Start(np.concatenate([begin.rows for begin in start]))
+
+    def compile(self) -> None:
+        """Compile what it runs."""
+        self._lanes.step(0)
+
+    def chunks(self) -> Iterator[Array]:
+        """Integrate; yield rows of the record (m, columns), the starts first. To be called once.
+
+        Of a linkage that cannot turn there is the start alone.
+        """
+        lanes = self._lanes
+        self.compile()  # what observes the start too
+        first = np.concatenate([one.first_row() for one in self.samples])
+        first[:, rec.SLOT] = np.arange(len(first))
+        yield first
+        if self._refused is not None:
+            return
+        values = np.repeat(self._values, len(first), axis=0)
+        self._evaluator.queue(np.arange(len(first)), self._par, self._start, values)
+        while lanes.pending:
+            while lanes.pending and not lanes.record_full:  # by steps, not by the clock
+                self._done.append(self._evaluator.advance(0.2))
+            yield lanes.take_record()
+
+    def record(self) -> Records:
+        """The outcomes (samples,), with a half-width if replicas run beside, once all chunks were taken."""
+        if self._refused is not None:
+            return failed(0, self._refused[0])
+        done = np.concatenate(self._done)
+        done = done[np.argsort(done["sample"], kind="stable")]
+        for k, scene in enumerate(self._beside, 1):  # pressures by numbers of their own
+            if has_pressure(scene):
+                with_pressures(scene, ITSELF, [*ITSELF.values], done[k : k + 1])
+        return done
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Some instants of the output (t,), and the steps (s,) that they lie between."""
+
+    times: Array
+    steps: Steps
+    k: NDArray[np.intp]  # (t,): each lies in the step that begins with row k
+
+
+def pieces(chunks: Iterable[Array], count: int) -> Iterator[Piece]:
+    """Distribute instants over the steps of one sample, in their order, a piece for some revolutions.
+
+    Parameters
+    ----------
+    chunks : iterable of ndarray, shape (m, columns)
+        Of `Recording.chunks`.
+    count : int
+        As of `Pieces`.
+    """
+    made = Pieces(count)
+    for chunk in chunks:
+        yield from made.take(chunk)
+    yield made.finish()
+
+
+class Pieces:
+    """Instants over the steps of one sample as these come.
+
+    Parameters
+    ----------
+    count : int
+        Instants a revolution, evenly spaced in time from its start to its end; the last revolution ends with the last step. 0:
+        every step is an instant.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._most_kept = max(LEAST_KEPT, 8 * count)
+        self._rows: Array | None = None
+        self._broken = np.zeros(0, bool)
+
+    def take(self, chunk: Array) -> Iterator[Piece]:
+        """Take rows (m, columns), the start first of all; yield what is finished."""
+        if self._rows is None:
+            self._rows, self._broken = chunk, np.zeros(len(chunk), bool)
+            return
+        rows = np.concatenate([self._rows, chunk])
+        broken = np.concatenate([self._broken, np.zeros(len(chunk), bool)])
+        if self._count == 0:
+            done = len(rows) - 1
+        else:
+            closing = np.flatnonzero(np.diff(rows[:, rec.REVOLUTION]) > 0)
+            done = int(closing[-1]) if len(closing) else 0
+        if done:
+            yield _piece(rows[: done + 1], broken, self._count, last=False)
+            rows, broken = rows[done:], broken[done:]
+        while len(rows) > self._most_kept:
+            rows, broken = _thinned(rows, broken)
+        self._rows, self._broken = rows, broken
+
+    def finish(self) -> Piece:
+        """Return the last piece."""
+        assert self._rows is not None
+        return _piece(self._rows, self._broken, self._count, last=True)
+
+
+def _piece(rows: Array, broken: Booleans, count: int, *, last: bool) -> Piece:
+    """Instants from the first of these rows to the last, which is an instant itself if it is the `last` of all."""
+    steps = Steps.of(rows)
+    if count == 0:
+        times = steps.time if last else steps.time[:-1]
+    else:
+        closing = np.flatnonzero(np.diff(steps.revolution) > 0)
+        borders = steps.time[np.unique([0, *closing, len(rows) - 1])]
+        parts = [np.linspace(a, b, count, endpoint=False) for a, b in itertools.pairwise(borders)]
+        times = np.concatenate([*parts, borders[-1:] if last else []])
+    k = np.clip(np.searchsorted(steps.time, times, side="right") - 1, 0, max(len(rows) - 2, 0))
+    if broken.any():  # an instant where steps were dropped moves to the next that were not
+        dropped = broken[np.minimum(k + 1, len(rows) - 1)]
+        k = k + dropped
+        times = np.where(dropped, steps.time[k], times)
+    return Piece(times, steps, k)
+
+
+def _thinned(rows: Array, broken: Booleans) -> tuple[Array, Booleans]:
+    """Drop half of the rows where steps are shortest, a quarter of all; `broken`: before which rows some are missing.
+
+    Of four rows the first two stay, which keep a step whole. What was thinned before has an even number of rows, so that its
+    pairs stay together.
+    """
+    quads = (len(rows) - 1) // 4
+    begins = rows[: 4 * quads + 1 : 4, rec.TIME]
+    spans = np.diff(begins)
+    keep = np.ones(len(rows), bool)
+    of_quads = keep[: 4 * quads].reshape(quads, 4)
+    of_quads[spans <= np.median(spans), 2:] = False
+    after_gap = np.concatenate([[False], ~keep[:-1]])
+    return rows[keep], (broken | after_gap)[keep]

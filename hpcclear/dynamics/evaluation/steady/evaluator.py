@@ -1,0 +1,276 @@
+"""Steady means of a stream of designs: their procedures share the lanes."""
+
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+
+import numpy as np
+
+from hpcclear.base.arrays import Array, Integers, Records
+from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
+from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
+from hpcclear.dynamics.evaluation.evaluator import (
+    DEFAULT_LANES,
+    outcome_records,
+    responses_reported,
+    with_pressures,
+)
+from hpcclear.dynamics.evaluation.steady.copies import scales
+from hpcclear.dynamics.evaluation.steady.effort import Mean, Sample, Segment
+from hpcclear.dynamics.evaluation.steady.judging import objective
+from hpcclear.dynamics.evaluation.steady.procedure import steady_mean
+from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.scene import Scene
+from hpcclear.scene.points import Points
+
+TURN_SECONDS = 0.02
+"""How long one set of lanes works before the next one does."""
+
+
+Procedure = Callable[[Sample], Generator[Segment, Outcome, Mean]]
+
+
+def _to_target(scene: Scene) -> Procedure:
+    """The steady mean to the scene's target error."""
+    target, budget = scene.numerics.target_error, scene.numerics.target_revolutions
+    assert target is not None
+    return lambda sample: steady_mean(sample, target, budget)
+
+
+class _Ask:
+    """A design's procedure, the segment it waits for, and what of that has come in."""
+
+    def __init__(
+        self, sample: int, values: Array, par: Array, asking: Generator[Segment, Outcome, Mean]
+    ) -> None:
+        self.sample = sample
+        self.values = values
+        self.par = par
+        self.asking = asking
+        self.segment = next(asking)
+        self._rows: dict[int, Array] = {}
+
+    def take(self, copy: int, row: Array) -> Mean | None:
+        """A copy's outcome; the procedure's result if that was the last thing it waited for."""
+        self._rows[copy] = row
+        if len(self._rows) < len(self.segment.start):
+            return None
+        outcome = Outcome(np.stack([self._rows[k] for k in range(len(self._rows))]))
+        self._rows = {}
+        try:
+            self.segment = self.asking.send(outcome)
+        except StopIteration as end:
+            mean: Mean = end.value
+            return mean
+        return None
+
+    @property
+    def asks_anew(self) -> bool:
+        """Whether nothing of the segment it waits for has come in."""
+        return not self._rows
+
+
+def check_steady(scene: Scene) -> None:
+    """Refuse a scene whose motion goes by the time since the start, which has no steady mean; raises InputError."""
+    if linkage_of(scene).mechanism.clocked:
+        raise InputError(
+            "numerics.target_error", scene.numerics.target_error,
+            "a load or drive goes by the time since the start, so there is no steady mean",
+            "Leave it out, and average the revolutions of interest (numerics.averaged_revolutions)",
+        )  # fmt: skip
+
+
+class SteadyEvaluator:
+    """Finds the steady mean of points of one scene as a stream; to be used like `evaluation.evaluator.Evaluator`.
+
+    Parameters
+    ----------
+    columns : Points
+        Points (perhaps none) whose names and paths all submitted values share.
+    procedure : function of a Sample, optional
+        What is done to each design; by default `steady_mean` to the scene's ``numerics.target_error`` with
+        ``numerics.target_revolutions``.
+
+    Raises
+    ------
+    InputError
+        If the scene requires what the kernel cannot do.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        columns: Points,
+        lanes: int = DEFAULT_LANES,
+        procedure: Procedure | None = None,
+    ) -> None:
+        check_steady(scene)
+        self._procedure = procedure or _to_target(scene)
+        self.scene = scene
+        self.lanes = lanes
+        self._columns = columns
+        self._scale = scales(scene)
+        self._plain = scene.with_({"numerics.target_error": None})
+        self._sets: dict[tuple[float, int], Lanes] = {}
+        self._asks: dict[int, _Ask] = {}
+        contact = scene.effects.contact
+        self._latched = contact is not None and contact.latched
+        problem = self._lanes_of(1e-4, 1).problem  # refuses what cannot be simulated
+        self._free = problem.effects.torque is not None
+        self._responses, self._worn = responses_reported(problem), bool(problem.effects.wear)
+
+    def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
+        """The lanes for segments of this kind."""
+        if (rtol, revolutions) not in self._sets:
+            changes = {
+                "numerics.rtol": rtol,
+                "numerics.atol": None,
+                "numerics.transient_revolutions": 0,
+                "numerics.averaged_revolutions": revolutions,
+                "numerics.energy": False,
+            }
+            problem = problem_of(self._plain.with_(changes))
+            self._sets[rtol, revolutions] = Lanes(problem, self.lanes)
+        return self._sets[rtol, revolutions]
+
+    @property
+    def pending(self) -> int:
+        """Designs submitted and not finished."""
+        return len(self._asks)
+
+    def submit(self, index: Integers, points: Array) -> None:
+        """Queue designs: indices (m,), values (m, d) in the columns' order, SI."""
+        made = Points(self._columns.names, points, self._columns.paths)
+        par = parameters(self.scene, made)
+        start = start_states(self.scene, par, made)
+        numbers = np.asarray(index, np.int64).tolist()
+        for k, sample in enumerate(numbers):
+            design = Sample(
+                par[k : k + 1], start[k : k + 1], self._scale, self._latched, self._free
+            )
+            self._asks[sample] = _Ask(sample, points[k], design.par, self._procedure(design))
+        self._queue([self._asks[sample] for sample in numbers])
+
+    def _queue(self, asks: "list[_Ask]") -> None:
+        """Hand the segments that procedures request to the lanes."""
+        by_kind: dict[tuple[float, int], list[_Ask]] = {}
+        for ask in asks:
+            by_kind.setdefault((ask.segment.rtol, ask.segment.revolutions), []).append(ask)
+        for kind, group in by_kind.items():
+            self._lanes_of(*kind).queue(
+                np.concatenate([ask.segment.par for ask in group]),
+                Start(np.concatenate([ask.segment.start.rows for ask in group])),
+                np.concatenate([_labels(ask) for ask in group]),
+            )
+
+    def advance(self, seconds: float) -> Records:
+        """Work for about `seconds`; return the records of the designs that finished meanwhile."""
+        end = time.perf_counter() + seconds
+        done: list[Records] = []
+        if not self._asks:
+            self._lanes_of(1e-4, 1).step(1)  # without samples it only compiles
+        while self._asks:
+            for lanes in [lanes for lanes in self._sets.values() if lanes.pending]:
+                lanes.advance(min(seconds, TURN_SECONDS))
+                done += self._collect(lanes)
+            if time.perf_counter() >= end:
+                break
+        return np.concatenate(done) if done else np.zeros(0, OUTCOME)
+
+    def _collect(self, lanes: Lanes) -> Iterator[Records]:
+        """Take in what finished; procedures that have all they waited for go on or end."""
+        labels, outcome, _ = lanes.collect()
+        going = []
+        for label, row in zip(labels.tolist(), outcome.rows, strict=True):
+            sample, copy = divmod(label, _MOST_COPIES)
+            ask = self._asks[sample]
+            mean = ask.take(copy, row)
+            if mean is not None:
+                del self._asks[sample]
+                record = record_of(
+                    sample, ask.par, mean, self._responses, self._worn, self.scene.objective
+                )
+                yield with_pressures(self.scene, self._columns, [ask.values], record)
+            elif ask.asks_anew:
+                going.append(ask)
+        self._queue(going)
+
+
+_MOST_COPIES = 1 << 20
+
+
+def _labels(ask: _Ask) -> Integers:
+    return ask.sample * _MOST_COPIES + np.arange(len(ask.segment.start))
+
+
+def record_of(
+    sample: int, par: Array, mean: Mean, responses: Sequence[str] = (), worn: bool = False,
+    judged: Objective = MEAN_GAP,
+) -> Records:  # fmt: skip
+    """What was found as a record (1,): means over segments and copies, of the peaks too unless the motion is regular.
+
+    Parameters
+    ----------
+    par : ndarray, shape (1, PARAMETERS)
+    responses : sequence of str
+        Further responses, as of `responses_reported`.
+    worn : bool
+        Whether a joint wears.
+    judged : Objective
+        By what.
+    """
+    rows = mean.outcomes.rows.reshape(-1, Outcome.size)
+    if mean.status != Status.OK:
+        return failed(sample, mean.status, int(mean.evaluations))
+    each = outcome_records(
+        np.zeros(len(rows), np.int64),
+        Outcome(rows),
+        np.repeat(par, len(rows), axis=0),
+        responses,
+        worn,
+        judged,
+    )
+    record = each[:1].copy()
+    for name in (
+        "mean_contact_force",
+        "peak_contact_force",
+        "peak_crank_moment",
+        "slider_acceleration_deviation",
+        "point_acceleration_deviation",
+        "peak_point_acceleration",
+        "sliding_work",
+        "sliding_waves",
+    ):
+        record[name] = each[name].mean(axis=0)
+    power = 2.0 if judged.made == "rms" else 1.0
+    record[RATE] = (each[RATE] ** power).mean(axis=0) ** (1.0 / power)
+    if judged.made == "peak":
+        record[RATE] = each[RATE].max(axis=0)
+    if mean.segment == 1:
+        record["peak_contact_force"] = each["peak_contact_force"].max(axis=0)
+        for name in ("peak_crank_moment", "peak_point_acceleration"):
+            record[name] = each[name].max()
+    record["sample"] = sample
+    record["mean_gap"] = mean.gaps
+    record["objective"] = objective(mean.gaps)
+    record["objective_spread"] = np.std(objective(mean.outcomes.mean_gap), ddof=1)
+    record["objective_limit"] = record["objective_uncertainty"] = mean.limit
+    record["regime"] = mean.regime
+    record["period"] = np.nan if mean.period is None else mean.period
+    record["lyapunov_exponent"] = mean.growth
+    record["lyapunov_exponent_limit"] = mean.growth_limit
+    record["attractors"] = np.nan if mean.attractors is None else mean.attractors
+    record["steady_rtol"] = mean.tightest
+    record["steady_revolutions"] = mean.revolutions
+    record["latched"] = (
+        each["latched"].mean(axis=0) > 0.5
+    )  # now and then a revolution is, by chance
+    record["rhs_evaluations"] = int(mean.evaluations)
+    flags = np.bitwise_or.reduce(each["flags"])
+    record["flags"] = flags | (0 if mean.met else int(Flag.TARGET_MISSED))
+    return record

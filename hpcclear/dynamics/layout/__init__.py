@@ -1,0 +1,489 @@
+"""Where everything stands in the kernel's flat buffers: row k of lane i is ``buffer[k * W + i]``.
+
+Rows are numbered as they are declared (`hpcclear.base.numbered`). They are module constants, so the compiler sees every
+distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hpcclear.base.numbered import Rows
+from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
+
+TURN = 6.283185307179586  # rad
+
+MAX_COORDINATES = 24
+
+
+class Effects(NamedTuple):
+    """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
+
+    joints: Any = None  # how many have clearance
+    first: Any = 0  # place of the first of them; the others follow
+    contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
+    friction: Any = None
+    torque: Any = None  # the body that gives the period is free, driven by a torque
+    baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
+    energies: Any = None  # energy balance
+    series: Any = None  # friction forces and crank moment, for time series
+    responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
+    impacts: Any = None  # measures of impact and noise of each sample
+    sliding: Any = None  # kinks of the laws, for the implicit method
+    swinging: Any = None  # the drive that gives the period does not turn round
+    wear: Any = None  # sliding work of the joints with clearance
+    waves: Any = (
+        None  # surfaces that are out of round; how many waves around bearing and journal have:
+    )
+    bearing_waves: Any = None
+    journal_waves: Any = None
+    threshold: Any = None  # of the pressure, below which nothing wears
+    profile: Any = None  # where around these the sliding work is done
+    films: Any = None  # names of laws of oil films, by places of joints
+    objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
+
+    @property
+    def latched(self) -> Any:
+        """Whether the normal force's law requires the impact speed, which is `latched`."""
+        return None if self.contact is None else self.contact.latched
+
+    @property
+    def film_at(self) -> tuple[Any, ...]:
+        """The same, of scenes without oil as well."""
+        return self.films or (None,) * MAX_JOINTS
+
+    @property
+    def bristled(self) -> Any:
+        """Whether friction has bristles, a coordinate for each joint with clearance."""
+        return None if self.friction is None else self.friction.bristled
+
+
+def bristles_of(effects: Effects) -> int:
+    """How many coordinates the bristles of friction take: one for each joint with clearance, before those of the mechanism.
+
+    A bristle's deflection is the velocity of its coordinate, so that steppers need no other kind of state.
+    """
+    return 0 if effects.bristled is None else len(places_of(effects))
+
+
+def places_of(effects: Effects) -> range:
+    """Places of the joints with clearance."""
+    return range(effects.first, effects.first + (effects.joints or 0))
+
+
+class Waves(NamedTuple):
+    """Where the waves around both surfaces of a joint stand among `WAVE_ROWS`: cosine and sine of one, of two and so on."""
+
+    bearing: int  # first row
+    bearing_count: int
+    journal: int
+    journal_count: int
+
+    def rows(self) -> range:
+        """All of them."""
+        return range(self.bearing, self.journal + 2 * self.journal_count)
+
+
+def waves_of(effects: Effects) -> tuple[Waves, ...]:
+    """Those of each place of joints, up to the last open one."""
+    bearing, journal = effects.bearing_waves or 0, effects.journal_waves or 0
+    stride = 2 * (bearing + journal)
+    return tuple(
+        Waves(k * stride, bearing, k * stride + 2 * bearing, journal)
+        for k in range(places_of(effects).stop)
+    )
+
+
+# ---- parameters of one sample -------------------------------------------------------------------
+OF_SAMPLE = Rows()
+SPEED = OF_SAMPLE("of the drive: a turn over its share of the period", "rad/s")
+DRIVEN_LENGTH = OF_SAMPLE("largest distance between points of the body that gives the period", "m")
+PERIOD = OF_SAMPLE("one revolution at the prescribed speed", "s")
+FIRST_STEP = OF_SAMPLE("first step to try", "s")
+STRICTNESS = OF_SAMPLE(
+    "squared: how many times tighter this sample's tolerances are than the run's"
+)
+EDGE = OF_SAMPLE(
+    "one over the relative tolerance that explicit steps need at the edge of stability"
+)
+TURN_END = OF_SAMPLE(
+    "angle of the free body that gives the period at which its revolution ends: its start and all its turns",
+    "rad",
+)
+HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest drive torque", "N m")
+HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
+HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
+
+LAW_NUMBERS = 8
+"""Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
+OF_JOINT = Rows()  # within a joint's block
+CLEARANCE = OF_JOINT("radial clearance", "m")
+BEARING_RADIUS = OF_JOINT("radius of the bearing", "m")
+JOURNAL_RADIUS = OF_JOINT("radius of the journal", "m")
+EXPONENT = OF_JOINT(
+    "of the depth in the normal force; this and the next are what peaks between steps are found by"
+)
+DAMPING = OF_JOINT(
+    "factor of the rate in the normal force, or of the rate over the impact speed",
+    "s/m",
+)
+DEEPEST_VALID = OF_JOINT("depth from where on a result is flagged", "m")
+INVERSE_RAMP = OF_JOINT("one over the sliding speed within which friction changes most", "s/m")
+STEEPNESS = OF_JOINT("largest slope of friction over normal force", "s/m")
+CONTACT_NUMBERS = OF_JOINT("of its law of contact", size=LAW_NUMBERS)
+FRICTION_NUMBERS = OF_JOINT("of its law of friction", size=LAW_NUMBERS)
+FILM_SCALE = OF_JOINT("of the film's force; 0 where there is none", "N s/m")
+FILM_SHEAR = OF_JOINT("2 pi mu L R^3/c", "N m s")
+FILM_FLOOR = OF_JOINT("least thickness over the clearance")
+FILM_STEEPNESS = OF_JOINT(
+    "the film's force over that of inertia, by the speed; with bristles next to nothing, but not nothing",
+    "s/m",
+)
+JOINT_ROWS = OF_JOINT.end
+JOINT_BLOCKS = OF_SAMPLE("of all joints, one behind the other", size=MAX_JOINTS * JOINT_ROWS)
+OWN = OF_SAMPLE("what a linkage has of its own", size=192)
+WAVES = OF_SAMPLE(
+    "of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each another, its slope's",
+    size=2 * WAVE_ROWS,
+)
+THRESHOLDS = OF_SAMPLE(
+    "of what share of the normal force wears, two a joint: (slope) F_N + (offset), between 0 and 1",
+    size=2 * MAX_JOINTS,
+)
+FURTHER_ROWS = 180
+FURTHER = OF_SAMPLE(
+    "what laws of films have besides, joint by joint", size=MAX_JOINTS * FURTHER_ROWS
+)
+PARAMETERS = OF_SAMPLE.end
+
+# ---- what the motion writes besides accelerations ---------------------------------------------
+# What joints have stands side by side, so that the compiler knows the distances between one joint's rows, whichever it is.
+# Rates that are integrated name the effect that requires them.
+WRITTEN = Rows()
+EACH = MAX_JOINTS
+GAP = WRITTEN("distance from the clearance circle, positive in contact", "m", EACH, "joints")
+FORCE = WRITTEN("normal force", "N", EACH, "responses")
+GAP_RATE = WRITTEN("rate of the gap", "m/s", EACH)
+DRIVE_POWER = WRITTEN("of all drives", "W", asked_by="energies")
+ABS_DRIVE_POWER = WRITTEN("its size", "W", asked_by="energies")
+DISSIPATION = WRITTEN("of contacts, guides, bars", "W", asked_by="energies")
+LOAD_POWER = WRITTEN("of loads and springs", "W", asked_by="energies")
+FRICTIONS = WRITTEN("tangential force, for time series and objectives", "N", EACH)
+DRIVE_MOMENT = WRITTEN("for time series, responses and objectives", "N m")
+FOLLOWED_ACCELERATION = WRITTEN(
+    "of a guided body, or of a point along x", "m/s^2", asked_by="responses"
+)
+FOLLOWED_SQUARE = WRITTEN("of the followed acceleration", "m^2/s^4", asked_by="responses")
+FOLLOWED_ACROSS = WRITTEN("of a point along y", "m/s^2", asked_by="responses")
+IMPACT_POWERS = WRITTEN("lost by the damping of contacts, friction left out", "W", EACH, "impacts")
+FORCE_SQUARES = WRITTEN("of the normal force", "N^2", EACH, "impacts")
+FRAME_X = WRITTEN("force of the mechanism on its frame, along x", "N", asked_by="impacts")
+FRAME_Y = WRITTEN("likewise along y", "N", asked_by="impacts")
+FRAME_SQUARE = WRITTEN("square of its size", "N^2", asked_by="impacts")
+FLIGHTS = WRITTEN(
+    "no rate, its integral is summed up at the ends of steps: time without contact",
+    "s",
+    EACH,
+    "steps",
+)
+BEGUN = WRITTEN("likewise: how many contacts began", "", EACH, "steps")
+SLIDING_POWERS = WRITTEN("F_N |v_t|", "W", EACH, "wear")
+OBJECTIVE_RATES = WRITTEN(
+    "of the objective: of each joint, or the first of the whole mechanism", "", EACH, "objective"
+)
+SLIDING_SPEEDS = WRITTEN("this and normals for the objective's rate only", "m/s", EACH)
+NORMALS_X = WRITTEN("from the bearing's centre to the journal's", "", EACH)
+NORMALS_Y = WRITTEN("likewise", "", EACH)
+FORCE_KINKS = WRITTEN(
+    "changes its sign where the normal force is cut at 0; these for the implicit method only",
+    "",
+    EACH,
+)
+LOW_KINKS = WRITTEN("changes its sign at the lower side of friction's ramp", "", EACH)
+HIGH_KINKS = WRITTEN("and at the upper side", "", EACH)
+ANGLES = WRITTEN(
+    "cosine and sine of the contact's angle in the bearing, then in the journal", "", 4 * EACH
+)
+"""These and what follows are for profiles of wear only, and stand last, so that others need not pass over them."""
+PROFILES = WRITTEN(
+    "sliding powers times waves of these angles, in the order of `waves_of`",
+    "W",
+    WAVE_ROWS,
+    "profile",
+)
+RATES = WRITTEN.end
+
+
+class Integrated(NamedTuple):
+    """A rate that every stepper integrates over a step: its row, and the effect that requires it. A gap's absolute value is
+    integrated, and the error of its integral, relative to the clearance times a revolution, counts for the step's."""
+
+    rate: int
+    asked_by: str
+
+
+_PLACES = range(MAX_JOINTS)
+GAPS = tuple(Integrated(GAP + k, "joints") for k in _PLACES)
+_OTHERS = [row for row in WRITTEN.declared if row.asked_by and row.first != GAP]
+_STEPPED = {row.asked_by for row in _OTHERS} - {"profile", "steps"}
+_PROFILES, MEASURES, _SUMMED = (
+    tuple(
+        Integrated(row.first + k, row.asked_by)
+        for row in _OTHERS
+        if row.asked_by in groups
+        for k in range(row.size)
+    )
+    for groups in (("profile",), _STEPPED, ("steps",))
+)
+INTEGRATED = (*GAPS, *MEASURES, *_SUMMED, *_PROFILES)
+"""All that is integrated; profiles of wear at the ends of steps (`stepping.profile`).
+The explicit and implicit steppers, the sums of a lane and its outcome read this."""
+
+INTEGRATED_RATES = np.array([one.rate for one in INTEGRATED])
+
+
+def _mask(largest: int) -> int:
+    """All bits that numbers up to `largest` have: taken with it a number is not below 0, and no other number."""
+    return (1 << largest.bit_length()) - 1
+
+
+JOINT_MASK = _mask(MAX_JOINTS - 1)
+COORDINATE_MASK = _mask(MAX_COORDINATES - 1)
+MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
+
+
+def measures_of(effects: Effects) -> np.ndarray:
+    """Rates besides the gaps that are integrated with these effects."""
+    there = places_of(effects)
+    whole = effects.objective is not None and effects.objective.whole
+    closed = {
+        row.first + k
+        for row in _OTHERS
+        if row.size == MAX_JOINTS
+        for k in _PLACES
+        if k not in (range(1) if whole and row.first == OBJECTIVE_RATES else there)
+    }
+    asked = [one for one in MEASURES if getattr(effects, one.asked_by) is not None]
+    return np.array([one.rate for one in asked if one.rate not in closed], np.int64)
+
+
+def place(rate: int) -> int:
+    """Where a rate stands in `INTEGRATED`."""
+    return [one.rate for one in INTEGRATED].index(rate)
+
+
+WORKS = place(DRIVE_POWER)  # the first of four: drive, its absolute value, losses, load
+
+# ---- lane state and scratch ---------------------------------------------------------------------
+OF_LANE = Rows()
+Q = OF_LANE("coordinates at the start of the step", size=MAX_COORDINATES)
+V = OF_LANE("velocities", size=MAX_COORDINATES)
+QS = OF_LANE("coordinates of the stage", size=MAX_COORDINATES)
+VS = OF_LANE("velocities", size=MAX_COORDINATES)
+ACC = OF_LANE("accelerations of the stage", size=MAX_COORDINATES)
+RATE_NOW = OF_LANE("rates of the stage", size=RATES)
+RATE_OLD = OF_LANE("rates at the start of the step", size=RATES)
+RATE_SUM = OF_LANE("weighted by the method: h * sum is the integral over the step", size=RATES)
+RATE_ERROR = OF_LANE("weighted by the difference of the pair", size=RATES)
+INTEGRAL = OF_LANE("since the start of the revolution (gaps: of their absolute values)", size=RATES)
+TIME = OF_LANE("since the start of this revolution", "s")
+STEP = OF_LANE("the step being tried", "s")
+NEXT_STEP = OF_LANE("step that the controller proposes", "s")
+STAGE_TIME = OF_LANE("of the stage", "s")
+BEGAN = OF_LANE("when this revolution began, since the sample's start", "s")
+ERROR = OF_LANE("mean square of the scaled error")
+LOG_ERROR = OF_LANE("log2 of the last accepted one")
+ACCEPT = OF_LANE("1 or 0")
+PEAK_MOMENT = OF_LANE("of the drive, its size")
+PEAK_FOLLOWED = OF_LANE("of the square of the followed acceleration")
+AVERAGING = OF_LANE("1 once the transient is over")
+ATTEMPTS = OF_LANE("steps tried, accepted or not")
+EVALUATIONS = OF_LANE("of the motion")
+RUNNING = OF_LANE("1 while the lane holds a sample")
+FRESH = OF_LANE("1 while the accelerations at the start of the step are not known")
+REJECTED = OF_LANE("1 after a rejection: the next step must not grow")
+SPECIAL = OF_LANE("1 when this step needs a look by the scalar code")
+ENDING = OF_LANE("1 when this step ends the revolution")
+STIFF = OF_LANE("1 while the implicit method runs this lane")
+EDGE_EXCESS = OF_LANE("positive where the step is at the edge of stability")
+EDGE_SCORE = OF_LANE("of explicit steps at the edge of stability")
+REJECTION_SCORE = OF_LANE("of rejected explicit steps")
+STIFF_STEPS_HERE = OF_LANE("implicit steps tried since it took the lane over")
+STIFF_STEPS = OF_LANE("implicit steps tried for this sample")
+CALM = OF_LANE("implicit steps in a row that the explicit method could have taken")
+STRICTER = OF_LANE(
+    "squared: how many times tighter than the run's the tolerances of this lane's explicit steps are"
+)
+STRICTER_WITHIN = OF_LANE("that within the range of stability")
+STRICTER_AT_EDGE = OF_LANE("and at the edge of it")
+MAX_CURVES = 8
+CURVES = OF_LANE("values of tabulated curves at the stage", size=MAX_CURVES)
+ACTIVE = OF_LANE("contact whose impact speed is kept (1), or flight (0)", "", EACH)
+INVERSE_IMPACT = OF_LANE("1 / d'_0", "s/m", EACH)
+PEAK = OF_LANE("largest contact force", "N", EACH)
+DEEPEST = OF_LANE("largest penetration", "m", EACH)
+ENDED = OF_LANE("contacts ended in this revolution", "", EACH)
+LARGEST_RATE = OF_LANE("of the objective's", "", EACH)
+TOUCHES = OF_LANE(
+    "whether there was contact at the end of the last step; below 0 at the start", "", EACH
+)
+WORK = OF_LANE.end
+
+BANK = WORK + PARAMETERS
+"""Rows of what a motion reads and writes: those of `work`, then the parameters."""
+
+STAGES = BANK
+"""First row of the explicit method's stage accelerations, behind them: row STAGES + s MAX_COORDINATES + k."""
+
+# ---- tabulated curves, one behind the other -----------------------------------------------------
+CELLS = 2048  # cubic cells over one turn, 4 coefficients each
+TABLES = 4 * MAX_CURVES * CELLS  # at most
+
+# ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
+OF_BOOK = Rows()
+SAMPLE = OF_BOOK("slot of the sample in the queue")
+REVOLUTION = OF_BOOK("revolutions finished")
+TIME_SUM = OF_BOOK("over the averaged revolutions", "s")
+MEAN_F = OF_BOOK("Welford mean of the revolution's objective")
+M2_F = OF_BOOK("sum of squares about it")
+COUNT_F = OF_BOOK("how many")
+ELAPSED = OF_BOOK("whole revolutions so far", "s")
+LATCHED = OF_BOOK("whole revolutions in contact", "", EACH)
+AVERAGED = OF_BOOK(
+    "integrals over the averaged revolutions, in the order of INTEGRATED", size=len(INTEGRATED)
+)
+TOTAL = OF_BOOK("integrals over all revolutions, likewise", size=len(INTEGRATED))
+BOOK = OF_BOOK.end
+
+# ---- one finished sample --------------------------------------------------------------------------
+OF_OUTCOME = Rows()
+OUT_STATUS = OF_OUTCOME("how it ended")
+OUT_OBJECTIVE = OF_OUTCOME("f of eq. 13", "m")
+OUT_SPREAD = OF_OUTCOME("standard deviation of f between averaged revolutions", "m")
+OUT_EVALUATIONS = OF_OUTCOME("of the motion")
+OUT_REVOLUTIONS = OF_OUTCOME("all that were simulated")
+OUT_TIME = OF_OUTCOME("of these", "s")
+OUT_ATTEMPTS = OF_OUTCOME("steps tried")
+OUT_STIFF_STEPS = OF_OUTCOME("implicit steps tried")
+OUT_MOMENT = OF_OUTCOME("largest size of the drive's moment", "N m")
+OUT_ACCELERATION = OF_OUTCOME("standard deviation of the followed acceleration", "m/s^2")
+OUT_FOLLOWED = OF_OUTCOME("its largest size", "m/s^2")
+OUT_PERIOD = OF_OUTCOME("mean length of an averaged revolution", "s")
+OUT_CYCLE = OF_OUTCOME("angle of the drive in a revolution", "rad")
+OUT_PEAK = OF_OUTCOME("largest contact force", "N", EACH)
+OUT_LATCHED = OF_OUTCOME("whole revolutions in contact", "", EACH)
+OUT_DEEPEST = OF_OUTCOME("largest penetration", "m", EACH)
+OUT_ACTIVE = OF_OUTCOME("contact whose impact speed is kept, at the end", "", EACH)
+OUT_INVERSE_IMPACT = OF_OUTCOME("1 / d'_0 there", "s/m", EACH)
+OUT_LARGEST_RATE = OF_OUTCOME("of the objective's", "", EACH)
+OUT_MEAN = OF_OUTCOME(
+    "time means over the averaged revolutions, in the order of INTEGRATED", size=len(INTEGRATED)
+)
+OUT_TOTAL = OF_OUTCOME("integrals over all revolutions, likewise", size=len(INTEGRATED))
+OUT_STATE = OF_OUTCOME("coordinates and velocities at the end", size=2 * MAX_COORDINATES)
+OUT = OF_OUTCOME.end
+
+# ---- one sample to come ---------------------------------------------------------------------------
+OF_START = Rows()
+OF_START("coordinates and velocities", size=2 * MAX_COORDINATES)
+START_CONTACTS = OF_START("active flags, then 1/d'_0", size=2 * MAX_JOINTS)
+START = OF_START.end
+
+
+# ---- what the steppers hand on as one -------------------------------------------------------------
+class Joint(NamedTuple):
+    """Where the motion finds and leaves the numbers of one joint with clearance; steppers count from its place."""
+
+    place: int
+    block: int  # of parameters
+    further: int
+    gap: int  # rates
+    force: int
+    rate: int
+    friction: int
+    force_kink: int
+    low_kink: int
+    high_kink: int
+    sliding_power: int
+    impact_power: int
+    force_square: int
+    objective_rate: int
+    sliding_speed: int
+    normal_x: int
+    normal_y: int
+    active: int  # rows of `work`
+    inverse_impact: int
+
+
+JOINTS = tuple(
+    Joint(
+        k, JOINT_BLOCKS + JOINT_ROWS * k, FURTHER + FURTHER_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
+        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
+        IMPACT_POWERS + k, FORCE_SQUARES + k, OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
+        ACTIVE + k, INVERSE_IMPACT + k,
+    )
+    for k in _PLACES
+)  # fmt: skip
+
+
+class Block(NamedTuple):
+    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, sums.
+
+    `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
+
+    work: Any
+    stages: Any
+    par: Any
+    book: Any
+
+
+class Queue(NamedTuple):
+    """Samples to come and samples done: parameters, starts, outcomes, slots in the order they finished, counters."""
+
+    par: Any
+    start: Any
+    out: Any
+    finished: Any
+    counters: Any
+
+
+class Method(NamedTuple):
+    """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
+    which a stepper calls what is compiled apart from it (`stepping.special`)."""
+
+    settings: Any
+    weights: Any
+    tables: Any  # (TABLES,)
+    measures: Any  # as `measures_of`
+    numbers: Any
+
+
+class Rules(NamedTuple):
+    """What a stepper has to know of the effects, as numbers 0 and 1: they change no compiled code."""
+
+    latched: Any  # impacts are located, and their speed is kept
+    free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
+    turning: Any  # its angle is a coordinate, whoever drives it
+    responses: Any
+    impacts: Any  # contacts are counted
+    profile: Any  # where around joints sliding work is done is recorded
+    largest: Any  # the objective is made of the largest value of its rate
+    begin: Any  # places of open joints, from `begin` on
+    end: Any  # and before `end`
+
+
+def rules_of(effects: Effects) -> Rules:
+    """Those of a set of effects."""
+    e = effects
+    turning = e.torque or (None if e.swinging else e.baumgarte)
+    largest = None if e.objective is None else e.objective.largest
+    flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
+    places = places_of(e)
+    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop])
+
+
+class Stepped(NamedTuple):
+    """What the functions of a stepper read: rules and measures."""
+
+    rules: Rules
+    measures: Any

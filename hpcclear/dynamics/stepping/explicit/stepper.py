@@ -1,0 +1,121 @@
+"""The block stepper: W samples in a batch, each with its own time, step, contact state and outcome.
+
+A lane whose sample ends takes the next one from the queue. The stepper returns after a budget of steps with
+its whole state in the arrays it was given, and goes on from there bit for bit.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from hpcclear.base.bits import call_at
+from hpcclear.base.cached import cached
+from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
+from hpcclear.base.one_text import one_text
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.settings import GAP_TOLERANCE, PROFILE
+from hpcclear.dynamics.linkage.rhs import run_motion
+from hpcclear.dynamics.stepping.borrowing import borrowed_all
+from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
+from hpcclear.dynamics.stepping.explicit.switching import settle_methods
+from hpcclear.dynamics.stepping.implicit.batch import ask_implicit
+from hpcclear.dynamics.stepping.peaks import peaks_inside
+from hpcclear.dynamics.stepping.record import record_step
+from hpcclear.dynamics.stepping.special import END_OF_REVOLUTION, END_OF_STEP, NEXT_SAMPLE, ask
+
+
+@lane_function
+def load_lanes(special, numbers, block, queue, settings, W):
+    """Give samples to lanes that rest. Returns how many run."""
+    running = 0.0
+    for i in range(W):
+        if block.work[at.RUNNING * W + i] == 0.0:
+            ask(special, NEXT_SAMPLE, i, numbers, block, queue, settings)
+        running += block.work[at.RUNNING * W + i]
+    return running
+
+
+@lane_function
+def judge_steps(special, rules, n, numbers, block, queue, settings, W):
+    """Accept, cut or reject every lane's step. Returns the change of the number of running lanes."""
+    work = block.work
+    change = 0.0
+    judge_step(work, settings, W)
+    if flag_gaps(rules, work, block.par, n - 1, settings[GAP_TOLERANCE], W) > 0.0:
+        for i in range(W):
+            if work[at.SPECIAL * W + i] == 1.0:
+                change += ask(special, END_OF_STEP, i, numbers, block, queue, settings)
+    return change
+
+
+@lane_function
+def end_revolutions(special, numbers, block, queue, settings, W):
+    """Close the revolutions that ended. Returns the change of the number of running lanes."""
+    work = block.work
+    change = 0.0
+    for i in range(W):
+        ends = work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i]
+        if ends == 1.0:
+            change += ask(special, END_OF_REVOLUTION, i, numbers, block, queue, settings)
+    return change
+
+
+@lane_function
+def ask_explicit(address, block, method):
+    """One step of the pair on every lane, by `steps.explicit_code`."""
+    arrays = (
+        method.numbers, block.work, method.settings, method.weights, method.tables, method.measures
+    )  # fmt: skip
+    call_at(address, arrays)
+
+
+@lane_function
+def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
+    """Take at most `budget` block steps. Returns whether lanes are running."""
+    if W == 1:
+        narrow_vectors()
+    block, queue, method = borrowed_all(block, queue, method, W)
+    settings, numbers, work = method.settings, method.numbers, block.work
+    running = load_lanes(codes.special, numbers, block, queue, settings, W)
+    while budget > 0 and running > 0.0:
+        budget -= 1
+        choose_step(work, block.par, rules.free, W)
+        stiff = settle_methods(memory, settings, work, W)
+        if stiff < running:
+            ask_explicit(codes.explicit, block, method)
+        if stiff > 0.0:
+            ask_implicit(codes.implicit, numbers, block, method, memory)
+        running += judge_steps(codes.special, rules, n, numbers, block, queue, settings, W)
+        if rules.profile:
+            run_motion(numbers[PROFILE], work, method.tables)
+        peaks_inside(rules, work, block.par, W)
+        ended = commit(at.Stepped(rules, method.measures), work, block.stages, n, W)
+        full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
+        if ended > 0.0:
+            running += end_revolutions(codes.special, numbers, block, queue, settings, W)
+        if full:
+            break
+    return running > 0.0
+
+
+class Codes(NamedTuple):
+    """Addresses of what a stepper calls: `special.special_code`, `steps.explicit_code`, `batch.batch_code` (0 without)."""
+
+    special: int
+    explicit: int
+    implicit: int
+
+
+@cache
+def make_stepper(W: int, *, implicit: bool = False) -> Any:
+    """Return the compiled stepper for W lanes, of any number of coordinates and any joints.
+
+    Its arguments: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`, `layout.Method`; an
+    array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the implicit method (see
+    `columns.new_columns`); and the budget: how many block steps to take at most. It returns True while lanes are running. A
+    response and an ensemble call the same machine code; ensembles want at least twice the vector length.
+    """
+    known: dict[str, Any] = {"W": W}
+    if not implicit:
+        known["memory"] = None
+    text = one_text(advance, f"stepper_{W}", **known)
+    return cached(text, fastmath=FASTMATH)

@@ -1,0 +1,174 @@
+"""One explicit step of every lane: stages, integrals, error. Compiled for a number of lanes, and called by its address."""
+
+from functools import cache
+from typing import Any
+
+from numba import carray, types
+
+from hpcclear.base.bits import beyond
+from hpcclear.base.cached import c_function
+from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
+from hpcclear.base.one_text import one_text
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.settings import (
+    ATOL,
+    COORDINATES,
+    MEASURES,
+    MOTION,
+    NUMBERS,
+    OBSERVING,
+    RTOL,
+    SENSES,
+    SETTINGS,
+    WIDTH,
+    rules_in,
+)
+from hpcclear.dynamics.linkage.rhs import run_observed
+from hpcclear.dynamics.stepping.control import coordinate, measure, place
+from hpcclear.dynamics.stepping.explicit import tableau as tab
+from hpcclear.dynamics.stepping.explicit.combine import Step, any_stage_state, step_error
+from hpcclear.dynamics.stepping.explicit.switching import sense_stiffness
+
+
+@lane_function
+def begin_stage(work, c, W):
+    """Time of this stage within the revolution."""
+    for i in range(W):
+        work[at.STAGE_TIME * W + i] = work[at.TIME * W + i] + c * work[at.STEP * W + i]
+
+
+@lane_function
+def start_state(work, n, W):
+    """The start of the step as a stage, for lanes whose accelerations there are not known yet."""
+    for number in range(n):
+        k = coordinate(number)
+        for i in range(W):
+            work[(at.QS + k) * W + i] = work[(at.Q + k) * W + i]
+            work[(at.VS + k) * W + i] = work[(at.V + k) * W + i]
+
+
+@lane_function
+def adopt_fresh(effects, work, stages, n, W):
+    """Take over accelerations and rates at the start of the step on fresh lanes of the explicit method only."""
+    for i in range(W):
+        if work[at.FRESH * W + i] > work[at.STIFF * W + i]:
+            for k in range(n):
+                stages[k * W + i] = work[(at.ACC + k) * W + i]
+            for r in range(at.PROFILES if effects.rules.profile else at.ANGLES):
+                work[(at.RATE_OLD + r) * W + i] = work[(at.RATE_NOW + r) * W + i]
+            work[at.FRESH * W + i] = 0.0
+            work[at.EVALUATIONS * W + i] += 1.0
+
+
+@lane_function
+def weigh_rate(work, rate, first, row, b, i, W):
+    """Add a stage's rate to the sum that becomes its integral over the step."""
+    before = work[(at.RATE_SUM + rate) * W + i]
+    before = 0.0 if first else before
+    work[(at.RATE_SUM + rate) * W + i] = before + b * work[(row + rate) * W + i]
+
+
+@lane_function
+def weigh_error(work, first, row, e, i, W):
+    """Add a stage's gap to the sum that becomes the error of its integral."""
+    before = work[(at.RATE_ERROR + at.GAP) * W + i]
+    before = 0.0 if first else before
+    work[(at.RATE_ERROR + at.GAP) * W + i] = before + e * work[(row + at.GAP) * W + i]
+
+
+@lane_function
+def weigh_rates(effects, work, first, row, b, e, lanes, W):
+    """Add a stage's rates, times the weights b and e of its method, to the sums over the step.
+
+    One loop over all gaps of all lanes, whose rows are contiguous: shorter ones the compiler unrolls instead of
+    vectorising. One product a sum: of two it might fuse either, and lanes would differ from a single response in the last bit.
+    What has no weight, as one or two of the stages of every pair, is left out.
+    """
+    begin = place(effects.rules.begin)
+    if (b != 0.0) | (e != 0.0):
+        for k in range(place(effects.rules.end - 1 - begin) * W + W):
+            i = begin * W + k
+            weigh_rate(work, at.GAP, first, row, b, i, W)
+            weigh_error(work, first, row, e, i, W)
+    if b != 0.0:
+        for r in range(len(effects.measures)):
+            rate = measure(effects, r)
+            for i in range(lanes):
+                weigh_rate(work, rate, first, row, b, i, W)
+
+
+@lane_function
+def weigh_stage(effects, step, s, W):
+    """Weigh the rates of stage s; those of the first stage are known from the step before."""
+    work, weights, lanes = step.work, step.weights, step.lanes
+    b, e = tab.WEIGHTS, tab.ERROR
+    if s == 1:
+        weigh_rates(effects, work, True, at.RATE_OLD, weights[b], weights[e], lanes, W)
+    weigh_rates(effects, work, False, at.RATE_NOW, weights[b + s], weights[e + s], lanes, W)
+
+
+@lane_function
+def any_fresh(work, W):
+    """Whether a lane of the explicit method does not know the accelerations at the start of its step."""
+    fresh = 0.0
+    for i in range(W):
+        fresh += max(work[at.FRESH * W + i] - work[at.STIFF * W + i], 0.0)
+    return fresh > 0.0
+
+
+@lane_function
+def take_explicit_steps(effects, observing, motion, step, tables, senses, stages, W):
+    """One step of the pair on every lane, with its integrals and its error, and the scores of its stiffness."""
+    work, weights = step.work, step.weights
+    for s in range(0 if any_fresh(work, W) else 1, stages):
+        if s == 0:
+            start_state(work, step.n, W)
+        else:
+            any_stage_state(step, s, stages, W)
+        begin_stage(work, weights[tab.NODES + s], W)
+        run_observed(observing, motion, work, tables)
+        if s == 0:
+            adopt_fresh(effects, work, step.stages, step.n, W)
+        else:
+            weigh_stage(effects, step, s, W)
+    step_error(effects, step, stages, W)
+    if senses != 0.0:
+        sense_stiffness(step, stages, W)
+    for i in range(W):
+        evaluations = (stages - 1.0) * (1.0 - work[at.STIFF * W + i])
+        work[at.EVALUATIONS * W + i] += evaluations
+
+
+@lane_function
+def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measures):
+    """`take_explicit_steps` for arrays at addresses."""
+    if W == 1:
+        narrow_vectors()
+    of = carray(numbers, NUMBERS)
+    work = carray(lanes, (at.STAGES + stages * at.MAX_COORDINATES) * W)
+    entries = carray(settings, SETTINGS)
+    step = Step(
+        work,
+        beyond(work, at.STAGES * W),
+        beyond(work, at.WORK * W),
+        carray(weights, tab.PACKED),
+        of[COORDINATES],
+        entries[RTOL],
+        entries[ATOL:SETTINGS],
+        of[WIDTH] & 127,
+    )
+    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
+    curves, senses = carray(tables, at.TABLES), entries[SENSES]
+    observing, motion = of[OBSERVING], of[MOTION]
+    take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
+
+
+_DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
+SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 4, _COUNTS)
+
+
+@cache
+def explicit_code(W: int, stages: int) -> Any:
+    """The compiled steps of W lanes by pairs of so many stages; their ``address`` is what steppers take."""
+    text = one_text(explicit_steps, f"explicit_{W}_{stages}", W=W, stages=stages)
+    return c_function(SIGNATURE, text, fastmath=FASTMATH)

@@ -1,0 +1,365 @@
+"""The stepper's arrays and its queue: queue samples, advance, collect what finished; or run all at once."""
+
+import time
+from typing import Any
+
+import numpy as np
+from numba import typeof
+
+from hpcclear.base.arrays import Array, Booleans, Integers, aligned
+from hpcclear.base.beside import compiled_beside, note_compiled
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.settings import (
+    COUNTERS,
+    FINISHED,
+    KEPT,
+    MOTION,
+    MOTION_OF_EIGHT,
+    NEXT_SLOT,
+    OBSERVING,
+    OBSERVING_EIGHT,
+    PROFILE,
+    RECORDED,
+    SLOTS,
+    numbers_of,
+)
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
+from hpcclear.dynamics.linkage.observe import observe, observing_code
+from hpcclear.dynamics.linkage.rhs import compiled_text
+from hpcclear.dynamics.stepping.explicit.stepper import Codes, make_stepper
+from hpcclear.dynamics.stepping.explicit.steps import explicit_code
+from hpcclear.dynamics.stepping.implicit.batch import batch_code
+from hpcclear.dynamics.stepping.implicit.columns import new_columns
+from hpcclear.dynamics.stepping.implicit.memory import COLUMNS
+from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.dynamics.stepping.profile import profile_code
+from hpcclear.dynamics.stepping.record import columns
+from hpcclear.dynamics.stepping.special import special_code
+
+NO_LIMIT = 1 << 40  # of block steps in a call
+SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
+TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
+OBSERVER = f"{observing_code.__module__}:{observing_code.__name__}"
+BATCH = f"{batch_code.__module__}:{batch_code.__name__}"
+
+
+class Lanes:
+    """W lanes and a queue of samples.
+
+    Parameters
+    ----------
+    width : int
+        Lanes; 1 for a single response.
+    record : numpy.ndarray, optional
+        Buffer (rows, columns) for every accepted step of the first samples of the queue, which run in the first lanes.
+    observed : Effects, optional
+        With which the same motion is run a second time while these samples are recorded, for their works and what `observe`
+        returns. No other number depends on it.
+    kept : int
+        How many samples are recorded.
+
+    Raises
+    ------
+    ValueError
+        If the problem's coordinates do not fit the stepper.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        width: int,
+        record: Array | None = None,
+        observed: at.Effects | None = None,
+        kept: int = 1,
+    ) -> None:
+        n = problem.coordinates
+        self.problem = problem
+        self.width = width
+        self._kept = kept
+        self.record = np.zeros((0, columns(n))) if record is None else record
+        bank = aligned((at.STAGES + problem.tableau.stages * at.MAX_COORDINATES) * width)
+        bank[at.WORK * width : at.STAGES * width] = (
+            1.0  # parameters: a resting lane divides by them
+        )
+        self._block = at.Block(
+            work=bank[: at.WORK * width],
+            stages=bank[at.STAGES * width :],
+            par=bank[at.WORK * width : at.STAGES * width],
+            book=np.zeros(at.BOOK * width),
+        )
+        implicit = problem.implicit != "never"
+        self._memory = new_columns(width) if implicit else None
+        sliding = None if self._memory is None else 1
+        effects = problem.effects._replace(sliding=sliding)
+        self._observed = None if observed is None else observed._replace(sliding=sliding)
+        self._rules = at.rules_of(effects._replace(impacts=(observed or effects).impacts))
+        measures = at.measures_of(observed or problem.effects)
+        self._method = at.Method(
+            problem.settings().rows,
+            problem.tableau.packed(),
+            problem.tables,
+            measures,
+            numbers_of(self._rules, width, n, len(measures)),
+        )
+        self._codes = Codes(0, 0, 0)
+        self._step = make_stepper(width, implicit=implicit)
+        self._budget = 256
+        self.counters = np.zeros(COUNTERS, np.int64)
+        self._accept_queue(
+            np.empty((0, problem.parameter_rows)), np.empty((0, Start.size)), np.empty(0, np.int64)
+        )
+        self._effects = effects
+        self._compiled = False
+
+    @property
+    def _widths(self) -> tuple[int, int]:
+        """Lanes of its motions, 0 for none: of all lanes, and of eight stiff ones."""
+        return self.width, 0 if self._memory is None else COLUMNS
+
+    @property
+    def motions(self) -> list[str]:
+        """Its motions as `hpcclear.base.beside` names what another process may compile."""
+        kinds = [effects for effects in (self._effects, self._observed) if effects is not None]
+        texts = [
+            self.problem.motion_text(effects, width)
+            for effects in kinds
+            for width in self._widths
+            if width
+        ]
+        return [f"{TEXT}:{text}" for text in texts]
+
+    def _compile(self) -> None:
+        """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
+        problem, effects, widths = self.problem, self._effects, self._widths
+        stiff = self._memory is not None
+        apart = [SPECIAL, *self.motions]
+        apart += [OBSERVER] if len(self.record) else []
+        with compiled_beside([BATCH] if stiff else apart):  # either is half of it
+            explicit = explicit_code(self.width, problem.tableau.stages).address
+            self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
+            if stiff:  # implicit steps take as long as all of this together
+                special_code()
+                for width in widths:
+                    problem.motion(effects, width)
+        implicit = batch_code().address if stiff else 0
+        self._codes = Codes(special_code().address, explicit, implicit)
+        for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
+            self._method.numbers[row] = problem.motion(effects, width).address if width else 0
+        self._observer = int(self._method.numbers[MOTION])
+        if self._observed is not None:
+            for row, width in zip((OBSERVING, OBSERVING_EIGHT), widths, strict=True):
+                address = problem.motion(self._observed, width).address if width else 0
+                self._method.numbers[row] = address
+            self._observer = int(self._method.numbers[OBSERVING])
+        note_compiled(self.motions)
+        if self._rules.profile:
+            self._method.numbers[PROFILE] = profile_code(effects, self.width).address
+        self._compiled = (
+            True  # last: a stepper must not call what an interrupted compilation left out
+        )
+
+    def observe(
+        self, par: Array, states: Array, contacts: Array, times: Array, began: Array
+    ) -> Array:
+        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion with the observed effects.
+
+        Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
+        the first step.
+        """
+        out = np.zeros((len(times), self.problem.coordinates + at.RATES))
+        states, contacts, times, began = map(np.ascontiguousarray, (states, contacts, times, began))
+        tables, both = self.problem.tables, (times, began)
+        observe(self._observer, par, tables, states, contacts, both, out, self.width)
+        return out
+
+    def _arguments(self, budget: int) -> tuple[Any, ...]:
+        arrays = (self._rules, self._block, self._queue, self._method)
+        memory = () if self._memory is None else (self._memory,)
+        return (self.problem.coordinates, self._codes, *arrays, self.record, *memory, budget)
+
+    def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:
+        count = len(labels)
+        self._labels = labels
+        self._queue = at.Queue(
+            par=np.ascontiguousarray(par),
+            start=np.ascontiguousarray(start),
+            out=np.full((count, Outcome.size), np.nan),
+            finished=np.zeros(count, np.int64),
+            counters=self.counters,
+        )
+        self.counters[:] = 0
+        self.counters[SLOTS] = count
+        self.counters[KEPT] = self._kept
+
+    @property
+    def running(self) -> Booleans:
+        """Which lanes hold a sample, shape (width,)."""
+        row = at.RUNNING * self.width
+        running: Booleans = self._block.work[row : row + self.width] == 1.0
+        return running
+
+    @property
+    def waiting(self) -> int:
+        """Samples queued that no lane has taken yet."""
+        return int(self.counters[SLOTS] - self.counters[NEXT_SLOT])
+
+    @property
+    def pending(self) -> int:
+        """Samples that have not finished."""
+        return self.waiting + int(self.running.sum())
+
+    def run(self, par: Array, start: Start) -> Outcome:
+        """Simulate samples to their ends: parameters (m, PARAMETERS) and m starts to m outcomes, in their order.
+
+        To be called when nothing is queued or running.
+        """
+        assert self.pending == 0
+        assert len(self.record) == 0
+        self.queue(par, start, np.arange(len(par)))
+        while self.step(NO_LIMIT):
+            pass
+        self.counters[FINISHED] = 0
+        return self.problem.marked(Outcome(self._queue.out), par, start)
+
+    def queue(self, par: Array, start: Start, labels: Integers) -> None:
+        """Add samples: parameters (m, PARAMETERS), m starts, labels (m,).
+
+        To be called when everything finished has been collected: lanes keep their own copy of what they
+        run, so the queue is rebuilt from what still waits.
+
+        Raises
+        ------
+        ValueError
+            If a row of parameters has another length than the kernel's.
+        """
+        par = Parameters(par).rows
+        if self.pending == 0:
+            self._accept_queue(par, start.rows, labels)
+            return
+        book = self._block.book.reshape(at.BOOK, self.width)
+        running = np.flatnonzero(self.running)
+        slots = book[at.SAMPLE, running].astype(np.int64)
+        waiting = slice(int(self.counters[NEXT_SLOT]), int(self.counters[SLOTS]))
+        held = self._labels[slots]
+        # slots 0.. belong to the samples in lanes; their rows of the queue are never read again
+        old = self._queue
+        new_par = np.concatenate([old.par[slots], old.par[waiting], par])
+        new_start = np.concatenate([old.start[slots], old.start[waiting], start.rows])
+        new_labels = np.concatenate([held, self._labels[waiting], labels])
+        self._accept_queue(new_par, new_start, new_labels)
+        self.counters[NEXT_SLOT] = len(slots)
+        book[at.SAMPLE, running] = np.arange(len(slots))
+
+    def advance(self, seconds: float) -> None:
+        """Work for about `seconds`, or until every sample is finished (or the record is full)."""
+        end = time.perf_counter() + seconds
+        while True:
+            start = time.perf_counter()
+            going = self.step(self._budget)
+            now = time.perf_counter()
+            # How long a call takes does not change any result: only where it is interrupted.
+            if now - start < 0.1 * seconds:
+                self._budget = min(2 * self._budget, 1 << 20)
+            elif now - start > 0.4 * seconds:
+                self._budget = max(self._budget // 2, 16)
+            if not going or now >= end or self.record_full:
+                return
+
+    @property
+    def record_full(self) -> bool:
+        """Whether the record must be emptied before the stepper can go on."""
+        return 0 < len(self.record) < int(self.counters[RECORDED]) + self._kept
+
+    def take_record(self) -> Array:
+        """The recorded rows since the last call (a copy); the record is empty afterwards.
+
+        Once the recorded samples are over, those that go on are no longer observed.
+        """
+        rows = self.record[: int(self.counters[RECORDED])].copy()
+        self.counters[RECORDED] = 0
+        places = self._block.book[at.SAMPLE * self.width : (at.SAMPLE + 1) * self.width]
+        if not (self.running & (places < self._kept)).any():
+            self._method.numbers[[OBSERVING, OBSERVING_EIGHT]] = 0
+        return rows
+
+    def step(self, budget: int) -> bool:
+        """Take at most `budget` block steps; True while samples are running.
+
+        Raises
+        ------
+        RuntimeError
+            The record is full: what comes next would be written beyond it.
+        """
+        if self.record_full:
+            raise RuntimeError("the record is full; take it first")
+        if (
+            not self._compiled
+        ):  # at the first call, which one rank of a node makes before the others
+            self._compile()
+        going = self._step(*self._arguments(budget))
+        return bool(going)
+
+    def collect(self) -> tuple[Integers, Outcome, Array]:
+        """Labels (m,), outcomes and parameters (m, PARAMETERS) of what finished since the last call."""
+        count = int(self.counters[FINISHED])
+        slots = self._queue.finished[:count].copy()
+        self.counters[FINISHED] = 0
+        par = self._queue.par[slots]
+        start = Start(self._queue.start[slots])
+        outcome = self.problem.marked(Outcome(self._queue.out[slots]), par, start)
+        return self._labels[slots], outcome, par
+
+
+class PrescribedSamples:
+    """Stands in for `lanes.Lanes` where no coordinate is left to integrate: every sample is done when queued."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._labels: list[Integers] = []
+        self._par: list[Array] = []
+        self._starts: list[Array] = []
+
+    @property
+    def pending(self) -> int:
+        """Samples queued and not collected."""
+        return sum(map(len, self._labels))
+
+    def queue(self, par: Array, start: Start, labels: Integers) -> None:
+        """Add samples: parameters (m, PARAMETERS), m starts, of which only failures count, labels (m,)."""
+        self._par.append(par)
+        self._starts.append(start.rows)
+        self._labels.append(labels)
+
+    def advance(self, seconds: float) -> None:
+        """Nothing takes time."""
+
+    def collect(self) -> tuple[Integers, Outcome, Array]:
+        """Labels (m,), outcomes and parameters (m, PARAMETERS) since the last call."""
+        labels = np.concatenate([np.zeros(0, np.int64), *self._labels])
+        par = np.concatenate([np.zeros((0, self._problem.parameter_rows)), *self._par])
+        start = Start(np.concatenate([Start.at_rest(0).rows, *self._starts]))
+        self._labels, self._par, self._starts = [], [], []
+        return labels, self.run(par, start), par
+
+    def run(self, par: Array, start: Start) -> Outcome:
+        """Outcomes of samples, in their order: parameters (m, PARAMETERS) and m starts, of which only failures count."""
+        return self._problem.marked(Outcome(_outcomes(self._problem, par)), par, start)
+
+
+def _outcomes(problem: Problem, par: Array) -> Array:
+    """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, contact or work, which only a response has."""
+    rows = np.zeros((len(par), at.OUT))
+    revolutions = problem.transient + problem.averaged
+    rows[:, at.OUT_SPREAD] = 0.0 if problem.averaged > 1 else np.nan
+    rows[:, at.OUT_REVOLUTIONS] = revolutions
+    rows[:, at.OUT_TIME] = revolutions * par[:, at.PERIOD]
+    works = at.OUT_TOTAL + at.WORKS
+    rows[:, works : works + 4] = np.nan
+    known = (
+        (at.OUT_MOMENT, at.HELD_MOMENT),
+        (at.OUT_ACCELERATION, at.HELD_DEVIATION),
+        (at.OUT_FOLLOWED, at.HELD_PEAK),
+    )
+    for row, of_sample in known:
+        rows[:, row] = par[:, of_sample]
+    return rows

@@ -1,0 +1,120 @@
+"""What is common to the samples of a run, as numbers: linkage, effects, method, tolerances, tables."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.base.outcome import Status
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.settings import STRICT
+from hpcclear.dynamics.layout.views import Outcome, Parameters, Settings, Start
+from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.mechanism import modes_of
+from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text
+from hpcclear.dynamics.stepping.explicit.tableau import Tableau
+
+TORN = 0.25
+"""Penetration over a bearing's radius from which on a result is none: contact laws are of small ones, the softest bearing
+(0.5 GPa) of the paper comes to 0.035, and no material takes strains of this size."""
+
+THROWN_BACK = 0.0873
+"""How far (5 degrees) from its start a body that a torque drives may turn back, rad, in its first revolution from rest:
+the first impacts in its joints throw it."""
+
+IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
+"""When lanes take implicit steps: never, where their motion is stiff, always."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that is common to the samples of a run.
+
+    Raises
+    ------
+    ValueError
+        If coordinates or tolerances do not fit the kernel.
+    """
+
+    linkage: Linkage
+    """Whose motion it is."""
+    effects: at.Effects
+    coordinates: int
+    tableau: Tableau
+    rtol: float
+    atol: tuple[float, ...]
+    """Absolute tolerances of coordinates, then velocities, SI (2 * coordinates)."""
+    impact_floor: float
+    """Least `latched` impact speed, m/s."""
+    transient: int
+    averaged: int
+    max_steps: int
+    implicit: str = "never"
+    """When lanes take implicit steps, a key of `IMPLICIT_USE`."""
+    cycle: float = at.TURN
+    """By how much the angle of the driven body changes in a revolution, rad: negative clockwise, 0 of one that swings."""
+    parameter_rows: int = at.OWN
+    """Parameters of a sample."""
+    curves: tuple[Array, ...] = ()
+    """Cubic cells of its tables, 4 coefficients each."""
+    chosen: tuple[int, ...] = ()
+    """Places of the joints whose gaps count for f; none for all."""
+    from_rest: bool = False
+    """Whether the body that a torque drives may begin at rest."""
+
+    def __post_init__(self) -> None:
+        n = self.coordinates
+        if not 0 <= n <= at.MAX_COORDINATES:
+            raise ValueError(f"the kernel holds {at.MAX_COORDINATES} coordinates at most, not {n}")
+        if len(self.atol) != 2 * n:
+            raise ValueError(f"{n} coordinates have {2 * n} tolerances, not {len(self.atol)}")
+
+    def settings(self) -> Settings:
+        """The numbers that the stepper's control reads."""
+        s = Settings(np.zeros(Settings.size))
+        n = self.coordinates
+        modes = modes_of(self.linkage.mechanism)
+        length = min(self.atol[at.bristles_of(self.effects) + modes : n])
+        s.rtol = self.rtol
+        # An impact is located ten times better than positions are integrated, but not below round-off.
+        s.gap_tolerance = max(0.1 * length, 4e-15)
+        s.angle_tolerance = max(self.rtol * 1e-3, 1e-13)
+        s.impact_floor = self.impact_floor
+        s.transient, s.averaged, s.max_steps = self.transient, self.averaged, self.max_steps
+        s.smallest_step = 1e-14
+        s.exponent = 1.0 / (min(self.tableau.order, self.tableau.error_order) + 1)
+        s.beta = 0.04
+        s.implicit = IMPLICIT_USE[self.implicit]
+        s.senses = 1.0 if self.implicit != "never" or self.rtol > STRICT else 0.0
+        s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
+        s.at_rest = THROWN_BACK if self.from_rest else 0.0
+        last = at.waves_of(self.effects)[-1:]
+        s.profiled = last[0].rows().stop if last and self.effects.profile else 0
+        s.chosen = 0.0 if self.chosen else 1.0
+        s.chosen[list(self.chosen)] = 1.0
+        s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
+        return s
+
+    def motion(self, effects: at.Effects, width: int) -> Any:
+        """The compiled motion of so many lanes with these effects (`rhs.compiled_motion`)."""
+        return compiled_text(self.motion_text(effects, width))
+
+    def motion_text(self, effects: at.Effects, width: int) -> str:
+        """The name of the text that it is compiled from."""
+        return motion_text(self.linkage.module(effects), effects, width)
+
+    def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
+        """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
+        their starts (m), or were penetrated too deep."""
+        p, failed = Parameters(par), start.failed
+        outcome.status[failed != Status.OK] = failed[failed != Status.OK]
+        torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)
+        valid = np.isin(outcome.status, [status for status in Status if status.valid])
+        outcome.status[valid & torn] = Status.TORN_THROUGH
+        return outcome
+
+    @property
+    def tables(self) -> Array:
+        """The tabulated curves as the kernel reads them, one behind the other, shape (curves * 4 * CELLS,)."""
+        return np.concatenate([np.zeros(0), *self.curves])

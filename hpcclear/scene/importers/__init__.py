@@ -1,0 +1,75 @@
+"""Files of other programs that hold a linkage: one file here for each format.
+
+To add one: a module with `drawing_of(path, unit)`, which returns a `Drawing` or refuses with the cause, and its line
+in `FORMATS`.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from hpcclear.base.errors import InputError
+from hpcclear.scene.importers import dxf, linkage2, pmks, table
+from hpcclear.scene.importers.points import Drawing, scene_of, text_of
+from hpcclear.scene.units import UnitError, to_si
+
+__all__ = ["FORMATS", "Drawing", "drawing_of", "linkage_of", "scene_of", "text_of"]
+
+LARGEST_FILE = 20_000_000
+
+
+class Format(NamedTuple):
+    """A kind of file."""
+
+    name: str
+    drawing_of: Callable[[Path, str], Drawing]
+    begins: Callable[[bytes], bool]
+    """Whether a file is of this kind, by its first bytes."""
+
+
+FORMATS = (
+    Format("PMKS+ project or link", pmks.drawing_of, pmks.begins),
+    Format("Linkage document (.linkage2)", linkage2.drawing_of, linkage2.begins),
+    Format("DXF drawing", dxf.drawing_of, dxf.begins),
+    Format("table of points", table.drawing_of, lambda data: True),
+)
+"""Formats, in the order in which they are tried; the last takes what is left."""
+
+
+def drawing_of(path: Path, unit: str = "") -> Drawing:
+    """The linkage that a file holds.
+
+    Parameters
+    ----------
+    path : Path
+        In any of `FORMATS`.
+    unit : str
+        Of lengths, where the file states none.
+
+    Raises
+    ------
+    InputError
+        If no format fits the file, or the file has parts that a scene cannot have.
+    """
+    if unit:
+        try:
+            to_si(f"1 {unit}", "m")
+        except UnitError as error:
+            raise InputError("--unit", unit, error.reason, error.remedy) from None
+    begin = b""
+    if path.is_file():
+        with path.open("rb") as stream:
+            begin = stream.read(4096)
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(
+                "file",
+                str(path),
+                f"is larger than {LARGEST_FILE} bytes",
+                "Save the mechanism alone",
+            )
+    return next(one for one in FORMATS if one.begins(begin)).drawing_of(path, unit)
+
+
+def linkage_of(path: Path, unit: str = "") -> dict[str, Any]:
+    """The tables of a scene whose linkage has its points where a file has them; see `drawing_of`."""
+    return scene_of(drawing_of(path, unit), str(path))

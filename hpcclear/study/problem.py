@@ -1,0 +1,267 @@
+"""What the search minimises in one case: mean and standard deviation of a surrogate over random inputs, or other objectives."""
+
+import contextlib
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcclear.base import quantiles
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
+from hpcclear.scene import Scene
+from hpcclear.scene.cases import Case
+from hpcclear.scene.domain import Box, box, to_physical
+from hpcclear.scene.goals import Goal
+from hpcclear.scene.points import snapped
+from hpcclear.scene.random_inputs import RandomInput
+from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
+from hpcclear.scene.study import Study
+from hpcclear.statistics.random.inputs import Derived, RandomVariable
+from hpcclear.statistics.random.moments import Drawn, RobustObjective
+from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.study.goals import excess, guessed, shortfall
+from hpcclear.study.surrogates import coordinate
+
+PROBES = 64
+"""Designs, beside the corners, at which the rules of derived random inputs are chosen."""
+
+TOGETHER = 256
+"""Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a kernel that is no product of
+them, and for all that is not mean and standard deviation."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What the swarm minimises in one case.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Design variables Z.
+    region : Box
+        Their bounds in sampling coordinates.
+    objective : RobustObjective
+        Mean and standard deviation of designs in SI.
+    scene : Scene
+    case : Case
+    draws : callable
+        Of designs (n, d), points of a Sobol sequence in the random inputs, (n or 1, s) each, for what is made small besides.
+    further : tuple of RobustObjective
+        The same of `Study.further`, responses besides f that cases require.
+    """
+
+    names: tuple[str, ...]
+    region: Box
+    objective: RobustObjective
+    scene: Scene
+    case: Case
+    draws: Drawn
+    further: tuple[RobustObjective, ...] = ()
+
+    def physical(self, coordinates: Array) -> Array:
+        """The nearest designs that exist, in SI, shape (n, d)."""
+        return to_physical(self.scene, self.names, self.snapped(coordinates))
+
+    def snapped(self, coordinates: Array) -> Array:
+        """The nearest designs that exist, in sampling coordinates, (n, d)."""
+        return snapped(self.scene.required_study, self.names, coordinates)
+
+    def searched(self, designs: Array) -> Array | tuple[Array, Array]:
+        """Objectives of designs in SI, (n, objectives); with constraints, also by how much these are violated, (n,)."""
+        if self.case.plain:
+            return self.objective(designs)
+        draws = self.draws(designs)
+        each = [one.sampled(designs, draws) for one in (self.objective, *self.further)]
+        named = dict(zip(self.names, designs.T, strict=True))
+
+        def of(goal: Goal) -> Array:
+            return each[max(goal.place - 1, 0)]
+
+        found = np.column_stack([guessed(goal, of(goal), named) for goal in self.case.goals])
+        if not self.case.kept:
+            return found
+        broken = [
+            shortfall(one, one.most, of(one))
+            if one.statistic == "exceedance"
+            else excess([one], guessed(one, of(one), named)[:, None])
+            for one in self.case.kept
+        ]
+        return found, np.maximum(np.max(broken, axis=0), 0.0)
+
+    def moments(self, designs: Array) -> Array:
+        """Mean and standard deviation of designs in SI, (n, 2); NaN where the surrogate does not hold."""
+        found = np.full((len(designs), 2), np.nan)
+        for row, design in enumerate(designs):
+            try:
+                found[row] = self.objective(design[None])[0]
+            except InputError:  # the design's random inputs leave the surrogate's domain
+                continue
+        return found
+
+
+@dataclass(frozen=True)
+class _Averages:
+    """How the surrogates of one case are averaged over its random inputs."""
+
+    scene: Scene
+    case: str
+
+    @property
+    def study(self) -> Study:
+        return self.scene.required_study
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.study.design_variables(self.case)
+
+    @property
+    def rows(self) -> list[RandomInput]:
+        return [self.study.random_input(name) for name in self.study.case(self.case).random]
+
+    @property
+    def moving(self) -> bool:
+        """Whether a distribution depends on the design."""
+        return any(self.study.moves(row) for row in self.rows)
+
+    @property
+    def correlated(self) -> bool:
+        together = self.study.correlation
+        random = {row.name for row in self.rows}
+        return together is not None and len(set(together.inputs) & random) > 1
+
+    def objective(self, model: Piecewise) -> RobustObjective:
+        """Mean and standard deviation of f, by an exact rule where there is one."""
+        rng = generator(self.study.seed, "moments", self.case)
+        probes, derived = self.probes(rng), self.derived()
+        statistics, by_chance = (
+            self.study.swarm.statistics,
+            (self.study.swarm.monte_carlo_samples, rng),
+        )
+        if self.moving or self.correlated or (statistics == "quadrature" and not model.separable):
+            return self.averaged(model, probes, self.drawn(self.chances(rng)))
+        if statistics != "monte-carlo" and not self.askew(model, derived):
+            with contextlib.suppress(InputError):  # length scales too short for a quadrature rule
+                return self.averaged(model, probes)
+        return self.averaged(model, probes, by_chance)
+
+    def averaged(
+        self,
+        model: Piecewise,
+        probes: Array,
+        draws: tuple[int, np.random.Generator] | Drawn | None = None,
+    ) -> RobustObjective:
+        inputs = [
+            RandomVariable(
+                row.name,
+                _inner(self.study, row) if self.moving else row.law,
+                about_design=not row.absolute,
+            )
+            for row in self.rows
+        ]
+        joint = self.joint if self.correlated and not self.moving else None
+        return RobustObjective(
+            model,
+            self.names,
+            inputs,
+            derived=self.derived(),
+            probes=probes,
+            draws=draws,
+            joint=joint,
+        )
+
+    def probes(self, rng: np.random.Generator) -> Array:
+        """Designs at which the rules of derived random inputs are chosen, SI, (m, d): corners, and some between."""
+        region = box(self.scene, self.names)
+        corners = list(itertools.product((0.0, 1.0), repeat=len(self.names)))
+        unit = np.concatenate([unit_lhs(PROBES, len(self.names), rng), np.array(corners)])
+        places = region.lower + unit * (region.upper - region.lower)
+        return to_physical(self.scene, self.names, places)
+
+    def derived(self) -> list[Derived]:
+        """Ratios that the model knows instead of inertias."""
+        variables = [self.study.variable(name) for name in self.study.optimisation]
+        return [_ratio(self.scene, one.paths[0]) for one in variables if one.ratio is not None]
+
+    def askew(self, model: Piecewise, derived: Sequence[Derived]) -> bool:
+        """Whether borders of the surrogate's subintervals cut the random inputs where no rule can be split."""
+        random = {row.name for row in self.rows}
+        return len(model.leaves) > 1 and (
+            any(set(one.of) & random for one in derived)
+            or any(isinstance(row.law, quantiles.Cut) for row in self.rows)
+        )
+
+    def chances(self, rng: np.random.Generator) -> Array:
+        """Probabilities of the random inputs, (inputs, s)."""
+        return sobol(len(self.rows), rng, 0, TOGETHER).T
+
+    def drawn(self, chances: Array) -> Drawn:
+        """Draws at probabilities (inputs, s): the same for all designs, unless distributions depend on them."""
+        random = [row.name for row in self.rows]
+        if not self.moving:
+            found = offsets(self.scene, random, list(chances))
+            fixed = {name: one[None] for name, one in found.items()}
+            return lambda designs: fixed
+
+        def of_designs(designs: Array) -> dict[str, Array]:
+            rows = [
+                offsets(self.scene, random, list(chances), dict(zip(self.names, one, strict=True)))
+                for one in designs
+            ]
+            return {name: np.array([row[name] for row in rows]) for name in random}
+
+        return of_designs
+
+    def joint(self, count: int, rng: np.random.Generator) -> dict[str, Array]:
+        """Independent draws of inputs that vary together."""
+        random = [row.name for row in self.rows]
+        return offsets(self.scene, random, list(rng.random((len(random), count)) + 2.0**-54))
+
+
+def problem_of(
+    scene: Scene, case: str, model: Piecewise, others: Sequence[Piecewise] = ()
+) -> Problem:
+    """The problem of one case on a surrogate of its objective, and on those of further responses.
+
+    A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
+    the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
+    for inputs that vary together, or for a model whose length scales are a small part of a random input's range (it has
+    found noise). Such a case is averaged by Monte Carlo; one on a kernel that is no product of its inputs over points of a
+    Sobol sequence.
+    """
+    averages = _Averages(scene, case)
+    objective = averages.objective(model)
+    points = averages.drawn(averages.chances(generator(scene.required_study.seed, "goals", case)))
+    probes = averages.probes(generator(scene.required_study.seed, "moments", case))
+    further = tuple(averages.averaged(other, probes, points) for other in others)
+    study = scene.required_study
+    region = box(scene, averages.names)
+    return Problem(averages.names, region, objective, scene, study.case(case), points, further)
+
+
+def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:
+    """Ends of a distribution that depends on the design, as the domain of the surrogate has them for all."""
+    low, high = study.reach(row) if row.absolute else (0.0, 0.0)
+    return quantiles.Uniform((low + high) / 2.0, (high - low) / 2.0)
+
+
+def _ratio(scene: Scene, inertia: str) -> Derived:
+    """The ratio I / (m L^2 / 12) of a link from the inertia, and from its mass and length."""
+    study, link = scene.required_study, inertia.rpartition(".")[0]
+    variable = {path: name for name in study.optimisation for path in study.variable(name).paths}
+    of = [variable[inertia]]
+    places: dict[str, int] = {}
+    for part in ("mass", "length"):
+        if f"{link}.{part}" in variable:
+            places[part] = len(of)
+            of.append(variable[f"{link}.{part}"])
+    numbers = {part: scene.number(f"{link}.{part}") for part in ("mass", "length")}
+
+    def function(*values: Array) -> Array:
+        mass, length = (
+            values[places[part]] if part in places else numbers[part] for part in ("mass", "length")
+        )
+        return np.asarray(values[0] / (mass * length**2 / 12))
+
+    return Derived(coordinate(study.variable(variable[inertia])), tuple(of), function)

@@ -1,0 +1,226 @@
+"""Pins in slots with clearance: closed forms, random linkages against the dense model, and what is refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dense_linkage import Contact, Dense
+from hpcclear.dynamics.problem import problem_of
+from scipy.integrate import solve_ivp
+from test_guides import CHI, GRAVITY, MU, RAMP
+from test_loads import machine
+
+from hpcclear import load_scene, simulate
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.compiled import module_text
+from hpcclear.dynamics.planar.problem import linkage_of
+
+JOB = Path(__file__).parents[1] / "jobs" / "loose_slot.toml"
+MASS, INERTIA, RADIUS, CLEARANCE = 0.2, 2e-5, 0.01, 1e-3
+SOFT = {part: {"youngs_modulus": "2 GPa", "poisson_ratio": 0.4} for part in ("bearing", "journal")}
+
+
+def roller(tilt, offset, friction, **contact):
+    """A pin alone in a slot of the ground, which falls by `tilt` (rad); beside it a wheel that turns once a second."""
+    bodies = {"roller": {"mass": MASS, "inertia": INERTIA, "points": {"o": [0.0, 0.0]}}}
+    slot = {
+        "kind": "slot", "point": "roller.o", "line": "ground.o", "angle": -tilt, "clearance": CLEARANCE,
+        "pin_radius": RADIUS, "materials": SOFT, "start_offset": offset,
+    }  # fmt: skip
+    effects = {"gravity": GRAVITY, "contact": contact or {"law": "hertz"}, "friction": friction}
+    scene = machine(
+        {}, bodies, {"slot": {"kind": "slide", "point": "roller.o", "line": "ground.o"}}, turns=1
+    )
+    return scene.with_({"mechanism.joints.slot": slot, "effects": effects})
+
+
+def stiffness_of(scene):
+    """Of a sphere on a plane."""
+    h = (1 - 0.4**2) / 2e9
+    assert linkage_of(scene).mechanism.clearances[0].stiffness == pytest.approx(
+        4 / (3 * 2 * h) * math.sqrt(RADIUS), rel=1e-12
+    )
+    return 4 / (3 * 2 * h) * math.sqrt(RADIUS)
+
+
+@pytest.mark.parametrize("coefficient", [0.05, 0.4])
+def test_a_pin_slides_or_rolls_down_its_slot(coefficient):
+    """Pressed to the lower wall by its weight. It slides: a = g (sin - mu cos), or rolls: a = g sin/(1 + J/(m r^2))."""
+    tilt = 0.4
+    still = roller(tilt, 0.0, "none")
+    depth = (MASS * GRAVITY * math.cos(tilt) / stiffness_of(still)) ** (2 / 3)
+    friction = {"law": "coulomb", "coefficient": coefficient, "ramp_speed": 1e-4}
+    found = simulate(roller(tilt, -CLEARANCE - depth, friction))
+    time, arm = found["time"].to_numpy(), RADIUS - depth / 2
+    assert (coefficient > math.tan(tilt) / (1 + MASS * arm**2 / INERTIA)) == (coefficient > 0.1)
+    if coefficient > 0.1:
+        ahead = GRAVITY * math.sin(tilt) / (1 + INERTIA / (MASS * arm**2))
+        turning = -ahead / arm
+    else:
+        ahead = GRAVITY * (math.sin(tilt) - coefficient * math.cos(tilt))
+        turning = -coefficient * MASS * GRAVITY * math.cos(tilt) * arm / INERTIA
+    along = np.array([math.cos(tilt), -math.sin(tilt)])
+    moved = (
+        np.stack([found[f"body_{k}"].sel(body="roller").to_numpy() for k in "xy"], axis=1) @ along
+    )
+    np.testing.assert_allclose(moved - moved[0], 0.5 * ahead * time**2, atol=2e-4 * time[-1])
+    spin = found["body_spin"].sel(body="roller").to_numpy()
+    np.testing.assert_allclose(spin, turning * time, atol=2e-2)
+    np.testing.assert_allclose(
+        found["contact_force"].to_numpy(), [[0.0, MASS * GRAVITY * math.cos(tilt)]] * len(time), rtol=1e-5, atol=1e-9
+    )  # fmt: skip
+
+
+def test_a_pin_falls_from_wall_to_wall():
+    """Through both clearances: h = 2 c, then so deep that m g (h + d) = 2/5 K d^(5/2), and up again."""
+    scene = roller(0.0, CLEARANCE, "none").with_({"output.instants_per_revolution": 0})
+    found = simulate(scene)
+    stiffness = stiffness_of(scene)
+    forces = found["contact_force"].to_numpy()
+    time, lower = found["time"].to_numpy(), forces[:, 1]
+    fall = math.sqrt(2 * 2 * CLEARANCE / GRAVITY)
+    begun = np.flatnonzero((lower[1:] > 0) & (lower[:-1] == 0))[0]
+    assert time[begun] - 1e-12 <= fall <= time[begun + 1]
+    deepest = np.roots(
+        [
+            1.0,
+            0,
+            0,
+            -5 / 2 * MASS * GRAVITY / stiffness,
+            0,
+            -5 / 2 * MASS * GRAVITY * 2 * CLEARANCE / stiffness,
+        ]
+    )
+    root = float(deepest[(np.abs(deepest.imag) < 1e-12) & (deepest.real > 0)].real[0])  # of sqrt(d)
+    assert found["peak_contact_force"].to_numpy()[1] == pytest.approx(stiffness * root**3, rel=1e-6)
+    offset = found["guide_offset"].to_numpy()[:, 0]
+    later = time > 1.9 * fall
+    assert offset[later].max() == pytest.approx(CLEARANCE, rel=1e-2)
+    assert float(np.abs(found["energy_residual"]).max()) < 1e-8 * MASS * GRAVITY * CLEARANCE
+
+
+def random_lever(seed):
+    """A crank pin in the slot of a lever; with torque or at a constant speed."""
+    rng = np.random.default_rng(seed)
+    u, clearance = rng.uniform, rng.uniform(5e-5, 2e-4)
+    bodies = {
+        "crank": {"length": u(0.04, 0.06), "mass": 0.3, "inertia": 1e-4, "start_angle": u(0, 6)},
+        "lever": {"length": 0.25, "mass": 0.6, "inertia": 3e-3, "start_angle": 1.1},
+    }
+    joints = {
+        "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+        "o3": {"kind": "revolute", "journal": "lever.a", "bearing": "ground.p"},
+        "way": {
+            "kind": "slot", "point": "crank.b", "line": "lever.a", "angle": u(-0.1, 0.1), "clearance": clearance,
+            "pin_radius": u(0.004, 0.01), "materials": SOFT, "start_offset": u(-0.5, 0.5) * clearance,
+        },
+    }  # fmt: skip
+    drive = {"kind": "constant-speed", "body": "crank", "speed": u(60.0, 120.0)}
+    if seed % 2:
+        drive = {
+            "kind": "torque",
+            "body": "crank",
+            "torque": u(0, 5),
+            "initial_speed": u(60.0, 120.0),
+        }
+    return load_scene(
+        {
+            "format_version": 2,
+            "mechanism": {
+                "kind": "planar", "bodies": bodies, "joints": joints, "drives": {"motor": drive},
+                "ground": {"points": {"o": [0.0, 0.0], "p": [u(-0.01, 0.01), -0.1]}},
+            },
+            "effects": {
+                "gravity": GRAVITY, "contact": {"law": "hunt-crossley", "damping": CHI},
+                "friction": {"law": "coulomb", "coefficient": MU, "ramp_speed": RAMP},
+            },
+            "numerics": {
+                "rtol": 1e-11, "method": "dormand-prince", "transient_revolutions": 0, "averaged_revolutions": 1,
+            },
+            "output": {"instants_per_revolution": 2000},
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=[] if k < 2 else pytest.mark.full) for k in range(20)]
+)
+def test_random_slots_move_as_in_the_dense_model(seed):
+    """To 1e-8 m from the start through the first contact, and some time after, while the motion is regular."""
+    scene = random_lever(seed)
+    mechanism = linkage_of(scene).mechanism
+    laws = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
+    dense = Dense(mechanism, [laws], GRAVITY)
+    assembly = assemble(mechanism)
+    order = [
+        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
+        for one in assembly.loops.forest.coordinates
+    ]
+    start = np.zeros((2, dense.n))
+    start[0, order], start[1, order] = assembly.q, assembly.v
+    response = simulate(scene)
+    n, time = dense.n, response["time"].to_numpy()
+    pressed = response["contact_force"].to_numpy().max(axis=1) > 1.0
+    assert pressed.any()
+    early = time[time <= min(time[pressed.argmax()] + 1e-3, 1e-2)]
+    y = solve_ivp(
+        lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, early[-1]), start.ravel(),
+        method="DOP853", rtol=1e-11, atol=1e-13, max_step=early[-1] / 50, t_eval=early,
+    ).y  # fmt: skip
+    for k, name in enumerate(("body_x", "body_y", "body_angle")):
+        seen = response[name].to_numpy()[: len(early)]
+        np.testing.assert_allclose(seen, y[k:n:3].T, rtol=0, atol=1e-8)
+    work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
+    kinetic = float(response["kinetic_energy"].max())
+    assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * max(work, kinetic)
+
+
+def test_the_job_s_pin_changes_walls_and_follows_the_slot_without_clearance():
+    scene = load_scene(JOB)
+    assert scene.contact_labels() == ("slot.left", "slot.right")
+    found = simulate(scene)
+    slot = {"kind": "slot", "point": "crank.b", "line": "lever.a"}
+    ideal = simulate(
+        scene.with_(
+            {"mechanism.joints.slot": slot, "effects.contact": None, "effects.friction": "none"}
+        )
+    )
+    apart = (found["body_angle"] - ideal["body_angle"].interp(time=found["time"])).sel(body="lever")
+    assert (
+        1e-4 < float(np.abs(apart).max()) < 2 * 5e-5 / 0.06
+    )  # clearance over the nearest place of the pin
+    forces = found["contact_force"].to_numpy()
+    assert (forces.max(axis=0) > 50.0).all()
+    assert (forces.min(axis=1) == 0.0).all()  # one wall at a time
+    work = float(np.abs(np.diff(found["driving_work"].to_numpy())).sum())
+    assert float(np.abs(found["energy_residual"]).max()) < 1e-4 * work
+
+
+def test_scenes_without_a_slot_compile_nothing_of_it():
+    scene = load_scene(JOB)
+    problem = problem_of(scene)
+    text = module_text(problem.linkage._text(problem.linkage._on), ())
+    assert text.count("= corner_force(") == 2
+    slot = {"kind": "slot", "point": "crank.b", "line": "lever.a"}
+    plain = problem_of(scene.with_({
+        "mechanism.joints.slot": slot, "effects.contact": None, "effects.friction": "none",
+        "mechanism.drives.motor": {"kind": "torque", "body": "crank", "torque": 1.0, "initial_speed": 30.0},
+    }))  # fmt: skip
+    assert "corner_force" not in module_text(plain.linkage._text(plain.linkage._on), ())
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"mechanism.joints.slot.pin_radius": None}, "mechanism.joints.slot.pin_radius"),
+        ({"mechanism.joints.slot.clearance": 0.0}, "mechanism.joints.slot.clearance"),
+        ({"mechanism.joints.slot.point": "crank.z"}, "mechanism.joints.slot.point"),
+        ({"effects.contact": {"law": "hertz", "geometry": "line"}}, "mechanism.joints.slot.width"),
+    ],
+)
+def test_wrong_slots_are_refused_by_name(changes, key):
+    with pytest.raises(InputError) as refused:
+        simulate(load_scene(JOB).with_(changes))
+    assert refused.value.key == key
