@@ -68,7 +68,7 @@ class Numerics(Table):
 
     levels: Annotated[tuple[Frequency, ...], Field(max_length=MAX_BANDS)] = ()
     """Third-octave bands, by a frequency in each, Hz, whose force levels each sample records, with half-widths and those of the
-    measures of impact. A study of a level enables its band. A sample then takes as long as a single response."""
+    measures of impact. A study of a level enables its band. Samples then take ten times as long or more."""
 
     @field_validator("method", mode="before")
     @classmethod
