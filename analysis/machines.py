@@ -168,11 +168,11 @@ def pump_answer(scene):
         found = simulate(scene.with_({"joints.guide.clearance": clearance}))
         corners = [str(one) for one in found["joint"].to_numpy() if str(one).startswith("guide")]
         own = found.sel(joint=corners)
-        energy = quantity(float(own["impact_energy"].sum()), "J", 2)
+        energy = quantity(float(own["impact_energy"].sum()), "J", 3)
         yield (
             quantity(clearance, "m", 3),
             energy,
-            quantity(float(own["peak_contact_pressure"].max()), "Pa", 2),
+            quantity(float(own["peak_contact_pressure"].max()), "Pa", 3),
         )
 
 

@@ -68,8 +68,8 @@ class Numerics(Table):
 
     levels: Annotated[tuple[Frequency, ...], Field(max_length=MAX_BANDS)] = ()
     """Frequencies, Hz. Each sample records the force levels of the third-octave bands that contain them, with
-    half-widths, and half-widths of the measures of impact. Enabled automatically if the study needs a level. A sample
-    then takes as long as a single response."""
+    half-widths, and half-widths of the measures of impact. Enabled automatically if the study needs a level. Samples
+    then take ten times as long or more."""
 
     @field_validator("method", mode="before")
     @classmethod

@@ -14,8 +14,9 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.spectral import LEAST, Spectra
-from hpcclear.dynamics.evaluation.recorded.steps import Recorded, Recording, pieces
+from hpcclear.dynamics.evaluation.recorded.steps import Piece, Pieces, Recorded, Recording
 from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics import spectra
@@ -49,12 +50,13 @@ class SoundingEvaluator:
         self._columns, self._perturbations = columns, perturbations
         self._count = instants_of(scene)
         self._waiting: deque[tuple[int, Array]] = deque()
+        self._running: list[int] = []
         self._current: Iterator[Records | None] | None = None
 
     @property
     def pending(self) -> int:
         """Samples submitted and not finished."""
-        return len(self._waiting) + (self._current is not None)
+        return len(self._waiting) + len(self._running)
 
     def submit(self, index: Integers, points: Array) -> None:
         """Queue samples: indices (m,), values (m, d) in the columns' order, SI."""
@@ -68,33 +70,64 @@ class SoundingEvaluator:
             Recording(self.scene).compile()
         while self.pending:
             if self._current is None:
-                self._current = self._sample(*self._waiting.popleft())
-            record = next(self._current)
-            if record is not None:
-                self._current = None
-                done.append(record)
+                self._current = self._batch()
+            records = next(self._current)
+            if records is not None:
+                self._running, self._current = [], None
+                done.append(records)
             if time.perf_counter() >= end:
                 break
         return np.concatenate(done) if done else np.zeros(0, OUTCOME)
 
-    def _sample(self, index: int, values: Array) -> Iterator[Records | None]:
-        """One sample, piece by piece; its record (1,) at last."""
-        design = Points(self._columns.names, values[None], self._columns.paths)
+    def _batch(self) -> Iterator[Records | None]:
+        """As many samples as there are lanes, piece by piece; their records at last."""
+        size = 1 if self._perturbations else min(self.lanes, len(self._waiting))
+        taken = [self._waiting.popleft() for _ in range(size)]
+        self._running = [index for index, _ in taken]
+        points = np.array([values for _, values in taken]).reshape(size, -1)
+        design = Points(self._columns.names, points, self._columns.paths)
+        return self._recorded(self._running, design)
+
+    def _recorded(self, index: list[int], design: Points) -> Iterator[Records | None]:
         recording = Recording(
             self.scene, 0, self._perturbations, self.scene.objective, design=design
         )
-        sample = recording.samples[0]
-        turns, heard = Turns(), Spectra(self.scene, sample, self._count)
-        for piece in pieces(recording.chunks(), 1):
-            turns.take(piece.steps)
-            heard.take(piece)
+        heard = [_Heard(self.scene, sample, self._count) for sample in recording.samples]
+        for rows in recording.chunks():
+            for slot, one in enumerate(heard):
+                one.take(rows[rows[:, rec.SLOT] == slot])
             yield None
-        turns.finish(piece.steps)
-        record = recording.record()
-        record["sample"] = index
+        records = recording.record()
+        records["sample"] = index
+        for k, one in enumerate(heard):
+            one.finish(records[k : k + 1])
+        yield records
+
+
+class _Heard:
+    """One sample of a recording, as its steps come."""
+
+    def __init__(self, scene: Scene, sample: Recorded, count: int) -> None:
+        self._scene, self._sample = scene, sample
+        self._pieces, self._turns = Pieces(1), Turns()
+        self._spectra = Spectra(scene, sample, count)
+
+    def take(self, rows: Array) -> None:
+        """Take rows (m, columns) of the record."""
+        for piece in self._pieces.take(rows):
+            self._add(piece)
+
+    def _add(self, piece: Piece) -> None:
+        self._turns.take(piece.steps)
+        self._spectra.take(piece)
+
+    def finish(self, record: Records) -> None:
+        """Enter what was heard into its record (1,), a view."""
+        last = self._pieces.finish()
+        self._add(last)
+        self._turns.finish(last.steps)
         if Status(int(record["status"][0])).valid:
-            enter_levels(self.scene, sample, turns, heard, record)
-        yield record
+            enter_levels(self._scene, self._sample, self._turns, self._spectra, record)
 
 
 def enter_levels(

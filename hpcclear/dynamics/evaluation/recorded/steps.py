@@ -119,7 +119,7 @@ class Recording:
     beside : sequence of Scene
         Others with the same problem, which are recorded as well; without replicas, and all of them can turn.
     design : Points
-        One point of the first, by default the scene itself.
+        Points of the first, recorded side by side; by default the scene itself. Replicas go with one alone.
     """
 
     def __init__(
@@ -142,7 +142,9 @@ class Recording:
         self._refused = refused_of(scene) if alone else None
         if copy:
             start = [perturbed(start[0], scales(scene), range(copy, copy + 1))]
-        kept = len(par)
+        self._par = np.concatenate(par)
+        self._start = Start(np.concatenate([begin.rows for begin in start]))
+        kept = len(self._par)
         buffer = np.zeros((CHUNK, rec.columns(self.problem.coordinates)))
         observed = effects_of(scene, series=True, energies=True, impacts=True)
         self._lanes = Lanes(self.problem, DEFAULT_LANES, buffer, observed, kept)
@@ -151,11 +153,9 @@ class Recording:
         )
         self._done: list[Records] = []
         self.samples = [
-            Recorded(self.problem, own[0], self._lanes, begin)
-            for own, begin in zip(par, start, strict=True)
+            Recorded(self.problem, self._par[k], self._lanes, self._start[k : k + 1])
+            for k in range(kept)
         ]
-        self._par = np.concatenate(par)
-        self._start = Start(np.concatenate([begin.rows for begin in start]))
 
     def compile(self) -> None:
         """Compile what it runs."""
@@ -173,7 +173,7 @@ class Recording:
         yield first
         if self._refused is not None:
             return
-        values = np.repeat(self._values, len(first), axis=0)
+        values = np.resize(self._values, (len(first), self._values.shape[1]))
         self._evaluator.queue(np.arange(len(first)), self._par, self._start, values)
         while lanes.pending:
             while lanes.pending and not lanes.record_full:  # by steps, not by the clock
