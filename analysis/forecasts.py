@@ -41,7 +41,7 @@ ASKED: dict[str, tuple[list[Any], float | None]] = {
 def main() -> None:
     """Forecast, carry out, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=500)
+    parser.add_argument("--first", type=int, default=600)
     parser.add_argument("--studies", type=int, default=10)
     parser.add_argument("--out", type=Path, default=RESULTS)
     words = parser.parse_args()

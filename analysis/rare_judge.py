@@ -44,7 +44,7 @@ RESULTS = Path(__file__).parent / "results" / "rare_scenes.csv"
 FIELDS = "scene", "f", "most", "stated", "judge", "error", "objective", "given_away", "simulations", "seconds"  # fmt: skip
 
 OWN = {
-    "torque": (1e-4, "0 - m2 - m3"),
+    "torque": (1e-4, "m2 + m3"),
     "slider_crank": (1e-3, "0 - m2 - m3"),
     "quick_return": (3e-3, "0 - lever"),
     "four_stroke": (3e-4, "0 - rod - piston"),

@@ -38,7 +38,7 @@ FALL = 0.5, 1.5
 USUAL = {"verification": 0.8, "infill": 0.8}
 """Of the most designs that a stage may have."""
 
-CONTESTED = 1.2
+CONTESTED = 1.35
 """Times the simulations that an accuracy takes: what designs get beyond it while they may be the best."""
 
 SAFE = 0.6
