@@ -168,6 +168,68 @@ STUDIES: dict[str, tuple[str, dict[str, Any]]] = {
             "cases": {"made": {"random": ["C", "m3"], "objectives": ["mean", "deviation"]}},
         },
     ),
+    "compressor": (
+        "compressor.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "piston": mass("mechanism.slider.mass", 0.15, 0.35),
+                "rod": mass("mechanism.rod.mass", 0.08, 0.2),
+                "big": {"path": "joints.crank_rod.clearance", "range": ["8 um", "40 um"]},
+                "small": {"path": "joints.rod_slider.clearance", "range": ["2 um", "25 um"]},
+            },
+            "random": {"big": uniform("12 um", "35 um"), "small": uniform("4 um", "20 um")},
+            "cases": {"made": {"random": ["big", "small"], "objectives": [QUANTILE, {"formula": "0 - piston - rod"}]}},
+        },
+    ),
+    "moment": (
+        "hunt_crossley.toml",
+        {
+            "objective": "peak-crank-moment",
+            "variables": {
+                "m2": mass("mechanism.rod.mass", 0.12, 0.4),
+                "u2": {"path": "mechanism.rod.mass_center", "range": ["10 mm", "110 mm"]},
+                "C": {"range": ["0.1 mm", "0.6 mm"]},
+            },
+            "random": {
+                "C": uniform("0.15 mm", "0.5 mm"),
+                "m2": {"distribution": "normal", "deviation": "2 g"},
+            },
+            "cases": {"made": {"random": ["C", "m2"], "objectives": [QUANTILE, {"formula": "0 - m2"}]}},
+        },
+    ),
+    "one_joint": (
+        "hunt_crossley.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "m3": mass("mechanism.slider.mass", 0.08, 0.28),
+                "u2": {"path": "mechanism.rod.mass_center", "range": ["10 mm", "110 mm"]},
+                "C12": {"path": "joints.crank_rod.clearance", "range": ["0.1 mm", "0.6 mm"]},
+            },
+            "random": {
+                "C12": uniform("0.15 mm", "0.5 mm"),
+                "m3": {"distribution": "normal", "deviation": "2 g"},
+            },
+            "cases": {"made": {"random": ["C12", "m3"], "objectives": ["mean", "deviation"]}},
+        },
+    ),
+    "crank_rocker": (
+        "linkages/crank_rocker.toml",
+        {
+            "objective": "peak-contact-force",
+            "variables": {
+                "coupler": mass("mechanism.bodies.coupler.mass", 0.2, 0.4),
+                "rocker": mass("mechanism.bodies.rocker.mass", 0.15, 0.35),
+                "C": {"range": ["0.03 mm", "0.3 mm"]},
+            },
+            "random": {
+                "C": uniform("0.05 mm", "0.25 mm"),
+                "rocker": {"distribution": "uniform", "half_width": "5 g"},
+            },
+            "cases": {"made": {"random": ["C", "rocker"], "objectives": [QUANTILE, {"formula": "0 - coupler"}]}},
+        },
+    ),
 }  # fmt: skip
 """Studies of our own mechanisms, small enough to be judged."""
 
@@ -190,6 +252,7 @@ def scene_of(name: str) -> Scene:
     table = tomllib.loads((JOBS / job).read_text())
     table["study"] = SMALL | study
     table["numerics"] = table["numerics"] | QUICK
+    table["numerics"].pop("objective", None)  # the study has its own
     table["drive"] = DRIVES.get(name, table.get("drive"))
     table = {key: its for key, its in table.items() if its is not None}
     return load_scene(table)

@@ -131,14 +131,14 @@ HITS = 16
 """Exceedances after which a probability of half or twice what is allowed is distinguished from it."""
 
 
-WEIGHTED = 12288
-"""Simulations of a design by importance sampling that decide a rare failure as a rule."""
+WEIGHTED, FEWEST = 12288, 6144
+"""Simulations of a design by importance sampling that decide a rare failure as a rule; its pilot and first draws alone."""
 
 
 def usual(goal: Constraint, settings: Verification) -> float:
     """Simulations that decide a constraint of a design that is not too near its threshold; 0 of what is no probability."""
     if rare(goal, settings):
-        return float(min(WEIGHTED, 2 * settings.most_samples))
+        return float(min(WEIGHTED, max(2 * settings.most_samples, FEWEST)))
     return HITS / goal.most if goal.statistic == "exceedance" and goal.most > 0.0 else 0.0
 
 
