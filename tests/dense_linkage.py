@@ -14,7 +14,9 @@ import numpy as np
 from dense_mechanism import Touch, touching
 
 from hpcclear.dynamics.linkage import parts as m
-from hpcclear.dynamics.linkage.loads import Cylinder, Drag, TorsionSpring
+from hpcclear.dynamics.linkage.loads.cylinder import Cylinder
+from hpcclear.dynamics.linkage.loads.drag import Drag
+from hpcclear.dynamics.linkage.loads.torsion_spring import TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 
 

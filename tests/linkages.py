@@ -3,7 +3,9 @@
 import math
 from dataclasses import replace
 
-from hpcclear.dynamics.linkage.loads import Cylinder, Drag, TorsionSpring
+from hpcclear.dynamics.linkage.loads.cylinder import Cylinder
+from hpcclear.dynamics.linkage.loads.drag import Drag
+from hpcclear.dynamics.linkage.loads.torsion_spring import TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Body,

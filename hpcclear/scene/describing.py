@@ -18,10 +18,10 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
         clearance = scene.number(f"{scene.joint_key(name)}.clearance")
         size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
-        where = f"joint {name}" if name in scene.pins() else f"guide {name}"
-        where = "the guide" if where == "guide guide" else where
-        yield f"clearance {size} in {where}" + (f" ({NAMES[name]})" if name in NAMES else "")
         joint: Any = scene.clearance_joint(name)
+        kind = {"slide": "guide", "slot": "slot"}.get(joint.kind, "joint")
+        where = "the guide" if kind == name == "guide" else f"{kind} {name}"
+        yield f"clearance {size} in {where}" + (f" ({NAMES[name]})" if name in NAMES else "")
         if joint.out_of_round is not None:
             yield f"joint {name} out of round"
     for name in scene.worn_joints():

@@ -443,6 +443,8 @@ class Acting:
     """
 
     name: str
+    kind: ClassVar[str]
+    """That the scene names."""
     by_angle: ClassVar[bool] = False
     """Whether it goes by the angle of a body, which must not go round with the revolutions."""
 

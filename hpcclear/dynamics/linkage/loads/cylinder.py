@@ -1,7 +1,7 @@
 """A force between two points by a given law of their distance: hydraulic or pneumatic cylinder, gas spring, end stop, cable."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from hpcclear.dynamics.linkage.balance import Pull
 from hpcclear.dynamics.linkage.expression import Term, Vector, named
@@ -18,6 +18,7 @@ class Cylinder(Acting):
     second: str
     force: float | piecewise.Rows
     damping: float = 0.0
+    kind: ClassVar[str] = "cylinder"
 
     def numbers(self) -> dict[str, Any]:
         """Its parameters."""

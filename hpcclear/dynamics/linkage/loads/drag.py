@@ -1,7 +1,7 @@
 """A torque against the turning of a body, such as that of a fan or of oil that is stirred."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from hpcclear.dynamics.linkage.balance import Twist
 from hpcclear.dynamics.linkage.expression import Term, named
@@ -16,6 +16,7 @@ class Drag(Acting):
     body: str
     linear: float = 0.0
     quadratic: float = 0.0
+    kind: ClassVar[str] = "drag"
 
     def numbers(self) -> dict[str, Any]:
         """Its parameters."""

@@ -21,6 +21,7 @@ class TorsionSpring(Acting):
     lower: float | None = None
     upper: float | None = None
     stop_stiffness: float = 0.0
+    kind: ClassVar[str] = "torsion-spring"
     by_angle: ClassVar[bool] = True
 
     def numbers(self) -> dict[str, Any]:
