@@ -16,7 +16,7 @@ from hpcclear.dynamics.response import simulate
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.single import responses_of
+from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
 from hpcclear.results import dataset
@@ -122,9 +122,8 @@ def run_bifurcation(
             long = scene.with_(names)
             what = observation.described(_short(long, variants[0]))
             count = observation.revolutions
-            observed = responses_of(long, variants, observation, (count,), ranks, "bifurcation")[
-                :, 0
-            ]
+            asked = long, variants, observation, (count,), ranks, "bifurcation"
+            observed = responses_of(*asked, together=TOGETHER)[:, 0]
             coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
             content = session.write(
                 dataset.dataset(

@@ -12,6 +12,9 @@ from hpcclear.ensemble.simulate import content_of
 from hpcclear.ranks.team import Ranks, Task
 from hpcclear.scene import Scene, load_scene
 
+TOGETHER = 8
+"""Responses in a batch where many are wanted and their memory is small."""
+
 
 def responses_of(
     scene: Scene,

@@ -10,7 +10,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.single import responses_of
+from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.identify.inputs import Inputs, design
 from hpcclear.identify.signals import (
     INSTANTS,
@@ -28,9 +28,6 @@ from hpcclear.scene.planar import turns_of
 
 CHUNK = 64
 """Members between two checkpoints."""
-
-TOGETHER = 8
-"""Members in a batch: integration costs little more than that of one member, but the time series fill the memory."""
 
 LEAST_REVOLUTIONS = 10
 """Revolutions that a member is averaged over at least: chaos takes some to be seen."""

@@ -16,7 +16,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
 from hpcclear.ensemble.simulate import sample_points
-from hpcclear.ensemble.single import responses_of
+from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
@@ -175,6 +175,7 @@ def _over_steps(
         (),
         run.ranks,
         f"{STAGE}: simulations",
+        together=TOGETHER,
     )
     parts = f.reshape(len(designs), -1)
     return [(*_moments(part[:-1, None]), float(part[-1])) for part in parts]
