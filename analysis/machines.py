@@ -135,7 +135,7 @@ def engine_answer(scene):
 
 def compressor_answer(scene):
     """Level of the force on the frame at 1 kHz against the clearance of both pins."""
-    yield ("clearance of both pins", "force level at 1 kHz, dB re 1 µN", "95 % CI")
+    yield ("clearance of both pins", "force level at 1 kHz (dB re 1 µN)", "95 % CI (dB)")
     for clearance in (None, 5e-5, 1e-4):
         changes = {f"joints.{one}.clearance": clearance for one in ("crank_rod", "rod_slider")}
         found = simulate(scene if clearance is None else scene.with_(changes))
