@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "hpcclear"
 JOBS = {
     f"hpcclear/cli/jobs/{path.relative_to(ROOT / 'jobs')}"
-    for kind in ("*.toml", "linkages/*.toml", "*.slurm", "until_done.sh")
+    for kind in ("*.toml", "linkages/*.toml", "machines/*.toml", "*.slurm", "until_done.sh")
     for path in (ROOT / "jobs").glob(kind)
 }
 """Scenes and scripts that `hpcclear init --jobs` writes."""

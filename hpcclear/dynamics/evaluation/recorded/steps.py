@@ -119,7 +119,7 @@ class Recording:
     beside : sequence of Scene
         Others with the same problem, which are recorded as well; without replicas, and all of them can turn.
     design : Points
-        Points of the first, recorded side by side; by default the scene itself. Replicas go with one alone.
+        Points of the first, recorded together; by default the scene itself. Replicas go with one alone.
     """
 
     def __init__(
