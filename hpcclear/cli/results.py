@@ -74,17 +74,21 @@ def export(
     if statistics:
         table = writing.statistics(files, place_of(output), beyond)
         _print_rows(table)
-    elif len(files) > 1 or beyond:
-        reason = "a table holds one result"
-        raise InputError(
-            "export", f"{len(files)} files", reason, "Add --statistics, or export each by itself"
-        )
     else:
+        _check_one(files, beyond)
         table = writing.export(files[0], place_of(output), units)
         for name in table.attrs["left_out"]:
             say(f"Note: {name} is left out: it has too many columns. It stands in {files[0]}")
     show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
     return Exit.DONE
+
+
+def _check_one(files: tuple[Path, ...], beyond: tuple[str, ...]) -> None:
+    if len(files) > 1 or beyond:
+        reason = "a table holds one result"
+        raise InputError(
+            "export", f"{len(files)} files", reason, "Add --statistics, or export each by itself"
+        )
 
 
 def _print_rows(frame: "DataFrame") -> None:

@@ -78,7 +78,7 @@ def begins(data: bytes) -> bool:
 
 
 def drawing_of(path: Path, unit: str) -> Drawing:
-    """Bodies and pins of a drawing."""
+    """Bodies and pins of a drawing; raises InputError where the file cannot be read in full."""
     key = str(path)
     header, entities = _read(path)
     unit = _UNITS.get(header, "") or unit

@@ -56,7 +56,7 @@ def begins(data: bytes) -> bool:
 
 
 def drawing_of(path: Path, unit: str) -> Drawing:
-    """Joints, links, sliders and the rotating input of a project."""
+    """Joints, links, sliders and the rotating input of a project; raises InputError where the file cannot be read in full."""
     key = str(path)
     try:
         text = unquote(path.read_text(encoding="utf-8-sig").strip())

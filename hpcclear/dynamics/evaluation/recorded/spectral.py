@@ -75,7 +75,7 @@ class Spectra:
         return found, periods
 
     def measured(self) -> dict[str, Array]:
-        """Order spectra and third-octave levels with the bands' middles, as a response has them."""
+        """Order spectra (orders,) or (orders, joints) and third-octave levels (bands,) or (bands, joints), with the bands' middles."""
         forces, periods = self._found()
         most = len(next(iter(forces.values()))[0])
         centres = spectra.band_centres(1.0 / periods.max(), most / periods.max())
