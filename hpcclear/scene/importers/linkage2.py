@@ -45,7 +45,7 @@ class _Connector:
 
 
 def drawing_of(path: Path, unit: str) -> Drawing:
-    """Pins, sliders on straight lines, anchors and rotating inputs of a document; raises InputError where the file cannot be read in full."""
+    """Pins, sliders, anchors and rotating inputs of a document; raises InputError where it cannot be read in full."""
     root = _root(path)
     program = root.find("program")
     shown = "Millimeters" if program is None else program.get("units", "Millimeters")
