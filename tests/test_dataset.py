@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.objectives import MEAN_GAP, ORDINALS
-from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status, failed
+from hpcclear.base.outcome import FIELDS, JOINTS, OUTCOME, Flag, Status, failed
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.results.provenance import provenance
@@ -35,8 +35,14 @@ def outcomes(n: int) -> np.ndarray:
     for name in OUTCOME.names:
         if OUTCOME[name].base.kind == "f":
             found[name] = rng.random(found[name].shape)
-        if found[name].ndim > 1:
+        per = FIELDS[name].per.split()
+        if "band" in per:  # the places of a recorded sample that no band or joint has are NaN
+            found[name][..., 2:] = np.nan
+            if "joint" in per:
+                found[name][:, len(JOINTS) :] = np.nan
+        elif found[name].ndim > 1:
             found[name][:, len(JOINTS) :] = 0
+    found["band"][:, :2] = 500.0, 1000.0
     found["sample"] = np.arange(n)
     found["rhs_evaluations"] = rng.integers(1, 2**40, n)
     found["objective_uncertainty"] = np.nan

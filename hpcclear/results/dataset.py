@@ -299,6 +299,8 @@ def records(samples: xr.Dataset) -> np.ndarray:
                 found[name] = nothing
             bands = samples.sizes.get("band", 0)
             _there(name, found[name], samples["joint"].to_numpy(), bands)[...] = values
+    heard = np.isfinite(found["contact_force_level"]).any(axis=(1, 2))
+    found["band"][~heard] = np.nan  # of failed samples
     return found
 
 

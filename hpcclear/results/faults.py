@@ -49,7 +49,11 @@ def _outcome_fault(content: xr.Dataset) -> str | None:
         return "a finished simulation has no objective"
     for name in NUMBERS:
         judged = name not in JUDGED or "regime" in content  # 0 where nobody looked
-        if judged and name in content and bool((~finished & content[name].notnull()).any()):
+        if (
+            judged
+            and name in content.data_vars
+            and bool((~finished & content[name].notnull()).any())
+        ):
             return f"a failed simulation has a number in {name}"
     if "sample" in content.coords:
         samples = content["sample"].to_numpy()
