@@ -100,7 +100,7 @@ run_setting() {
         container)
             above=/srv
             commands=(
-                "rm -rf /opt/image /opt/hpcclear; userdel -rf user; python3 -m venv /opt/image && PATH=/opt/image/bin:\$PATH &&
+                "rm -rf /opt/image /opt/hpcclear; /usr/sbin/userdel -rf user; python3 -m venv /opt/image && PATH=/opt/image/bin:/usr/sbin:\$PATH &&
                     cp -r . /opt/hpcclear && $(sed -n 's/^RUN //p' packaging/Dockerfile)"
                 "PATH=/opt/image/bin:\$PATH && cd \$(mktemp -d) && hpcclear --version && hpcclear init engine.toml &&
                     mpiexec -n 2 hpcclear check engine.toml --no-cost"
