@@ -75,7 +75,7 @@ class Spectra:
         return found, periods
 
     def measured(self) -> dict[str, Array]:
-        """Order spectra (orders,) and third-octave levels (bands,), of contacts with a column a joint; and the bands' middles."""
+        """Order spectra (orders,) and third-octave levels (bands,), of contacts with a column a joint, and middles of bands."""
         forces, periods = self._found()
         most = len(next(iter(forces.values()))[0])
         centres = spectra.band_centres(1.0 / periods.max(), most / periods.max())
