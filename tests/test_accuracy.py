@@ -371,7 +371,7 @@ def test_figures_and_tables(measured, tmp_path, capsys):
     describe(measured, {"accuracy": tmp_path})
     shown = capsys.readouterr().out
     for word in (
-        "Steady mean: bias",
+        "Steady mean: relative bias",
         "of one core",
         "tsitouras",
         "Kriging",

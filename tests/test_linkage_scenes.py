@@ -410,7 +410,7 @@ def test_what_is_on_is_named_all_of_it():
     """Of a slider-crank and of a linkage: a guide's friction and waves around a bearing as well."""
     press = load_scene(LINKAGES / "press.toml")
     waves = {"mechanism.joints.o3.out_of_round": {"bearing": {"cosine_2": 1e-6}}}
-    assert "friction of guide guide, coefficient 0.05" in press.effects_on()
+    assert "guide friction in guide, coefficient 0.05" in press.effects_on()
     assert "joint o3 out of round" not in press.effects_on()
     assert "joint o3 out of round" in press.with_(waves).effects_on()
 
