@@ -245,7 +245,8 @@ def error(rows: list[dict[str, Any]]) -> list[str]:
 def table_of(rows: list[dict[str, Any]]) -> str:
     """The tables of the page on `identify`, as Markdown."""
     found = [
-        "| unknowns | mechanism | right model | intervals hold | refused | model lacks an effect | refused | hold | neither |",
+        "| unknowns | mechanism | machines, right model | intervals hold | machines refused "
+        "| machines, model lacks an effect | refused | hold | neither refused nor hold |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for count in (1, 2):
@@ -253,7 +254,13 @@ def table_of(rows: list[dict[str, Any]]) -> str:
             own = [row for row in rows if row["group"][:2] == [name, count]]
             found.append(" | ".join([f"| {count}", name, *counted(own)]) + " |")
     found.append(" | ".join(["| all", "", *counted(rows)]) + " |")
-    found += ["", "| signal | unknowns | noise | machines | median error | median half-width |"]
+    found += [
+        "",
+        "Errors and half-widths in the next table are relative to the true clearance. Each row has other machines, so rows "
+        "differ not only in the noise:",
+        "",
+        "| signal | unknowns | noise | machines | median error | median half-width |",
+    ]
     found.append("| --- | --- | --- | --- | --- | --- |")
     for signal, count in ((SIGNALS[0], 1), (SIGNALS[0], 2), (SIGNALS[1], 1)):
         for noise in NOISE:

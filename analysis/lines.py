@@ -149,7 +149,7 @@ def package_of(path: str) -> str:
     parts = path.split("/")[:-1]
     if parts[:1] == ["dynamics"] and len(parts) > 1:
         parts[1] = MOVED.get(parts[1], parts[1])
-    return "/".join(parts[:2]) or "(itself)"
+    return "/".join(parts[:2]) or "(modules outside the packages)"
 
 
 def table(title: str, before: Counter[str], now: Counter[str], rest: str = "") -> list[str]:
@@ -169,12 +169,14 @@ def text() -> str:
     with tempfile.TemporaryDirectory() as place:
         before = lines_of(checkout(AIM_COMMIT, Path(place)))
     features = table("feature", by(before, feature_of), by(now, feature_of), "")
-    packages = table("package", by(before, package_of), by(now, package_of), "(itself)")
+    packages = table(
+        "package", by(before, package_of), by(now, package_of), "(modules outside the packages)"
+    )
     total, core = sum(now.values()), by(now, feature_of)[""]
     words = (
-        f"The package has {total} lines, docstrings included. The aim of commit {AIM_COMMIT} was {AIM}. "
-        f"The core has {core}, less than that; the features below have the other {total - core}, and are the reasons for "
-        f"the {total - AIM} above the aim."
+        f"The package has {total} lines, docstrings included. At commit {AIM_COMMIT} the aim was {AIM} lines. "
+        f"The core has {core} lines, fewer than the aim. The features below have the other {total - core} lines; "
+        f"they account for the {total - AIM} lines above the aim."
     )
     return "\n".join([words, "", *features, "", *packages])
 

@@ -34,6 +34,11 @@ def commands(block: Block) -> str:
     return ", ".join(f"`{name}`" for name in found)
 
 
+def duration(seconds: float) -> str:
+    """A duration in whole seconds."""
+    return f"{seconds:.0f} s" if seconds >= 0.5 else "below 0.5 s"
+
+
 def main() -> None:
     """Run the page, print a row a block as it is done, and write the table."""
     lines = PAGE.read_text(encoding="utf-8").split("\n")
@@ -57,9 +62,9 @@ def main() -> None:
             title = [x for x in lines[: block.line] if x.startswith("## ")][-1][3:].split(":")[0]
             seconds = spent() - before
             totals[title] = totals.get(title, 0.0) + seconds
-            rows.append(f"| {title} | {commands(block)} | {seconds:.0f} s |")
+            rows.append(f"| {title} | {commands(block)} | {duration(seconds)} |")
             print(rows[-1], flush=True)
-    rows += [f"| {title} | all | {seconds:.0f} s |" for title, seconds in totals.items()]
+    rows += [f"| {title} | all | {duration(seconds)} |" for title, seconds in totals.items()]
     text = PAGE.read_text(encoding="utf-8")
     head, rest = text.split(BEGIN)
     made = head + BEGIN + "\n" + "\n".join(rows) + "\n\n" + END + rest.split(END)[1]

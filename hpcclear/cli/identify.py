@@ -61,7 +61,8 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option(
     "--noise", type=Amount(min=0.0, min_open=True), metavar="SHARE",
-    help="Noise of a sample over the RMS of the signal. With it the scatter between revolutions is used too.",
+    help="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "
+         "revolutions is used too.",
 )  # fmt: skip
 @click.option(
     "--pressure", default="", metavar="COLUMN=AREA",

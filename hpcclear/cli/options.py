@@ -94,7 +94,7 @@ INTERVAL = click.option(
     default=5.0,
     show_default=True,
     metavar="SECONDS",
-    help="Save finished samples this often; a crash loses no more than this.",
+    help="Save finished samples this often; a crash loses about this much simulation time.",
 )
 POINTS = click.option(
     "--points",

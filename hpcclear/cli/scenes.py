@@ -181,7 +181,7 @@ def _draw(scene: "Scene", sketch: Path) -> None:
 def simulate(written: Written, output: Path) -> int:
     """Simulate one design: objective, and time series of bearing forces, torque, motion and energies.
 
-    Exit code 1 if the simulation failed, 4 if f did not reach numerics.target_error. The file is written all the same.
+    Exit code 1 if the simulation failed, 4 if f was not as accurate as numerics.target_error. The file is written all the same.
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
