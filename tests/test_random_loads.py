@@ -11,7 +11,7 @@ from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.mechanism import uncentred
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start
 
 GRAVITY = 9.81
 SORTS = ("spring", "stop", "cylinder", "drag", "follows", "time", "time force", "angle")
@@ -150,6 +150,10 @@ def test_random_loads_move_linkages_as_in_the_dense_model(seed):
     # where a free body starts does not depend on its mass centre
     start[:, order] = coordinates(trees, assemble(uncentred(mechanism)), mechanism)
     response = simulate(scene)
+    for body, pose in poses_at_start(scene).items():  # what `hpcclear check` and sketches say
+        now = response.sel(body=body).isel(time=0)
+        seen = [float(now[name]) for name in ("body_x", "body_y", "body_angle")]
+        assert seen == pytest.approx(pose, abs=1e-12)
     n, time = dense.n, response["time"].to_numpy()
     early = time[time <= 0.25 * time[-1]]
     y = solve_ivp(
