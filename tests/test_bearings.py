@@ -156,3 +156,13 @@ def test_means_of_impacts_are_the_same_at_any_number_of_instants():
         assert np.isnan(means[0]) == ("rrr" in name)  # three drives share the work
         force = found[1]["contact_force"].to_numpy()[bearings.averaged(found[1])]
         assert [one.mean for one in fine] == pytest.approx(list(force.mean(axis=0)), rel=0.05)
+
+
+@pytest.mark.parametrize(("lost", "warned"), [(-4e-4, True), (-1e-6, False), (4e-4, False)])
+def test_impacts_that_gain_energy_are_warned_of(lost, warned):
+    made = response()
+    made["impact_energy"] = ("joint", np.array([1e-3, lost]))
+    made["impact_energy_limit"] = ("joint", np.array([1e-5, 1e-5]))
+    found = [text for kind, text in bearings.remarks(made) if "gain energy" in text]
+    assert len(found) == warned
+    assert all("rod_slider" in text and "400 µJ" in text for text in found)

@@ -166,12 +166,26 @@ def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
     f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
         found.append(("Warning", sensitive_words(half_width / abs(f))))
+    found += [("Warning", text) for text in _gaining(response)]
     flags = int(response["flags"])
     warnings = flag_remarks(flags & sum(WARNED))
     notes = flag_remarks(flags & int(Flag.STIFF))
     return [
         *found, *(("Warning", text) for text in warnings), *(("Note", text) for text in notes)
     ]  # fmt: skip
+
+
+def _gaining(response: xr.Dataset) -> list[str]:
+    """A sentence for each joint whose impacts gain energy, beyond the half-width of what they lose."""
+    if "impact_energy" not in response:
+        return []
+    lost, reach = (response[name].to_numpy() for name in ("impact_energy", "impact_energy_limit"))
+    return [
+        f"the impacts in {joint} gain energy, {labels.quantity(-float(lost[k]), 'J')} in a revolution: "
+        "the contact law is not physical. Check the sign of its damping"
+        for k, joint in enumerate(map(str, response["joint"].to_numpy()))
+        if lost[k] + reach[k] < 0.0
+    ]
 
 
 def validity(response: xr.Dataset) -> str:
