@@ -172,7 +172,7 @@ def remarks(samples: xr.Dataset) -> list[str]:
     sensitive = half_width > bearings.SENSITIVE * np.abs(f)
     if "regime" not in samples and sensitive.any():
         worst = float(np.nanmax((half_width / np.abs(f))[sensitive]))
-        found.append((int(sensitive.sum()), bearings.sensitive_words(worst)))
+        found.append((int(sensitive.sum()), bearings.sensitive_words(worst, samples)))
     flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(f), int)
     counts = [(int((good & ((flags & flag) != 0)).sum()), flag) for flag in bearings.WARNED]
     found += [(count, bearings.REMARKS[flag]) for count, flag in counts if count]
