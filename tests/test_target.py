@@ -10,6 +10,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from hpcclear import simulate
+from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime
 from hpcclear.cli import cli
 from hpcclear.cli.response import describe_response
@@ -22,6 +23,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.api import evaluate
+from hpcclear.report.bearings import sensitive_words
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -244,3 +246,17 @@ def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys):
     describe_response(found, tmp_path / "a.nc")
     steady = re.search(r"f, steady mean +([0-9.]+)", capsys.readouterr().out)
     assert float(steady[1]) == pytest.approx(1e6 * float(found["objective"]), rel=0.1)
+
+
+@pytest.mark.parametrize("changes", [{"numerics.objective": "peak-contact-force"}, {"study": None}])
+def test_only_the_mean_gap_has_a_target_and_advice_for_peaks_names_revolutions(changes):
+    peak = load_scene(FILE.parent / "quickstart.toml").with_(
+        {"study.objective": "peak-contact-force"}
+    )
+    scene = BASE.with_(changes) if "study" not in changes else peak
+    with pytest.raises(InputError, match=r"mean gap .*peak-contact-force.*averaged_revolutions"):
+        scene.with_({"numerics.target_error": 0.01})
+    of_peak, of_gap = xr.Dataset(attrs={"objective": scene.objective.words}), xr.Dataset()
+    assert "numerics.averaged_revolutions" in sensitive_words(0.5, of_peak)
+    assert "target_error" not in sensitive_words(0.5, of_peak)
+    assert "numerics.target_error" in sensitive_words(0.5, of_gap)

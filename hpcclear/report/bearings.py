@@ -26,7 +26,7 @@ SENSITIVE = 0.01
 
 _SENSITIVE_WORDS = (
     "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is {:.0%} of f. "
-    "Set numerics.target_error for a mean with a confidence interval"
+    "{}"
 )
 
 REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
@@ -165,7 +165,7 @@ def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
     found = []
     f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
-        found.append(("Warning", sensitive_words(half_width / abs(f))))
+        found.append(("Warning", sensitive_words(half_width / abs(f), response)))
     found += [("Warning", text) for text in _gaining(response)]
     flags = int(response["flags"])
     warnings = flag_remarks(flags & sum(WARNED))
@@ -235,9 +235,16 @@ def degrees(one: Bearing) -> str:
     return f"{np.degrees(one.angle):.0f} deg" if known else "–"
 
 
-def sensitive_words(relative: float) -> str:
-    """Return the warning of a half-width of f that is so large, relative to f."""
-    return _SENSITIVE_WORDS.format(relative)
+def sensitive_words(relative: float, content: xr.Dataset) -> str:
+    """Return the warning of a half-width of f that is so large, relative to f, of a response or samples."""
+    return _SENSITIVE_WORDS.format(relative, remedy(content))
+
+
+def remedy(content: xr.Dataset) -> str:
+    """Return what makes the objective of a response or samples surer; only the mean gap has steady means."""
+    if "objective" in content.attrs:  # as files have of other objectives only
+        return "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
+    return "Set numerics.target_error for a mean with a confidence interval"
 
 
 def flag_remarks(flags: int) -> list[str]:
