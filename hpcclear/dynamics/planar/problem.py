@@ -11,12 +11,11 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, uncentred
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
-from hpcclear.dynamics.linkage.poses import placed
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar import bristles, swings
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
@@ -273,9 +272,9 @@ def scene_of(scene: Scene, points: Points, row: int) -> Scene:
 
 
 def put_together(mechanism: Mechanism) -> Assembly:
-    """`assemble` by the bodies' own axes, as samples start, its InputError below ``mechanism``."""
+    """`assemble`, its InputError below ``mechanism``."""
     try:
-        return assemble(uncentred(mechanism))
+        return assemble(mechanism)
     except InputError as error:
         raise InputError(
             f"mechanism.{error.key}", error.value, error.reason, error.remedy

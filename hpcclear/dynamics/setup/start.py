@@ -76,7 +76,7 @@ def _of_scene(scene: Scene) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=16)
 def _assembled(scene: Scene) -> Assembly:
-    return put_together(mechanism_of(scene.linkage))
+    return put_together(uncentred(mechanism_of(scene.linkage)))
 
 
 class Samples:
@@ -99,7 +99,7 @@ class Samples:
         self._single: dict[int, Assembly] = {}
         for row in np.flatnonzero(~self.closed).tolist():
             try:
-                self._single[row] = put_together(self.mechanism(row))
+                self._single[row] = put_together(uncentred(self.mechanism(row)))
                 self.closed[row] = True
             except InputError:
                 continue
