@@ -137,6 +137,7 @@ def compare(
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """
     from hpcclear.cli.printing import console, table
+    from hpcclear.report.compare import NOT_ALIGNED
     from hpcclear.report.compare import compare as compared
     from hpcclear.results import dataset
 
@@ -146,10 +147,12 @@ def compare(
     out = console()
     angular = found.axis == "angle"
     moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.6g} s"
+    picked = "as it stands" if found.aligned == NOT_ALIGNED else "the one that correlates best"
     rows = [
         ("measured points", str(len(found.x))),
         ("aligned", f"{found.aligned}, shifted by {moved}"),
         ("simulated revolutions", f"{found.revolutions} averaged ones, repeated periodically"),
+        ("first point", f"in revolution {found.revolution} of these, {picked}"),
     ]
     out.print(table("Comparison", rows))
     for one in found.quantities:
@@ -170,14 +173,16 @@ def _norms(one: "Quantity") -> list[tuple[str, str]]:
     def shown(name: str) -> str:
         return f"{norms[name] * unit.factor:+.4g} {unit.unit}"
 
+    least, most = (pick(one.by_revolution) * unit.factor for pick in (min, max))
     return [
         (
             "RMS error",
             f"{shown('rms').lstrip('+')}, {norms['relative_rms']:.3g} of the measured RMS",
         ),
+        ("RMS error by revolution", f"{least:.4g} to {most:.4g} {unit.unit}"),
         ("largest error", shown("largest").lstrip("+")),
         ("error of the mean", shown("mean")),
-        ("error of the peak", shown("peak")),
+        ("error of the peak", f"{shown('peak')} at the measured points"),
         ("correlation coefficient", f"{norms['correlation']:.4f}"),
     ]
 
