@@ -1,6 +1,8 @@
 """Tables of results: what they hold, and that other programs read from every format what was written."""
 
 import json
+import re
+from importlib import resources
 
 import numpy as np
 import pandas as pd
@@ -17,6 +19,8 @@ from hpcclear.report.export import FORMATS, export
 from hpcclear.report.tables import ROWS, to_table
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS
+from hpcclear.scene import load_scene
+from hpcclear.scene.loading import scene_of_text
 
 IDEAL = ['joints.crank_rod={kind="ideal"}', 'joints.rod_slider={kind="ideal"}', "effects.friction=none"]  # fmt: skip
 SHORT = ["numerics.transient_revolutions=0", "output.instants_per_revolution=60"]
@@ -222,3 +226,20 @@ def test_statistics_of_a_response_are_refused_with_how_to_make_samples(ideal, tm
     assert "need samples, and it holds a response. Make samples with hpcclear sample" in str(
         done.exception
     )
+
+
+def test_units_of_the_scene_file_are_kept_where_values_come_from_a_file(tmp_path):
+    starter = resources.files("hpcclear.cli").joinpath("compressor.toml").read_text()
+    curve = 'slider_load = { file = "load.csv" }\n'
+    scene = re.sub(r"^slider_load = \[\n.*?^\]\n", curve, starter, flags=re.S | re.M)
+    assert curve in scene
+    (tmp_path / "c.toml").write_text(scene)
+    (tmp_path / "load.csv").write_text("Crank angle [deg],Force [N]\n0,-900\n90,0\n270,-200\n")
+    text = load_scene(tmp_path / "c.toml", ["joints.crank_rod.fit=20 H7/g6"]).text
+    assert scene_of_text(text, "scene").joints.crank_rod.bearing_radius == pytest.approx(
+        0.01, rel=1e-2
+    )
+    made = data.samples(80, 1).assign_attrs(scene=text)
+    headings = list(to_table(made).columns)
+    assert "peak_contact_force crank_rod [N]" in headings
+    assert "mean_gap crank_rod [mm]" in headings

@@ -138,12 +138,12 @@ def _columns(lines: spread.Lines, units: Units) -> dict[str, list[Any]]:
     shown = [unit or si for (_, si), unit in rows.items()]
     columns: dict[str, list[Any]] = {"statistic": [label for label, _ in rows], "unit": shown}
     for name, own in lines.items():
-        for k, end in enumerate(("value", "lower", "upper")):
+        for k, end in enumerate(spread.Estimate._fields[:3]):
             cells = columns[f"{name} {end}"] = []
             for (label, si), unit in rows.items():
                 line = own.get(label)
                 same = line is not None and line.estimate.unit == si
-                number = line.estimate[k] if line is not None and same else math.nan
+                number = line.estimate.ends[k] if line is not None and same else math.nan
                 cells.append(number / float(factor(unit, si)) if unit else number)
     return columns
 

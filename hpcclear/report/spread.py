@@ -49,6 +49,11 @@ class Estimate(NamedTuple):
     unit: str = ""
 
     @property
+    def ends(self) -> tuple[float, float, float]:
+        """The value and the ends of its interval."""
+        return self.value, self.lower, self.upper
+
+    @property
     def known(self) -> bool:
         """Whether there is a number."""
         return bool(np.isfinite(self.value))

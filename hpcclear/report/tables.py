@@ -14,7 +14,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
-from hpcclear.scene.loading import parse
+from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.units import UnitError, factor
 
@@ -48,8 +48,6 @@ MOST_COLUMNS = 128
 
 SI = "SI"
 """Word for the units of the result file, in place of those of the scene."""
-
-_QUANTITY = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([^\d\s.].*)")
 
 
 def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
@@ -226,15 +224,12 @@ def _strings(text: str) -> dict[str, str]:
         content = dict(flatten(parse(text, "scene")))
     except InputError:
         return {}
-    overrides = (line[len("# set: ") :] for line in text.splitlines() if line.startswith("# set: "))
-    content |= dict(line.partition("=")[::2] for line in overrides)
-    found = {}
-    for path, value in content.items():
-        for k, one in enumerate(value if isinstance(value, list) else [value]):
-            match = _QUANTITY.fullmatch(one.strip(" \"'")) if isinstance(one, str) else None
-            if match:
-                found[f"{path}.{k}" if isinstance(value, list) else path.strip()] = match[1]
-    return found
+    notes = [line for line in text.splitlines() if line.startswith(("# set: ", AS_WRITTEN))]
+    for line in notes:
+        path, _, value = line.removeprefix("# set: ").removeprefix(AS_WRITTEN).partition("=")
+        content[path.strip()] = value
+    matches = {path: QUANTITY.fullmatch(one) for path, one in quantities(content.items()).items()}
+    return {path: match[1] for path, match in matches.items() if match is not None}
 
 
 def _words(variable: xr.DataArray) -> np.ndarray:
