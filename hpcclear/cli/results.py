@@ -24,7 +24,6 @@ from hpcclear.ranks.stopping import Exit
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
     from hpcclear.report.compare import Quantity
     from hpcclear.report.html.content import Content
@@ -45,7 +44,7 @@ UNITS = click.option(
 @UNITS
 @flag(
     "--statistics",
-    "Write statistics of samples with their intervals instead, a column for each file.",
+    "Write statistics of samples instead: for each file columns of value and interval.",
 )
 @click.option(
     "--beyond",
@@ -69,11 +68,14 @@ def export(
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
     from hpcclear.report import export as writing
+    from hpcclear.report.spread import rows_of, side_by_side
 
     writing.check_format(output)
     if statistics:
-        table = writing.statistics(files, place_of(output), beyond)
-        _print_rows(table)
+        samples = writing.read_samples(files)
+        lines = side_by_side(samples, beyond)
+        table = writing.statistics(samples, place_of(output), lines, units)
+        _print_rows(["statistic", *samples], rows_of(lines))
     else:
         _check_one(files, beyond)
         table = writing.export(files[0], place_of(output), units)
@@ -91,7 +93,7 @@ def _check_one(files: tuple[Path, ...], beyond: tuple[str, ...]) -> None:
         )
 
 
-def _print_rows(frame: "DataFrame") -> None:
+def _print_rows(headings: list[str], rows: list[list[str]]) -> None:
     """Print a table of texts, its columns as wide as the terminal allows."""
     from rich import box
     from rich.table import Table
@@ -99,10 +101,10 @@ def _print_rows(frame: "DataFrame") -> None:
     from hpcclear.cli.printing import console
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in frame.columns:
-        made.add_column(str(heading), overflow="fold")
-    for row in frame.itertuples(index=False):
-        made.add_row(*map(str, row))
+    for heading in headings:
+        made.add_column(heading, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
     console().print(made)
 
 
