@@ -75,7 +75,7 @@ def test_a_film_is_the_same_in_any_number_of_lanes(model: str):
     for width in (1, DEFAULT_LANES):
         out = np.zeros((count, n + RATES))
         address = problem.motion(problem.effects, width).address
-        observe(address, par, problem.tables, states, contacts, np.zeros(count), out, width)
+        observe(address, par, problem.tables, states, contacts, np.zeros((2, count)), out, width)
         found.append(out)
     assert np.isfinite(found[0][:, :n]).all()
     np.testing.assert_array_equal(*found)

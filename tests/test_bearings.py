@@ -1,6 +1,7 @@
 """What an engineer reads first: loads of the bearings, in the terminal and on the page alike."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,3 +120,49 @@ def test_pressure_is_force_over_projected_area_and_ideal_joints_are_left_out():
 def test_no_share_is_rounded_to_all_or_nothing(contact):
     shown = bearings.share(contact)
     assert (re.fullmatch(r"(0|100)%", shown) is not None) == (contact in (0.0, 1.0))
+
+
+def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(tmp_path, capsys):
+    made = response()
+    angle, force = made["crank_angle"].to_numpy().copy(), 0.39
+    made["driving_work"][:] = force * angle
+    made["crank_moment"][:] = np.where(np.arange(len(angle)) % 9 == 0, -814.0, 0.0)  # impacts
+    drive = bearings.torque(made)
+    assert (drive.peak, drive.mean) == (814.0, pytest.approx(force))
+    made["crank_angle"][:] = -angle  # clockwise, the same work
+    assert bearings.torque(made).mean == pytest.approx(-force)
+    made["crank_angle"][:] = angle
+    made["drive_phase"] = ("time", angle)
+    made.attrs["scene"] = Path("jobs/linkages/crank_rocker.toml").read_text(encoding="utf-8")
+    assert bearings.torque(made).mean == pytest.approx(force)
+    made["crank_angle"][:] = np.sin(angle)  # it swings
+    assert np.isnan(bearings.torque(made).mean)
+    describe_response(made, tmp_path / "a.nc")
+    assert "largest 814 N m, mean" not in capsys.readouterr().out
+
+
+def test_means_of_impacts_are_the_same_at_any_number_of_instants():
+    few = ["numerics.transient_revolutions=1", "numerics.averaged_revolutions=2"]
+    for name in ("jobs/linkages/crank_rocker.toml", "jobs/linkages/three_rrr.toml"):
+        found = [
+            simulate(load_scene(name, [*few, f"output.instants_per_revolution={count}"]))
+            for count in (40, 4000)
+        ]
+        rough, fine = (bearings.bearings(one) for one in found)
+        for one, other in zip(rough, fine, strict=True):
+            assert (one.mean, one.contact) == pytest.approx((other.mean, other.contact), rel=1e-6)
+        means = [bearings.torque(one).mean for one in found]
+        assert means[0] == pytest.approx(means[1], rel=1e-6, nan_ok=True)
+        assert np.isnan(means[0]) == ("rrr" in name)  # three drives share the work
+        force = found[1]["contact_force"].to_numpy()[bearings.averaged(found[1])]
+        assert [one.mean for one in fine] == pytest.approx(list(force.mean(axis=0)), rel=0.05)
+
+
+@pytest.mark.parametrize(("lost", "warned"), [(-4e-4, True), (-1e-6, False), (4e-4, False)])
+def test_impacts_that_gain_energy_are_warned_of(lost, warned):
+    made = response()
+    made["impact_energy"] = ("joint", np.array([1e-3, lost]))
+    made["impact_energy_limit"] = ("joint", np.array([1e-5, 1e-5]))
+    found = [text for kind, text in bearings.remarks(made) if "gain energy" in text]
+    assert len(found) == warned
+    assert all("rod_slider" in text and "400 µJ" in text for text in found)

@@ -78,7 +78,7 @@ def test_columns_are_the_derivatives(name: str):
         out = np.zeros((len(states), n + at.RATES))
         contacts = np.tile(rows[at.ACTIVE : at.ACTIVE + 2 * at.MAX_JOINTS, i], (len(states), 1))
         par, times = rows[mem.PAR : mem.NUMBERS, i].copy(), np.full(len(states), TIME)
-        observe(motion, par, problem.tables, states, contacts, times, out)
+        observe(motion, par, problem.tables, states, contacts, (times, np.zeros_like(times)), out)
         return out[:, :n]
 
     differentiate(problem, m)

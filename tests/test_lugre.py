@@ -275,7 +275,7 @@ def accelerations(scene: Scene, states: np.ndarray) -> np.ndarray:
     out = np.zeros((count, n + at.RATES))
     observe(
         problem.motion(problem.effects, 1).address, parameters(scene)[0], problem.tables,
-        whole.reshape(count, -1), np.zeros((count, 2 * at.MAX_JOINTS)), np.zeros(count), out,
+        whole.reshape(count, -1), np.zeros((count, 2 * at.MAX_JOINTS)), np.zeros((2, count)), out,
     )  # fmt: skip
     return out[:, first:n]
 

@@ -274,7 +274,8 @@ def seen_by_kernel(effects, par, q, v, contacts, t):
     out = np.zeros((1, len(q) + at.RATES))
     states = np.concatenate([q, v])[None]
     motion = problem.motion(problem.effects, 1).address
-    observe(motion, par, problem.tables, states, contacts[None], np.array([t]), out)
+    times = np.array([t]), np.zeros(1)
+    observe(motion, par, problem.tables, states, contacts[None], times, out)
     return out[0, : len(q)], out[0, len(q) :]
 
 

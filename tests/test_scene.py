@@ -688,7 +688,7 @@ def with_numerics(**entries: object) -> Scene:
     ],
 )
 def test_averages_to_a_standard_error_are_read_as_a_target_error(old, expected) -> None:
-    scene = with_numerics(**old)
+    scene = with_numerics(**old, objective="mean-gap")
     assert scene.numerics.target_error == expected
     assert "target_error" in scene.readings[0]
     again = load_scene(tomllib.loads(scene.to_toml()))
@@ -700,6 +700,8 @@ def test_averages_that_no_target_error_can_replace_take_all_revolutions_that_the
     old = {"averaged_revolutions": "auto", "objective_joints": '["crank_rod"]'}
     scene = with_numerics(**old, max_averaged_revolutions=70)
     assert (scene.numerics.target_error, scene.numerics.averaged_revolutions) == (None, 70)
+    peak = with_numerics(averaged_revolutions="auto", objective="peak-contact-force")
+    assert peak.numerics.target_error is None
 
 
 def test_entries_of_automatic_averages_alone_are_left_out_as_they_were_unused() -> None:

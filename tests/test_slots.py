@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dense_linkage import Contact, Dense
-from hpcclear.dynamics.problem import problem_of
 from scipy.integrate import solve_ivp
 from test_guides import CHI, GRAVITY, MU, RAMP
 from test_loads import machine
@@ -16,6 +15,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.compiled import module_text
 from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.dynamics.setup.problem import problem_of
 
 JOB = Path(__file__).parents[1] / "jobs" / "loose_slot.toml"
 MASS, INERTIA, RADIUS, CLEARANCE = 0.2, 2e-5, 0.01, 1e-3

@@ -22,8 +22,12 @@ def drawn(count=60, failed=0, method="monte-carlo", **more) -> xr.Dataset:
     return data.samples(count, failed or 1).assign_attrs(sampling=method, **more)
 
 
+def texts(lines):
+    return {line.label: line.text for line in lines}
+
+
 def text(lines, label):
-    return dict(lines)[label]
+    return texts(lines)[label]
 
 
 @pytest.mark.parametrize("level", [0.05, 0.5, 0.95, 0.99])
@@ -54,7 +58,7 @@ def test_quantiles_are_stated_only_where_the_samples_reach_them():
     assert text(few, "P95 of f") == "not stated: it needs 72 samples"
     assert text(few, "P99 of f") == "not stated: it needs 368 samples"
     assert "to" in text(many, "P99 of f")
-    assert "failed" in dict(few)
+    assert "failed" in texts(few)
     failing = spread.statistics(drawn(500, 60))  # these might all be above
     assert text(failing, "P95 of f") == "not stated: too many samples failed"
     assert text(failing, "failed").startswith("60 of 500")
@@ -73,7 +77,7 @@ def test_designs_that_somebody_chose_have_no_intervals():
     lines = spread.statistics(data.samples())
     assert text(lines, "intervals") == spread.CHOSEN
     assert not any(mark in line.text for line in lines for mark in ("±", " to "))
-    assert "P95 of f" not in dict(lines)
+    assert "P95 of f" not in texts(lines)
     assert spread.statistics(data.samples(4, 3)) == []
     assert text(spread.statistics(drawn(method="lhs")), "intervals") == spread.USUALLY_WIDER
 
@@ -83,13 +87,13 @@ def test_a_share_beyond_a_threshold_counts_failures_for_and_against():
     units = spread.units_of(MEAN_GAP)
     all_above = spread.beyond(units, "peak_contact_force=1 kN")
     none_above = spread.beyond(units, "peak_contact_force=1e6")
-    lines = dict(spread.statistics(samples, [all_above, none_above]))
+    lines = texts(spread.statistics(samples, [all_above, none_above]))
     least = float(re.search(r"\(([\d.]+) %", lines["peak contact force > 1 kN"])[1])
     most = float(re.search(r"to ([\d.]+) %", lines["peak contact force > 1 MN"])[1])
     assert least < 90.0
     assert most > 10.0
     absent = spread.Beyond("mean_contact_force", 1.0)
-    assert "not recorded" in dict(spread.statistics(samples, [absent]))["mean_contact_force"]
+    assert "not recorded" in text(spread.statistics(samples, [absent]), "mean_contact_force")
 
 
 @pytest.mark.parametrize(
@@ -143,3 +147,24 @@ def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
     assert "P99 of f" in page
     assert "f &gt; 0.5 mm" in page
     assert "5 of 500 samples: indentation" in page
+
+
+def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_path):
+    for name, failed in (("H7g6", 5), ("H7f7", 1)):
+        dataset.write(drawn(100, failed), tmp_path / f"{name}.nc")
+    dataset.write(data.timing(), tmp_path / "H7g6.timing.nc")
+    chosen = [tmp_path / f"{name}.nc" for name in ("H7f7", "H7g6")]
+    for page in (write_report(tmp_path), write_report(*chosen, output=tmp_path / "chosen.html")):
+        text = page.read_text()
+        heads = re.findall(r"<h2 [^>]*>([^<]*)</h2>", text)
+        assert heads[:2] == ["Comparison", "H7f7: statistics of the samples"]
+        assert "H7g6: statistics of the samples" in heads
+        assert "was left out" not in text
+        assert "nothing was sampled" not in text
+        table = re.search(r"<thead>.*?</tbody>", text, re.S)[0]
+        assert table.index("H7f7") < table.index("H7g6")
+        assert table.index("1 of 100") < table.index("5 of 100")
+        ids = re.findall(r'id="([^"]*)"', text)
+        assert len(ids) == len(set(ids))
+        assert len([one for one in ids if one.startswith("figure-")]) >= 2
+    assert text.count("The command that made these results") == 0  # run times were not chosen

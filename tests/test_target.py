@@ -1,5 +1,6 @@
 """A named error of f: met within limits that hold, or said to be missed or not to exist, whatever the motion does."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import xarray as xr
 from click.testing import CliRunner
 
 from hpcclear import simulate
+from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime
 from hpcclear.cli import cli
+from hpcclear.cli.response import describe_response
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady import procedure
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales, separation
@@ -20,6 +23,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.ensemble.api import evaluate
+from hpcclear.report.bearings import sensitive_words
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -222,3 +226,37 @@ def test_a_linkage_is_looked_at_too():
     found = evaluate_records(scene.with_(asked), NOTHING)[0]
     assert found["regime"] != Regime.UNJUDGED
     assert found["steady_revolutions"] >= 4
+
+
+ONE_JOINT = "mechanism.joints.o3={kind='revolute',journal='coupler.b',bearing='rocker.b'}"
+"""Leaves a crank-rocker one joint with clearance."""
+
+
+@pytest.mark.parametrize("gaps", [[3.0], [3.0, 4.0], [2.0, 3.0, 6.0]])
+def test_f_is_the_root_sum_of_squares_of_as_many_joints_as_there_are(gaps):
+    assert objective(np.array([gaps, gaps])) == pytest.approx([float(np.linalg.norm(gaps))] * 2)
+
+
+def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys):
+    settings = [ONE_JOINT, "numerics.target_error=0.5", "numerics.target_revolutions=100"]
+    scene = load_scene(FILE.parent / "linkages" / "crank_rocker.toml", settings)
+    found = simulate(scene)
+    assert found["mean_gap"].shape == (1,)
+    assert float(found["objective"]) == float(found["mean_gap"][0]) > 0.0
+    describe_response(found, tmp_path / "a.nc")
+    steady = re.search(r"f, steady mean +([0-9.]+)", capsys.readouterr().out)
+    assert float(steady[1]) == pytest.approx(1e6 * float(found["objective"]), rel=0.1)
+
+
+@pytest.mark.parametrize("changes", [{"numerics.objective": "peak-contact-force"}, {"study": None}])
+def test_only_the_mean_gap_has_a_target_and_advice_for_peaks_names_revolutions(changes):
+    peak = load_scene(FILE.parent / "quickstart.toml").with_(
+        {"study.objective": "peak-contact-force"}
+    )
+    scene = BASE.with_(changes) if "study" not in changes else peak
+    with pytest.raises(InputError, match=r"mean gap .*peak-contact-force.*averaged_revolutions"):
+        scene.with_({"numerics.target_error": 0.01})
+    of_peak, of_gap = xr.Dataset(attrs={"objective": scene.objective.words}), xr.Dataset()
+    assert "numerics.averaged_revolutions" in sensitive_words(0.5, of_peak)
+    assert "target_error" not in sensitive_words(0.5, of_peak)
+    assert "numerics.target_error" in sensitive_words(0.5, of_gap)

@@ -149,6 +149,14 @@ Bad = ContactLaw(words="", parameters=(Parameter("b", "s/m", default=0.5),), for
 """,
         "the contact force pulls",
     ),
+    "creates energy at a small damping": (
+        """
+def force(depth, rate, stiffness, b):
+    return stiffness * depth**1.5 * (1 - b * rate)
+Bad = ContactLaw(words="", parameters=(Parameter("b", "s/m", default=1e-4),), force=force)
+""",
+        "an impact gains energy",
+    ),
     "not finite": (
         """
 def force(depth, rate, stiffness, b):

@@ -83,8 +83,8 @@ def test_flat_loops_are_passed_with_their_energy(count, formulation):
         time = response["time"].to_numpy()
         assert time[-1] > 10.0  # s, the benchmark's
         found = response["crank_angle"].to_numpy()
-        # after eight turns, or fifty radians
-        assert np.abs(found - as_one_body(count, time)).max() < {1e-6: 1e-4, 1e-8: 1e-6}[rtol]
+        # after eight turns, or fifty radians; of eight starts 1e-10 rad/s apart errors are 2e-6 to 3.4e-4 and 2e-8 to 6.3e-7
+        assert np.abs(found - as_one_body(count, time)).max() < {1e-6: 1e-3, 1e-8: 2e-6}[rtol]
 
 
 def test_feedback_that_is_off_is_told():

@@ -201,6 +201,8 @@ def _half_widths(samples: xr.Dataset) -> str:
     good = (samples["status"] == Status.OK).to_numpy()
     shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
     if not np.isfinite(shares).any():
+        if "objective" in samples.attrs:
+            return f"{labels.NOT_CHECKED}; a response has one (hpcclear simulate)"
         return f"{labels.NOT_CHECKED}; set numerics.target_error to estimate it for each sample"
     return f"median {np.nanmedian(shares):.2%}, largest {np.nanmax(shares):.2%} of f"
 

@@ -82,8 +82,7 @@ def _rows(response: xr.Dataset, seconds: float | None) -> list[tuple[str, str]]:
     rows = []
     status = Status(int(response["status"]))
     if status.valid:
-        drive = bearings.torque(response)
-        shown = f"largest {quantity(drive.peak, 'N m')}, mean {quantity(drive.mean, 'N m')}"
+        shown = fitting(bearings.torque_words(bearings.torque(response)))
         rows += [(name, fitting(text)) for name, text in noise.frame(response)]
         rows += [("torque of the drive", shown), *_crank(response)]
         rows += [("peak between instants", text) for text in _between_instants(response)]

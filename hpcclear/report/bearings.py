@@ -26,7 +26,7 @@ SENSITIVE = 0.01
 
 _SENSITIVE_WORDS = (
     "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is {:.0%} of f. "
-    "Set numerics.target_error for a mean with a confidence interval"
+    "{}"
 )
 
 REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
@@ -45,7 +45,7 @@ class Bearing(NamedTuple):
     angle: float
     """Crank angle of that instant, rad, 0 to 2 pi."""
     mean: float
-    """Time mean of the contact force, N."""
+    """Time mean of the contact force, N; from the impulse that every step adds to, where the response has it."""
     pressure: float
     """Mean force over the projected area 2 R_B L, Pa; the scene gives L for a film or for wear."""
     peak_pressure: float
@@ -69,12 +69,12 @@ class Torque(NamedTuple):
     peak: float
     """Of its absolute value, at the stored instants."""
     mean: float
+    """Work of the drive over the angle that it turned; NaN where there are several drives, or one that swings."""
 
 
 def bearings(response: xr.Dataset) -> list[Bearing]:
     """Return the loads of each joint with clearance of a response (kind ``response``), in its order."""
     inside = averaged(response)
-    weight = _weights(response["time"].to_numpy()[inside])
     angles = response["crank_angle"].to_numpy()[inside]
     areas = _projected_areas(response)
     found = []
@@ -82,9 +82,8 @@ def bearings(response: xr.Dataset) -> list[Bearing]:
         if float(response["mean_gap"][k]) == float(response["peak_contact_force"][k]) == 0.0:
             continue  # an ideal joint of a slider-crank
         force = response["contact_force"].to_numpy()[inside, k]
-        touching = response["penetration"].to_numpy()[inside, k] > 0.0
         at = int(force.argmax()) if len(force) else 0
-        mean = float(weight @ force) if len(force) else np.nan
+        mean, touching = _means(response, k, inside)
         found.append(
             Bearing(
                 joint,
@@ -95,7 +94,7 @@ def bearings(response: xr.Dataset) -> list[Bearing]:
                 mean / areas.get(joint, np.nan),
                 _known(response, "peak_contact_pressure", k),
                 _known(response, "contact_half_angle", k),
-                float(weight @ touching) if len(force) else np.nan,
+                touching,
                 float(response["mean_gap"][k]),
             )
         )
@@ -107,10 +106,58 @@ def torque(response: xr.Dataset) -> Torque:
     inside = averaged(response)
     if not inside.any():
         return Torque(np.nan, np.nan)
-    moment = response["crank_moment"].to_numpy()[inside]
-    weight = _weights(response["time"].to_numpy()[inside])
-    peak, mean = float(np.abs(moment).max()), float(weight @ moment)
+    peak = float(np.abs(response["crank_moment"].to_numpy()[inside]).max())
+    # impacts fall between the stored instants of the torque; the work has each of them
+    work, angle = (
+        float(one[-1] - one[0])
+        for one in (response[name].to_numpy()[inside] for name in ("driving_work", "crank_angle"))
+    )
+    swings = abs(angle) < 0.5 * np.ptp(motion.phase(response)[inside])
+    if swings or angle == 0.0 or not _one_drive(response):
+        return Torque(peak, np.nan)
+    mean = work / angle
     return Torque(peak, mean if abs(mean) > ROUNDING * peak else 0.0)
+
+
+def torque_words(drive: Torque) -> str:
+    """Return the torque of the drive in words, without a mean that is not known."""
+    largest = f"largest {labels.quantity(drive.peak, 'N m')}"
+    known = np.isfinite(drive.mean)
+    return f"{largest}, mean {labels.quantity(drive.mean, 'N m')}" if known else largest
+
+
+def _means(response: xr.Dataset, k: int, inside: Booleans) -> tuple[float, float]:
+    """Time mean of the contact force of joint k, N, and its share of contact.
+
+    Of the integrals that every step adds to; where the response has none, of the stored instants.
+    """
+    if "contact_impulse" in response and "revolution" in response.sizes:
+        time, turned = (
+            one[inside] for one in (response["time"].to_numpy(), motion.phase(response))
+        )
+        period, cycle = (
+            float(np.ptp(one)) / response.sizes["revolution"] for one in (time, turned)
+        )
+        flown = float(response["contact_loss"][k]) / cycle
+        return float(response["contact_impulse"][k]) / period, min(max(1.0 - flown, 0.0), 1.0)
+    weight = _weights(response["time"].to_numpy()[inside])
+    if not len(weight):
+        return np.nan, np.nan
+    touching = response["penetration"].to_numpy()[inside, k] > 0.0
+    return float(weight @ response["contact_force"].to_numpy()[inside, k]), float(weight @ touching)
+
+
+def _one_drive(response: xr.Dataset) -> bool:
+    """Whether all work is that of a single drive; a slider-crank has no other."""
+    return "drive_phase" not in response or _drives_in(str(response.attrs.get("scene"))) == 1
+
+
+@lru_cache(maxsize=4)
+def _drives_in(text: str) -> int:
+    try:
+        return len(scene_of_text(text, "scene").linkage.drives)
+    except InputError:
+        return 0  # of another version
 
 
 def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
@@ -118,13 +165,27 @@ def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
     found = []
     f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
-        found.append(("Warning", sensitive_words(half_width / abs(f))))
+        found.append(("Warning", sensitive_words(half_width / abs(f), response)))
+    found += [("Warning", text) for text in _gaining(response)]
     flags = int(response["flags"])
     warnings = flag_remarks(flags & sum(WARNED))
     notes = flag_remarks(flags & int(Flag.STIFF))
     return [
         *found, *(("Warning", text) for text in warnings), *(("Note", text) for text in notes)
     ]  # fmt: skip
+
+
+def _gaining(response: xr.Dataset) -> list[str]:
+    """A sentence for each joint whose impacts gain energy, beyond the half-width of what they lose."""
+    if "impact_energy" not in response:
+        return []
+    lost, reach = (response[name].to_numpy() for name in ("impact_energy", "impact_energy_limit"))
+    return [
+        f"the impacts in {joint} gain energy, {labels.quantity(-float(lost[k]), 'J')} in a revolution: "
+        "the contact law is not physical. Check the sign of its damping"
+        for k, joint in enumerate(map(str, response["joint"].to_numpy()))
+        if lost[k] + reach[k] < 0.0
+    ]
 
 
 def validity(response: xr.Dataset) -> str:
@@ -174,9 +235,16 @@ def degrees(one: Bearing) -> str:
     return f"{np.degrees(one.angle):.0f} deg" if known else "–"
 
 
-def sensitive_words(relative: float) -> str:
-    """Return the warning of a half-width of f that is so large, relative to f."""
-    return _SENSITIVE_WORDS.format(relative)
+def sensitive_words(relative: float, content: xr.Dataset) -> str:
+    """Return the warning of a half-width of f that is so large, relative to f, of a response or samples."""
+    return _SENSITIVE_WORDS.format(relative, remedy(content))
+
+
+def remedy(content: xr.Dataset) -> str:
+    """Return what makes the objective of a response or samples surer; only the mean gap has steady means."""
+    if "objective" in content.attrs:  # as files have of other objectives only
+        return "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
+    return "Set numerics.target_error for a mean with a confidence interval"
 
 
 def flag_remarks(flags: int) -> list[str]:

@@ -38,11 +38,21 @@ USUALLY_WIDER = (
 CHOSEN = "none: the designs were chosen, not sampled at random"
 
 
+class Estimate(NamedTuple):
+    """A statistic with its confidence interval, in a unit of the result file; NaN where not stated."""
+
+    value: float = np.nan
+    lower: float = np.nan
+    upper: float = np.nan
+    unit: str = ""
+
+
 class Line(NamedTuple):
-    """One line: its subject and its text."""
+    """One line: its subject, its text, and the numbers of the text where there are some."""
 
     label: str
     text: str
+    estimate: Estimate = Estimate()
 
 
 class Beyond(NamedTuple):
@@ -112,20 +122,46 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
     lines += [
         Line(
             f"P{100 * level:.0f} of f" if level != 0.5 else "median of f",
-            _quantile(f, level, unit, drawn),
+            *_quantile(f, level, unit, drawn),
         )
         for level in (LEVELS if drawn else LEVELS[:1])
     ]
     for joint in samples["joint"].to_numpy() if drawn and "peak_contact_force" in samples else ():
         peak = samples["peak_contact_force"].sel(joint=joint).to_numpy()
         if np.nanmax(peak, initial=0.0) > 0.0:
-            lines.append(Line(f"P95 peak force, {joint}", _quantile(peak, 0.95, "N", drawn)))
+            lines.append(Line(f"P95 peak force, {joint}", *_quantile(peak, 0.95, "N", drawn)))
     lines += [_share(samples, one, drawn) for one in thresholds]
     if len(known) < len(f):
         left_out = f"{len(f) - len(known)} of {len(f)}, left out of mean and standard deviation"
         lines.append(Line("failed", left_out))
     how = (INDEPENDENT if method == "monte-carlo" else USUALLY_WIDER) if drawn else CHOSEN
     return [*lines, Line("intervals", how)]
+
+
+def side_by_side(
+    every: Mapping[str, xr.Dataset], thresholds: Sequence[str] = ()
+) -> dict[str, dict[str, Line]]:
+    """Return the lines of `statistics` of several samples: by the name of each, then by label.
+
+    Thresholds are those of users, as `beyond` reads them.
+    """
+    found = {}
+    for name, samples in every.items():
+        units = {str(key): row.attrs.get("units", "1") for key, row in samples.data_vars.items()}
+        levels = [beyond(units, words) for words in thresholds]
+        count = samples.sizes["sample"]
+        lines = [Line("samples", str(count), Estimate(count)), *statistics(samples, levels)]
+        found[name] = {line.label: line for line in lines}
+    return found
+
+
+def rows_of(found: Mapping[str, Mapping[str, Line]]) -> list[list[str]]:
+    """Return the texts of `side_by_side` in rows: a label, then a text of each samples, "" where one has no such line."""
+    names = dict.fromkeys(label for lines in found.values() for label in lines)
+    return [
+        [label, *(lines[label].text if label in lines else "" for lines in found.values())]
+        for label in names
+    ]
 
 
 def remarks(samples: xr.Dataset) -> list[str]:
@@ -136,7 +172,7 @@ def remarks(samples: xr.Dataset) -> list[str]:
     sensitive = half_width > bearings.SENSITIVE * np.abs(f)
     if "regime" not in samples and sensitive.any():
         worst = float(np.nanmax((half_width / np.abs(f))[sensitive]))
-        found.append((int(sensitive.sum()), bearings.sensitive_words(worst)))
+        found.append((int(sensitive.sum()), bearings.sensitive_words(worst, samples)))
     flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(f), int)
     counts = [(int((good & ((flags & flag) != 0)).sum()), flag) for flag in bearings.WARNED]
     found += [(count, bearings.REMARKS[flag]) for count, flag in counts if count]
@@ -155,30 +191,32 @@ def _moments(known: Array, unit: str, drawn: bool) -> list[Line]:
 
     mean, deviation = moments(known[:, None])  # each sample is a replicate
     if not drawn or not np.isfinite(mean.value):
-        plain = (known.mean(), known.std(ddof=1))
-        texts = [labels.quantity(float(value), unit) for value in plain]
+        plain = (float(known.mean()), float(known.std(ddof=1)))
+        found = [Estimate(value, unit=unit) for value in plain]
+        texts = [labels.quantity(value, unit) for value in plain]
         texts = [f"{t}, interval not stated: too few samples" for t in texts] if drawn else texts
     else:
-        reach = student(CONFIDENCE, mean.freedom)
-        texts = [
-            labels.with_half_width(one.value, reach * one.error, unit) for one in (mean, deviation)
-        ]
-    return [Line("mean of f", texts[0]), Line("std. deviation of f", texts[1])]
+        pairs = [(m.value, student(CONFIDENCE, mean.freedom) * m.error) for m in (mean, deviation)]
+        found = [Estimate(value, value - half, value + half, unit) for value, half in pairs]
+        texts = [labels.with_half_width(value, half, unit) for value, half in pairs]
+    names = ("mean of f", "std. deviation of f")
+    return [Line(*one) for one in zip(names, texts, found, strict=True)]
 
 
-def _quantile(values: Array, level: float, unit: str, drawn: bool) -> str:
+def _quantile(values: Array, level: float, unit: str, drawn: bool) -> tuple[str, Estimate]:
     """A quantile with its confidence interval by the order of the values; not stated where the samples do not reach so far."""
     known = values[np.isfinite(values)]
     value = float(np.quantile(known, level, method="hazen"))
     if not drawn:
-        return labels.quantity(value, unit)
+        return labels.quantity(value, unit), Estimate(value, unit=unit)
     failed = len(values) - len(known)
     low, high = order_interval(known, level, failed)
     if np.isfinite([low, high]).all():
-        return f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
+        text = f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
+        return text, Estimate(value, low, high, unit)
     if failed and len(values) >= fewest(level):
-        return "not stated: too many samples failed"
-    return f"not stated: it needs {fewest(level)} samples"
+        return "not stated: too many samples failed", Estimate()
+    return f"not stated: it needs {fewest(level)} samples", Estimate()
 
 
 def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
@@ -190,12 +228,13 @@ def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
     above = int((values > one.value).sum())
     name = "f" if one.name == "objective" else one.name.replace("_", " ")
     label = f"{name} > {labels.quantity(one.value, str(samples[one.name].attrs['units']))}"
-    text = f"{_percent(above / (total - failed))} of the samples" if total > failed else "–"
+    share, low, high = above / (total - failed) if total > failed else np.nan, np.nan, np.nan
+    text = f"{_percent(share)} of the samples" if total > failed else "–"
     if drawn and total > failed:
         low = float(share_interval(np.array([above]), total)[0][0])
         high = float(share_interval(np.array([above + failed]), total)[1][0])
         text = f"{text} ({_percent(low)} to {_percent(high)})"
-    return Line(label, text)
+    return Line(label, text, Estimate(100.0 * share, 100.0 * low, 100.0 * high, "%"))
 
 
 def _percent(share: float) -> str:

@@ -47,7 +47,7 @@ CONVENTIONS = "CF-1.11"
 # Building
 
 
-NOT_CHECKED = "not checked: no replicas were simulated (numerics.target_error)"
+NOT_CHECKED = "not checked: no replicas were simulated"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 

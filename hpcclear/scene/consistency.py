@@ -5,6 +5,7 @@ from typing import Any, Self
 
 from pydantic import field_validator, model_validator
 
+from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
 from hpcclear.scene.bending import check_scene
 from hpcclear.scene.fields import check_period, invalid, nearest
@@ -181,12 +182,23 @@ class ConsistentTables(SceneTables):
                 "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
                 key=key,
             )
-        if chosen and self.numerics.target_error is not None:
+        return self
+
+    @model_validator(mode="after")
+    def _target_is_of_the_mean_gap(self) -> Self:
+        if self.numerics.target_error is None or not self.clearance_joints():
+            return self
+        why = "the confidence interval of a steady mean exists for the mean gap of all joints only"
+        if self.numerics.objective_joints:
+            remedy = "Leave out the joints, or numerics.target_error"
+            raise invalid(why, remedy, key="numerics.objective_joints")
+        named = self.numerics.objective if self.study is None else self.study.objective
+        if named not in (None, MEAN_GAP.name):
             raise invalid(
-                "the confidence interval of a steady mean exists for the gaps of all joints only",
-                "Leave out the joints, or numerics.target_error",
-                key=key,
-            )
+                f"{why}, and the objective is {named}",
+                "Remove numerics.target_error, and raise numerics.averaged_revolutions",
+                "numerics.target_error", self.numerics.target_error,
+            )  # fmt: skip
         return self
 
     @model_validator(mode="after")

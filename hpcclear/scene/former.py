@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.units import UnitError, to_si
 
@@ -40,7 +41,9 @@ def _numerics(content: dict[str, Any], words: list[str]) -> None:
 
 def _of_automatic(content: Mapping[str, Any], numerics: Mapping[str, Any]) -> tuple[str, Any]:
     """Entry and value in place of an automatic average: two of its standard errors, or where none can be aimed at its cap."""
-    if "wear" in content or numerics.get("objective_joints"):
+    table = content.get("study", numerics)
+    named = table.get("objective") if isinstance(table, Mapping) else None
+    if "wear" in content or numerics.get("objective_joints") or named not in (None, MEAN_GAP.name):
         return "averaged_revolutions", numerics.get("max_averaged_revolutions", 200)
     entry = numerics.get("objective_tolerance", 1e-3)
     try:

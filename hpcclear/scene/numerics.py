@@ -37,9 +37,9 @@ class Numerics(Table):
     """Absolute tolerance on lengths, m; default rtol times 1 mm. Tolerances of other states are scaled in proportion
     ("Integration" in the theory page)."""
     target_error: Annotated[float, Quantity("", above=0, most=0.5)] | None = None
-    """Target for the relative error of the objective of responses and samples. f is then a steady mean with a 95 %
-    half-width; tolerance and revolutions are chosen automatically, instead of `rtol`, `transient_revolutions` and
-    `averaged_revolutions`."""
+    """Target for the relative error of the mean gap f of responses and samples; other objectives are refused. f is then a
+    steady mean with a 95 % half-width. Tolerance and revolutions are chosen automatically, instead of `rtol`,
+    `transient_revolutions` and `averaged_revolutions`."""
     target_revolutions: Annotated[int, Count(100, 10**12)] = 20_000
     """With `target_error`: largest number of revolutions of a design, all replicas together. If they do not suffice,
     the target is reported as missed."""

@@ -37,13 +37,16 @@ TYPICAL = {
 }
 """A joint of the paper's: what laws are tried on."""
 
-DEPTHS = np.logspace(-8, -4.5, 36)
+DEPTHS = np.logspace(-9, -3.5, 45)
 RATES = np.array([-10.0, -1.0, -0.1, -1e-3, 0.0, 1e-3, 0.1, 1.0, 10.0])
 IMPACT_SPEEDS = np.array([1e-3, 0.1, 1.0, 10.0])
 SPEEDS = np.concatenate([-np.logspace(2, -7, 40), [0.0], np.logspace(-7, 2, 40)])
 
 TOUCHING = 1e-6
 """Force at no depth, as a part of that at the largest depth tried, up to which it counts as none."""
+
+ROUNDING = 1e-9
+"""Relative, of a force at opposite rates that counts as the same."""
 
 SAME = 1e-4
 """Relative, of slopes by differences."""
@@ -234,6 +237,15 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
         raise LawError(
             f"the contact force pulls, F =  {force[pulls][0]:.3g} N, {where(pulls)}",
             "A contact under compression must not pull",
+        )
+    # what counts is the force that the kernel applies: it does not pull
+    applied = np.maximum(force, 0.0)
+    creates = (rate > 0.0) & (applied[:, ::-1] > (1.0 + ROUNDING) * applied)
+    if creates.any():
+        raise LawError(
+            "an impact gains energy: the force is larger while bodies part than while they approach, "
+            f"{where(creates)}",
+            "Damping must add to the force at positive rates: write (1 + b * rate), not (1 - b * rate)",
         )
     _check_stored(law, given, force[:, list(RATES).index(0.0)])
     nothing = {**given, **varying, "depth": 0.0 * depth[:1]}

@@ -8,8 +8,9 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, typical_length
-from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
+from hpcclear.dynamics.linkage.mechanism import Mechanism, straight, uncentred
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Slide, as_complex, split
 from hpcclear.dynamics.linkage.trees import forest
@@ -56,16 +57,57 @@ def _degrees(angle: float) -> str:
 def assemble(mechanism: Mechanism) -> Assembly:
     """Close all loops at time 0, journals centred or at their `start_eccentricity`, with the velocities of ideal joints.
 
+    The least change is that of the bodies' own axes (`uncentred`), so that mass centres move nothing.
+
     Raises
     ------
     InputError
         If a loop cannot close, a joint is held twice, or the mechanism stands in a dead centre: the joint is named.
     """
-    loops = Loops(mechanism, closed=True)
+    bare = uncentred(mechanism)
+    loops = Loops(bare, closed=True)
     q, steps = _closed(loops, rough_pose(loops)[:, None], _eccentricities(loops)[:, None])
     jacobian = loops.at(q, np.zeros_like(q), np.zeros(1)).jacobian[0]
     check_rank(loops, jacobian, _ideal(mechanism, loops), 0.0)
-    return Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0], steps)
+    made = Assembly(loops, q[:, 0], _velocities(loops, q)[:, 0], steps)
+    return made if bare.bodies == mechanism.bodies else _about_centres(made, mechanism)
+
+
+def _about_centres(made: Assembly, mechanism: Mechanism) -> Assembly:
+    """The same with mass centres where a mechanism has them."""
+    loops = Loops(mechanism, closed=True)
+    q, v = made.q.copy(), made.v.copy()
+    for k, one in enumerate(loops.forest.coordinates):
+        if one.kind in ("x", "y"):
+            center = mechanism.body(one.body).center
+            here, speed, _, _ = placed(made, f"{one.body}.{CENTER}", center)
+            q[k], v[k] = (here.real, speed.real) if one.kind == "x" else (here.imag, speed.imag)
+    return Assembly(loops, q, v, made.steps)
+
+
+def placed(
+    assembly: Assembly, place: str, at: tuple[Any, Any] | None = None
+) -> tuple[Any, Any, Any, Any]:
+    """Position and velocity (complex) of a place of an assembly, or of one `at` the body's own axes; angle and angular velocity
+    of its body."""
+    mechanism: Mechanism = assembly.loops.mechanism
+    name, point = split(place)
+    if name == GROUND:
+        return as_complex(mechanism.ground[point]), 0j, 0.0, 0.0
+    body, forest = mechanism.body(name), assembly.loops.forest
+    places = {**body.points, CENTER: body.center}
+    here = as_complex(places[point] if at is None else at)
+    hang = forest.hangs[name]
+    if hang.joint is not None:  # held on the ground
+        angle = forest.offsets[name]
+        at_rest = placed(assembly, hang.parent)[0]
+        own = as_complex(places[split(hang.own)[1]])
+        return at_rest + np.exp(1j * np.asarray(angle)) * (here - own), 0j, angle, 0.0
+    x, y, turns = (forest.index(kind, name) for kind in ("x", "y", "angle"))
+    q, v = assembly.q, assembly.v
+    angle, spin = (0.0, 0.0) if turns is None else (q[turns], v[turns])
+    turned = (here - as_complex(body.center)) * np.exp(1j * np.asarray(angle))
+    return q[x] + 1j * q[y] + turned, v[x] + 1j * v[y] + 1j * spin * turned, angle, spin
 
 
 def assemble_samples(

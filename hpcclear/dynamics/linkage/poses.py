@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.linkage.assembly import Assembly
+from hpcclear.dynamics.linkage.assembly import Assembly, placed
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import WORDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide, as_complex, split
+from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide
 from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -154,28 +154,3 @@ def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Any, Any]:
         (along.conjugate() * offset).real,
         (along.conjugate() * rate).real + (turned.conjugate() * offset).real,
     )
-
-
-def placed(
-    assembly: Assembly, place: str, at: tuple[Any, Any] | None = None
-) -> tuple[Any, Any, Any, Any]:
-    """Position and velocity (complex) of a place of an assembly, or of one `at` the body's own axes; angle and angular velocity
-    of its body."""
-    mechanism: Mechanism = assembly.loops.mechanism
-    name, point = split(place)
-    if name == GROUND:
-        return as_complex(mechanism.ground[point]), 0j, 0.0, 0.0
-    body, forest = mechanism.body(name), assembly.loops.forest
-    places = {**body.points, CENTER: body.center}
-    here = as_complex(places[point] if at is None else at)
-    hang = forest.hangs[name]
-    if hang.joint is not None:  # held on the ground
-        angle = forest.offsets[name]
-        at_rest = placed(assembly, hang.parent)[0]
-        own = as_complex(places[split(hang.own)[1]])
-        return at_rest + np.exp(1j * np.asarray(angle)) * (here - own), 0j, angle, 0.0
-    x, y, turns = (forest.index(kind, name) for kind in ("x", "y", "angle"))
-    q, v = assembly.q, assembly.v
-    angle, spin = (0.0, 0.0) if turns is None else (q[turns], v[turns])
-    turned = (here - as_complex(body.center)) * np.exp(1j * np.asarray(angle))
-    return q[x] + 1j * q[y] + turned, v[x] + 1j * v[y] + 1j * spin * turned, angle, spin

@@ -15,7 +15,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, placed
 from hpcclear.dynamics.linkage.generator import On, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import WORDS, Loops
@@ -23,7 +23,7 @@ from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Node, Passage, walked
-from hpcclear.dynamics.linkage.poses import Poses, coordinates, placed
+from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.table_drive import words_of
 

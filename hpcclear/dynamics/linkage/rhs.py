@@ -33,7 +33,8 @@ def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Any:
     behind it from row ``layout.WORK`` on.
 
     - It reads coordinates and velocities of the stage (n rows each from QS and VS on), STAGE_TIME (s since the start of the
-      revolution), of each joint with clearance its contact state (ACTIVE, INVERSE_IMPACT), and parameters.
+      revolution), BEGAN (when that was, s), of each joint with clearance its contact state (ACTIVE, INVERSE_IMPACT), and
+      parameters.
     - It writes accelerations (n rows from ACC on) and, from RATE_NOW on, each joint's gap, normal force and rate of the gap,
       and of the other rates those that are requested.
     - It may use CURVES. All other rows it leaves alone: no state of its own, nothing kept between calls.

@@ -9,10 +9,9 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.assembly import assemble, placed
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import split
-from hpcclear.dynamics.linkage.poses import placed
 from hpcclear.dynamics.linkage.prescribed import passed_through
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.turning import without_clearance

@@ -1,6 +1,7 @@
 """What a directory of results holds, by kind."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import xarray as xr
@@ -25,6 +26,8 @@ class Content:
     """What could not be read or does not belong together, a sentence each."""
     whole: bool = True
     """Whether this is all of a directory, not files that were chosen."""
+    samples: dict[str, dict[str, xr.Dataset]] = field(default_factory=dict)
+    """Where several samples are all that there is, each with its run times, by the name of its file; `files` has the first."""
 
     def get(self, kind: str) -> xr.Dataset | None:
         """The dataset of a kind, or None."""
@@ -45,6 +48,11 @@ class Content:
         every = [*self.files.values(), *self.responses.values()]
         return next((str(one.attrs[name]) for one in every if name in one.attrs), "")
 
+    def each_of_samples(self) -> Iterator[tuple[str, "Content"]]:
+        """The results with one of several samples at a time, by the name of its file."""
+        for name, files in self.samples.items():
+            yield name, replace(self, files=files, responses={}, samples={})
+
 
 def read(*places: str | Path) -> Content:
     """Read every result file of a directory and of its folder ``responses``, or the files that are named.
@@ -60,25 +68,39 @@ def read(*places: str | Path) -> Content:
     files: dict[str, xr.Dataset] = {}
     names: dict[str, str] = {}
     responses: dict[str, xr.Dataset] = {}
-    troubles = []
+    several: dict[str, dict[str, xr.Dataset]] = {}
+    troubles, others = [], []
     found = dataset.each_in(place) if whole else ((one, dataset.read(one)) for one in chosen)
     for path, one in found:
         if isinstance(one, InputError):
             troubles.append(f"{path.relative_to(place)} was left out: {one.reason}.")
             continue
         kind = "map" if SHAPE in one.attrs else str(one.attrs["hpcclear_kind"])
+        if kind in ("samples", "timing"):
+            own = several.setdefault(str(path.with_suffix("")).removesuffix(".timing"), {})
+            own[kind] = one
         if kind == "response":
             responses[str(one.attrs.get("design", path.stem))] = one
         elif kind == "timing" and kind in files:
             continue  # of another result beside the first
         elif kind in files and (not whole or path.stem != kind):
-            troubles.append(f"{path.name} was left out: {names[kind]} holds {kind} already.")
+            text = f"{path.name} was left out: {names[kind]} holds {kind} already."
+            (others if kind == "samples" else troubles).append(text)
         else:
             files[kind], names[kind] = one, path.name
+    stems = [Path(name).name for name in several]
+    samples = {
+        name if stems.count(Path(name).name) > 1 else Path(name).name: own
+        for name, own in several.items()
+        if "samples" in own
+    }
+    if len(samples) < 2 or not files.keys() <= {"samples", "timing"}:
+        samples, troubles = {}, [*troubles, *others]  # a study's own samples, or the only ones
     if not files and not responses:
         reason = "there is no result file in it"
         raise InputError("directory", str(place), reason, "Name the directory a run wrote to")
-    return Content(place, files, names, responses, (*troubles, *_strangers(files)), whole)
+    every = (*troubles, *_strangers(files))
+    return Content(place, files, names, responses, every, whole, samples)
 
 
 def _strangers(files: dict[str, xr.Dataset]) -> list[str]:

@@ -5,6 +5,7 @@ import functools
 import hashlib
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,9 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
 
     One that cannot be made or filled into its template is left out, and said in `troubles` and on the page.
     """
+    if content.samples:
+        yield from _several(content, troubles)
+        content = replace(content, files={})
     drawn = functools.partial(gallery.figures, troubles=troubles)
     makers: tuple[tuple[str, str, str, Callable[[Content], object]], ...] = (
         ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
@@ -132,12 +136,30 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         ("time", "Run time of the ranks", "parts.html", origin.timing),
     )
     for name, title, template, make in makers:
+        if content.samples and (name in _OF_SAMPLES or not content.responses):
+            continue
         # figures are limited one by one
         section = functools.partial(_section, name, title, template, make, content)
         made = section() if name == "figures" else attempt(f"“{title}”", section, troubles)
         if made is not None:
             yield made
     yield Section("missing", "Results not available", "list.html", _missing(content, troubles))
+
+
+_OF_SAMPLES = ("statistics", "summary", "trust")
+"""Sections on samples alone."""
+_EACH = (*_OF_SAMPLES, "figures", "effects", "reproduce")
+"""Sections that each of several samples has by itself."""
+
+
+def _several(content: Content, troubles: list[str]) -> Iterator[Section]:
+    """The comparison of several samples, then the sections of each, which name its file."""
+    yield _section("comparison", "Comparison", "parts.html", sections.compared, content)
+    for k, (name, one) in enumerate(content.each_of_samples(), 1):
+        for section in _sections(one, troubles):
+            if section.name in _EACH:
+                heading = f"{name}: {section.title[0].lower()}{section.title[1:]}"
+                yield replace(section, name=f"{section.name}-{k}", title=heading)
 
 
 _FOLDED = ("paper", "time")
@@ -161,7 +183,7 @@ def _section(
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    if not content.whole or (content.responses and not set(content.files) - {"timing"}):
+    if not content.whole or not set(content.files) - {"timing"}:
         return troubles or None
     for kind in ("accuracy", "wear", "effects", "map", "bifurcation", "identify"):
         if set(content.files) <= {kind, "timing"} and kind in content.files:

@@ -173,6 +173,15 @@ def statistics(content: Content) -> list[object] | None:
     return [*([table] if rows else []), *warnings] or None
 
 
+def compared(content: Content) -> list[object]:
+    """Statistics of several samples side by side, a column for each file."""
+    every = {name: own["samples"] for name, own in content.samples.items()}
+    rows = spread.rows_of(spread.side_by_side(every))
+    words = f"The files {', '.join(content.samples)} are compared here; a part on each follows."
+    caption = "Statistics of the samples, with 95 % confidence intervals"
+    return [words, Table(["quantity", *content.samples], rows, caption)]
+
+
 def _thresholds(samples: xr.Dataset) -> list[spread.Beyond]:
     """Values of f that the cases of the study keep below, or whose exceedance they make small."""
     try:

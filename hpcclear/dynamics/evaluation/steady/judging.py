@@ -29,8 +29,8 @@ DRIFT = 3.5
 
 def objective(gaps: Array) -> Array:
     """f (eq. 13), m, from mean gaps of all joints, m: shape (..., joints) to (...)."""
-    total: Array = np.hypot(gaps[..., 0], gaps[..., 1])
-    for k in range(2, gaps.shape[-1]):
+    total: Array = np.abs(gaps[..., 0])
+    for k in range(1, gaps.shape[-1]):
         total = np.hypot(total, gaps[..., k])  # by 0 it stays what it is, to the last bit
     return total
 
@@ -44,7 +44,7 @@ class Windows:
     length: int
     """Revolutions of the later window: about half of them, whole periods."""
     gaps: Array
-    """Shape (copies, 2): mean gaps over it."""
+    """Shape (copies, joints): mean gaps over it."""
     settling: float
     """How far the average may still move if it goes on as it did."""
     moved: float
@@ -67,12 +67,12 @@ def period_of(f: Array, tolerance: float) -> int | None:
 
 
 def windows(gaps: Array, tolerance: float) -> Windows:
-    """Judge mean gaps (revolutions, copies, 2 joints) of four revolutions or more; `tolerance` for a period, m."""
+    """Judge mean gaps (revolutions, copies, joints) of four revolutions or more; `tolerance` for a period, m."""
     period = period_of(objective(gaps), tolerance)
     whole = period or 1
     length = max(len(gaps) // 4 // whole, 1) * whole  # of a quarter
     quarters = [gaps[len(gaps) - (k + 1) * length : len(gaps) - k * length] for k in range(4)]
-    means = np.stack([quarter.mean(axis=0) for quarter in quarters[::-1]])  # (4, copies, 2)
+    means = np.stack([quarter.mean(axis=0) for quarter in quarters[::-1]])  # (4, copies, joints)
     steps = np.abs(np.diff(objective(means), axis=0)).max(axis=1)
     settling = remaining(float(steps[2]), float(steps[1]), believed=0.9)
     before, apart = np.ptp(objective(means[2:]), axis=1)
@@ -148,7 +148,7 @@ def variance_of_mean(groups: list[Array]) -> tuple[float, float]:
 
 
 def projected(gaps: Array) -> Array:
-    """Mean gaps, shape (..., 2), as numbers, shape (...), whose mean is the objective of the mean gaps, to first order."""
+    """Mean gaps, shape (..., joints), as numbers, shape (...), whose mean is the objective of the mean gaps, to first order."""
     mean = gaps.reshape(-1, gaps.shape[-1]).mean(axis=0)
     return gaps @ (mean / objective(mean))
 
