@@ -21,7 +21,7 @@ import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError, StorageError
-from hpcclear.base.outcome import OUTCOME, Status, failed, unknown
+from hpcclear.base.outcome import Status, failed, unknown
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
 from hpcclear.results.keys import check_key, key_attribute

@@ -169,7 +169,7 @@ def test_what_scatters_at_the_recommended_design_makes_all_of_its_scatter(done):
     assert float(own["contribution"]) == pytest.approx(1.0, abs=1e-3)
     assert float(own["halved"]) == pytest.approx(0.5, abs=1e-3)
     assert float(own["unexplained"]) == pytest.approx(0.0, abs=1e-9)
-    lines = dict(answer(done, "out"))
+    lines = {line.label: line.text for line in answer(done, "out")}
     assert re.search(
         r": C 100(\.0)?% ± ", lines["contributions"]
     )  # digits as the half-width supports
