@@ -5,7 +5,7 @@ import pytest
 from running import HUNT_CROSSLEY, LATCHED, scene_with
 
 from hpcclear.base.objectives import RATE, asked
-from hpcclear.base.outcome import ON_REQUEST, RESPONSES
+from hpcclear.base.outcome import LEVELS, ON_REQUEST, RESPONSES, WIDEST
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.response import simulate
@@ -116,8 +116,10 @@ def test_what_is_asked_for_is_in_the_file():
     }
     records = evaluate_records(asking(everything), NOTHING, lanes=1)
     content = dataset.samples_dataset((), np.empty((1, 0)), {}, records)
-    # no point is followed, and f has no rate of its own
-    asked_for = {name for name in ON_REQUEST if "point" not in name and name != RATE}
+    # no point is followed, no level asked for, f has no rate of its own, and the contact no pressure
+    left_out = {RATE, *LEVELS, *WIDEST}
+    asked_for = {name for name in ON_REQUEST if "point" not in name} - left_out
+    assert left_out.isdisjoint(content.data_vars)
     assert asked_for <= set(content.data_vars) <= set(KINDS["samples"].data)
     assert dataset.records(content).tobytes() == records.tobytes()
 

@@ -305,7 +305,8 @@ def test_the_command_and_the_page_say_when_and_why_lives_ended(written):
     told = " ".join(output.split())
     assert "4 at wear.limit.clearance" in told
     assert "4/4 service lives finished (100 %)" in told
-    assert "life in hours" in told
+    assert "service life, revolutions" in told
+    assert "service life, h" in told
     assert "120 µm" in told or "0.12 mm" in told
     page = write_report(folder / "results").read_text(encoding="utf-8")
     assert "Median service life: " in page

@@ -14,7 +14,7 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.statistics.streams.accumulator import Accumulator
-from hpcclear.statistics.streams.summary import BINS, LEAF, ROWS, Summary, summarise
+from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF, ROWS, Summary, summarise
 
 if TYPE_CHECKING:
     from hpcclear.ranks.schedule import Points, Worker
@@ -131,6 +131,9 @@ class Summariser:
     ) -> None:
         self._worker, self._points, self._edges = worker, points, edges
         self._on_block = on_block
+        self._waiting: list[
+            tuple[int, int, int]
+        ] = []  # number, first sample and length of parts not begun
         self._open: dict[int, np.ndarray] = {}  # records by part; sample -1: not here yet
         self._places: dict[int, tuple[int, int]] = {}  # first sample and length of each part
         self._missing: dict[int, int] = {}
@@ -138,23 +141,35 @@ class Summariser:
     @property
     def pending(self) -> int:
         """Parts not finished."""
-        return len(self._open)
+        return len(self._waiting) + len(self._open)
 
     @property
     def samples_in_hand(self) -> list[int]:
-        """Samples of open parts that have not finished, ascending."""
-        return sorted(
+        """Samples of parts in hand that have not finished, ascending."""
+        begun = (
             self._places[part][0] + k
             for part, records in self._open.items()
             for k in np.flatnonzero(records["sample"] < 0).tolist()
         )
+        waiting = (k for _, *place in self._waiting for k in self._samples(*place).tolist())
+        return sorted([*begun, *waiting])
+
+    def _samples(self, first: int, length: int) -> Integers:
+        return np.arange(first, min(first + length, len(self._points)))
 
     def submit(self, index: Integers, points: Array) -> None:
         """Queue parts: numbers (m,), rows of first sample and length (m, 2)."""
-        for part, (first, length) in zip(
-            index.tolist(), points.astype(np.int64).tolist(), strict=True
-        ):
-            samples = np.arange(first, min(first + length, len(self._points)))
+        places = points.astype(np.int64).tolist()
+        self._waiting += [
+            (part, *place) for part, place in zip(index.tolist(), places, strict=True)
+        ]
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin as many parts as fill a block: memory of records does not grow with the parts in hand."""
+        while self._waiting and self._worker.pending < BLOCK:
+            part, first, length = self._waiting.pop(0)
+            samples = self._samples(first, length)
             records = np.zeros(samples.size, OUTCOME)
             records["sample"] = -1
             self._open[part], self._places[part] = records, (first, length)
@@ -174,6 +189,7 @@ class Summariser:
                 self._missing[part] -= int(np.count_nonzero(mine))
                 if self._missing[part] == 0:
                     done.append(self._finish(part))
+            self._begin()
         return np.concatenate(done) if done else np.zeros(0, PARTIAL)
 
     def _finish(self, part: int) -> np.ndarray:

@@ -7,7 +7,7 @@ of a method of order 5.
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -186,12 +186,19 @@ def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=scene.objective)
 
 
+def respond_together(scenes: Sequence[Scene]):
+    """Those of a batch, each by what simulates one."""
+    for k, scene in enumerate(scenes):
+        yield k, single.simulate(scene, checked=False)
+
+
 def replace_dynamics(set_attribute: Callable[[object, str, object], None] = setattr) -> None:
     """Samples and responses by formula, and nothing is compiled."""
     set_attribute(simulate, "make_evaluator", make_formula)
     set_attribute(compiling, "compile_share", compile_nothing)
     set_attribute(responses, "simulate", respond)
     set_attribute(single, "simulate", respond)
+    set_attribute(single, "simulate_together", respond_together)
 
 
 def run_in_pieces(scene: Scene, directory: str, ranks: Ranks) -> int:
