@@ -17,7 +17,8 @@ from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.fields import CurveOf, MotionTable
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.measured import CURVES, MOTION
+from hpcclear.scene.loads import Law
+from hpcclear.scene.measured import BY_TIME, CURVES
 from hpcclear.scene.paths import PHYSICAL, _named, _parts
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.points import Points
@@ -56,12 +57,14 @@ def test_files_stand_wherever_a_table_stands():
                     if isinstance(one, CurveOf):
                         found[path] = one.unit
                     if isinstance(one, MotionTable):
-                        found[path] = "motion"
+                        found[path] = "rad"
+                    if isinstance(one, Law) and one.x == "s":
+                        found[path] = one.unit
                 walk(field.annotation, f"{path}.*" if _named(field) else path)
 
     for top, model in (*PHYSICAL.items(), ("mechanism", Planar)):
         walk(model, top)
-    assert found == {**CURVES, MOTION: "motion"}
+    assert found == {**CURVES, **BY_TIME}
 
 
 def pressure_file(folder, angles, law, name="p.csv"):
