@@ -121,3 +121,35 @@ def test_a_column_without_a_quantity_is_pointed_to_those_of_its_unit(response, t
         compare(response, path)
     assert "Use one of: crank_moment" in str(error.value)
     assert "--name COLUMN=QUANTITY" in str(error.value)
+
+
+def test_a_name_of_no_column_is_refused(response, tmp_path):
+    path = measured(response, tmp_path / "m.csv", "time [ms]")
+    for name in ("Moment", "contact_force crank_rodd"):
+        with pytest.raises(InputError, match=f"the table has no column '{name}'"):
+            compare(response, path, names={name: "crank_moment"})
+
+
+@pytest.mark.parametrize("axis", ["time [ms]", "crank_angle [deg]"])
+def test_the_revolution_that_was_picked_is_told_with_the_errors_of_all(response, tmp_path, axis):
+    made = response.copy(deep=True)
+    turn = made["crank_angle"].to_numpy() / (2.0 * np.pi)
+    wave = 100.0 * np.sin(2.0 * np.pi * turn)  # in each revolution more of it
+    made["contact_force"][:] += (np.floor(turn + 1e-9) * wave)[:, None]
+    shown = made.isel(time=slice(401, 590, 3))  # of the third
+    across = 1e3 * shown["time"] if axis.startswith("time") else 360.0 * (turn[401:590:3] % 1.0)
+    force = shown["contact_force"].sel(joint="crank_rod").to_numpy()
+    path = table(
+        tmp_path / "m.csv", {axis: np.asarray(across), "contact_force crank_rod [N]": force}
+    )
+    found = compare(made, path, "angle" if axis.startswith("crank") else "none")
+    (one,) = found.quantities
+    if axis.startswith("crank"):
+        assert len(one.by_revolution) == found.revolutions == 4
+        assert found.revolution == 3
+        off = np.sqrt(np.mean(wave[401:590:3] ** 2))
+        assert one.by_revolution == pytest.approx(off * np.array([2, 1, 0, 1]), abs=1e-6)
+    peak = float(one.series.max())
+    assert peak >= float(one.simulated.max())
+    assert len(one.series) == len(found.series_x) > 2.5 * len(found.x)
+    assert np.interp(found.x, found.series_x, one.series) == pytest.approx(one.simulated, abs=1.0)

@@ -1,6 +1,8 @@
 """Tables of results: what they hold, and that other programs read from every format what was written."""
 
 import json
+import re
+from importlib import resources
 
 import numpy as np
 import pandas as pd
@@ -13,11 +15,12 @@ from scipy.io import loadmat
 import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
-from hpcclear.report import spread
 from hpcclear.report.export import FORMATS, export
 from hpcclear.report.tables import ROWS, to_table
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS
+from hpcclear.scene import load_scene
+from hpcclear.scene.loading import scene_of_text
 
 IDEAL = ['joints.crank_rod={kind="ideal"}', 'joints.rod_slider={kind="ideal"}', "effects.friction=none"]  # fmt: skip
 SHORT = ["numerics.transient_revolutions=0", "output.instants_per_revolution=60"]
@@ -187,14 +190,56 @@ def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
     words = ["--statistics", "--beyond", "0.3 mm", "-o", str(tmp_path / "fits.xlsx")]
     done = CliRunner().invoke(cli, ["export", *files, *words])
     assert done.exit_code == 0, done.output
-    table = pd.read_excel(tmp_path / "fits.xlsx", index_col=0)
-    assert list(table.columns) == ["H7f7", "H7g6"]
-    assert table.loc["samples"].tolist() == ["200", "200"]
-    assert table.loc["failed", "H7f7"].startswith("3 of 200")
-    assert table.loc["failed", "H7g6"].startswith("1 of 200")
-    for name in table.columns:
-        lines = dict(spread.statistics(dataset.read(tmp_path / f"{name}.nc")))
-        assert lines.items() <= table[name].to_dict().items()
-        assert "of the samples (" in table.loc["f > 0.3 mm", name]
+    assert "3 of 200" in done.output
+    sheets = pd.read_excel(tmp_path / "fits.xlsx", sheet_name=None)
+    assert list(sheets) == ["data", "about"]
+    assert str(tmp_path / "H7f7.nc") in sheets["about"]["value"].tolist()
+    table = sheets["data"].set_index("statistic")
+    ends = [f"{name} {end}" for name in ("H7f7", "H7g6") for end in ("value", "lower", "upper")]
+    assert list(table.columns) == ["unit", *ends]
+    assert all(table[end].dtype.kind == "f" for end in ends)
+    assert table.loc["samples", "H7f7 value"] == 200
+    assert table.loc["f > 0.3 mm", "unit"] == "%"
+    for name in ("H7f7", "H7g6"):
+        mean, lower, upper = table.loc[
+            "mean of f", [f"{name} {e}" for e in ("value", "lower", "upper")]
+        ]
+        known = dataset.read(tmp_path / f"{name}.nc")["objective"]
+        per = {"m": 1.0, "mm": 1e3, "um": 1e6}[table.loc["mean of f", "unit"]]
+        assert mean == pytest.approx(per * float(known.mean()))
+        assert lower < mean < upper
+    micro = [*words[:-1], str(tmp_path / "um.csv"), "--unit", "um"]
+    assert CliRunner().invoke(cli, ["export", *files, *micro]).exit_code == 0
+    again = pd.read_csv(tmp_path / "um.csv").set_index("statistic")
+    assert again.loc["mean of f", "unit"] == "um"
+    assert again.loc["mean of f", "H7f7 value"] == pytest.approx(
+        1e6 / per * table.loc["mean of f", "H7f7 value"]
+    )
     refused = CliRunner().invoke(cli, ["export", *files, "-o", str(tmp_path / "all.csv")])
     assert "Add --statistics" in str(refused.exception)
+
+
+def test_statistics_of_a_response_are_refused_with_how_to_make_samples(ideal, tmp_path):
+    dataset.write(ideal, tmp_path / "one.nc")
+    words = [str(tmp_path / "one.nc"), "--statistics", "-o", str(tmp_path / "x.csv")]
+    done = CliRunner().invoke(cli, ["export", *words])
+    assert "need samples, and it holds a response. Make samples with hpcclear sample" in str(
+        done.exception
+    )
+
+
+def test_units_of_the_scene_file_are_kept_where_values_come_from_a_file(tmp_path):
+    starter = resources.files("hpcclear.cli").joinpath("compressor.toml").read_text()
+    curve = 'slider_load = { file = "load.csv" }\n'
+    scene = re.sub(r"^slider_load = \[\n.*?^\]\n", curve, starter, flags=re.S | re.M)
+    assert curve in scene
+    (tmp_path / "c.toml").write_text(scene)
+    (tmp_path / "load.csv").write_text("Crank angle [deg],Force [N]\n0,-900\n90,0\n270,-200\n")
+    text = load_scene(tmp_path / "c.toml", ["joints.crank_rod.fit=20 H7/g6"]).text
+    assert scene_of_text(text, "scene").joints.crank_rod.bearing_radius == pytest.approx(
+        0.01, rel=1e-2
+    )
+    made = data.samples(80, 1).assign_attrs(scene=text)
+    headings = list(to_table(made).columns)
+    assert "peak_contact_force crank_rod [N]" in headings
+    assert "mean_gap crank_rod [mm]" in headings

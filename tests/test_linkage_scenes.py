@@ -435,6 +435,8 @@ def test_a_row_like_another_takes_over_what_its_tables_do_not_say():
 def test_the_angle_of_a_body_that_is_held_is_told():
     """By the joint that holds it: it has no coordinate of its own."""
     examples = LINKAGES.parents[1] / "docs" / "mkdocs" / "examples"
-    told = put_together(mechanism_of(load_scene(examples / "linkage.toml").linkage)).report()
+    scene = load_scene(examples / "linkage.toml")
+    assert math.degrees(poses_at_start(scene)["frame"][2]) == pytest.approx(90.0)
+    told = put_together(mechanism_of(scene.linkage)).report()
     assert "frame: 90 deg (start_angle 0 deg)" in told
     assert "crank: 25 deg (start_angle 25 deg)" in told

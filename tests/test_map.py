@@ -17,6 +17,7 @@ from hpcclear.dynamics.evaluation.steady.mapping import mapped
 from hpcclear.ensemble.api import as_points
 from hpcclear.ensemble.maps import SHAPE, axis, cells
 from hpcclear.scene import load_scene
+from hpcclear.scene.units import noting
 
 FILE = Path(__file__).parent.parent / "jobs" / "hunt_crossley.toml"
 BASE = load_scene(FILE)
@@ -143,3 +144,15 @@ def test_ranks_and_a_kill_change_no_byte(tmp_path):
     code, output = run(words(out, *grids), 2)
     assert code == 0, output
     assert out.read_bytes() == files[0]
+
+
+def test_a_plain_speed_on_an_axis_is_told_in_rpm_and_an_unknown_path_has_those_alike_first():
+    scene, noted = load_scene("jobs/hunt_crossley.toml"), []
+    with noting(lambda text, read: noted.append(f"{text}: {read}")):
+        axis(scene, "drive.speed=200:800:3")
+        axis(scene, "drive.speed=200 rpm:800 rpm:3")
+        axis(scene, "joints.crank_rod.clearance=1e-4:2e-4:3")
+    assert [one for one in noted if "1909.9 rpm" in one or "7639.4 rpm" in one] == noted
+    assert len(noted) == 2
+    with pytest.raises(InputError, match=r"Use one of: joints\.crank_rod\.clearance"):
+        axis(scene, "clearance=1e-4:2e-4:3")

@@ -155,3 +155,17 @@ def test_spellings_do_not_contradict_each_other():
     assert not SPELLINGS.keys() & UNITS.keys()
     assert not REFUSED.keys() & (UNITS.keys() | SPELLINGS.keys())
     assert set(SPELLINGS.values()) <= UNITS.keys()
+
+
+@pytest.mark.parametrize("unit", ["N/mm^1.4", "N/mm^(7/5)", "N/mm**1.4", "N*mm^-1.4", "kN/m^1.4"])
+def test_powers_may_be_fractions(unit):
+    scale = 1e3 if unit.startswith("k") else 10.0**4.2
+    assert to_si(f"3 {unit}", "N/m^1.4") == pytest.approx(3.0 * scale, rel=1e-14)
+    with pytest.raises(UnitError):
+        to_si(f"3 {unit}", "N/m^1.5")
+
+
+def test_a_fraction_that_gives_a_whole_power_is_exact():
+    assert to_si("0.3 mm^1.0", "m") == to_si("0.3 mm", "m")
+    assert to_si("3 mm^(4/2)", "m^2") == to_si("3 mm^2", "m^2")
+    assert to_si("7 cm^1.5", "m^1.5") == 7e-3

@@ -472,3 +472,14 @@ def test_parts_of_helpers_and_of_other_modules_become_constant_too():
     at = {"depth": np.array([1e-6, 3e-6]), "rate": 0.2}
     before, after = (force_of(one, {**sample_numbers(one, given), **at}) for one in (law, made))
     np.testing.assert_allclose(after, before, rtol=1e-14)
+
+
+def test_a_parameter_of_a_fractional_unit_takes_text_in_others(tmp_path):
+    law = """
+def force(depth, rate, k, chi):
+    return k * depth**1.4 * (1 + chi * rate)
+Own = ContactLaw(words="", parameters=(Parameter("k", "N/m^1.4"), Parameter("chi", "s/m")), force=force)
+"""
+    (tmp_path / "own.py").write_text(HEAD + law, encoding="utf-8")
+    path = file_with(tmp_path, {"law": "own:Own", "k": "3e4 N/mm^(7/5)", "chi": 0.1})
+    assert load_scene(path).effects.contact.value("k") == pytest.approx(3e4 * 10.0**4.2, rel=1e-14)

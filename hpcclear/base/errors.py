@@ -64,6 +64,12 @@ class InputError(ValueError):
         return plain(_BOXED.sub(r"\1\2", f"{self.key} = {shown}: {self.reason}. {self.remedy}"))
 
 
+def _alike(word: str, one: str) -> float:
+    """How alike a word is to a dotted path, which is more alike where the word, or its last part, is a part of it."""
+    shared = (word.rpartition(".")[2] in one.split(".")) + (word in one)
+    return shared + difflib.SequenceMatcher(None, word[:80], one).ratio()
+
+
 def nearest(word: str, words: Sequence[str]) -> str:
     """A sentence that points to the nearest of `words`, or lists them."""
     close = difflib.get_close_matches(word[:80], words, n=3, cutoff=0.6)
@@ -75,6 +81,8 @@ def nearest(word: str, words: Sequence[str]) -> str:
     if not words:
         return "Remove it"
     more = len(words) - MOST_LISTED
+    if more > 0:  # of a list that is cut, what is alike stands first
+        words = sorted(words, key=lambda one: -_alike(word, one))
     return "Use one of: " + ", ".join(words[:MOST_LISTED]) + (f" ({more} more)" if more > 0 else "")
 
 

@@ -96,7 +96,8 @@ def sample(
 
         chosen = None if part is None else Part.parse(part)
         scene, place = written.scene(), place_of(output)
-        levels = [beyond(units_of(scene.objective), words) for words in thresholds]
+        units, joints = units_of(scene.objective), scene.joint_labels
+        levels = [beyond(units, words, joints) for words in thresholds]
         if statistics:
             kept = None if raw is None else place_of(raw)
             describe_statistics(

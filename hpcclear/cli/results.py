@@ -24,7 +24,6 @@ from hpcclear.ranks.stopping import Exit
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
     from hpcclear.report.compare import Quantity
     from hpcclear.report.html.content import Content
@@ -45,7 +44,7 @@ UNITS = click.option(
 @UNITS
 @flag(
     "--statistics",
-    "Write statistics of samples with their intervals instead, a column for each file.",
+    "Write statistics of samples instead: for each file columns of value and interval.",
 )
 @click.option(
     "--beyond",
@@ -69,11 +68,14 @@ def export(
     Example: hpcclear export results/samples.nc -o results/samples.xlsx
     """
     from hpcclear.report import export as writing
+    from hpcclear.report.spread import rows_of, side_by_side
 
     writing.check_format(output)
     if statistics:
-        table = writing.statistics(files, place_of(output), beyond)
-        _print_rows(table)
+        samples = writing.read_samples(files)
+        lines = side_by_side(samples, beyond)
+        table = writing.statistics(samples, place_of(output), lines, units)
+        _print_rows(["statistic", *samples], rows_of(lines))
     else:
         _check_one(files, beyond)
         table = writing.export(files[0], place_of(output), units)
@@ -91,7 +93,7 @@ def _check_one(files: tuple[Path, ...], beyond: tuple[str, ...]) -> None:
         )
 
 
-def _print_rows(frame: "DataFrame") -> None:
+def _print_rows(headings: list[str], rows: list[list[str]]) -> None:
     """Print a table of texts, its columns as wide as the terminal allows."""
     from rich import box
     from rich.table import Table
@@ -99,10 +101,10 @@ def _print_rows(frame: "DataFrame") -> None:
     from hpcclear.cli.printing import console
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in frame.columns:
-        made.add_column(str(heading), overflow="fold")
-    for row in frame.itertuples(index=False):
-        made.add_row(*map(str, row))
+    for heading in headings:
+        made.add_column(heading, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
     console().print(made)
 
 
@@ -137,6 +139,7 @@ def compare(
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """
     from hpcclear.cli.printing import console, table
+    from hpcclear.report.compare import NOT_ALIGNED
     from hpcclear.report.compare import compare as compared
     from hpcclear.results import dataset
 
@@ -146,10 +149,12 @@ def compare(
     out = console()
     angular = found.axis == "angle"
     moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.6g} s"
+    picked = "as it stands" if found.aligned == NOT_ALIGNED else "the one that correlates best"
     rows = [
         ("measured points", str(len(found.x))),
         ("aligned", f"{found.aligned}, shifted by {moved}"),
         ("simulated revolutions", f"{found.revolutions} averaged ones, repeated periodically"),
+        ("first point", f"in revolution {found.revolution} of these, {picked}"),
     ]
     out.print(table("Comparison", rows))
     for one in found.quantities:
@@ -170,14 +175,16 @@ def _norms(one: "Quantity") -> list[tuple[str, str]]:
     def shown(name: str) -> str:
         return f"{norms[name] * unit.factor:+.4g} {unit.unit}"
 
+    least, most = (pick(one.by_revolution) * unit.factor for pick in (min, max))
     return [
         (
             "RMS error",
             f"{shown('rms').lstrip('+')}, {norms['relative_rms']:.3g} of the measured RMS",
         ),
+        ("RMS error by revolution", f"{least:.4g} to {most:.4g} {unit.unit}"),
         ("largest error", shown("largest").lstrip("+")),
         ("error of the mean", shown("mean")),
-        ("error of the peak", shown("peak")),
+        ("error of the peak", f"{shown('peak')} at the measured points"),
         ("correlation coefficient", f"{norms['correlation']:.4f}"),
     ]
 

@@ -18,7 +18,7 @@ from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, check_points
-from hpcclear.scene.units import UnitError, to_si
+from hpcclear.scene.units import UnitError, note, to_si
 
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
 
@@ -58,9 +58,15 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
 def _number(words: str, unit: str) -> float:
     """A limit: a plain number in SI, or one with a unit."""
     try:
-        return float(words)
+        value = float(words)
     except ValueError:
         return to_si(words.strip().strip('"'), unit)
+    if unit == "rad/s":  # a slip for rpm is a factor of ten
+        note(
+            words,
+            f"{value:g} rad/s, {value * 30.0 / np.pi:.5g} rpm; if rpm are meant, write {value:g} rpm",
+        )
+    return value
 
 
 def number_of(key: str, words: str, unit: str) -> float:

@@ -22,6 +22,8 @@ Alignment = Literal["auto", "angle", "correlation", "none"]
 SHIFTS = 720
 """Shifts of a revolution that are tried for the largest correlation; the best is refined between its neighbours."""
 
+NOT_ALIGNED = "not aligned"
+
 MOST_POINTS = 4000
 """Measured points that the search for a shift uses."""
 
@@ -59,10 +61,17 @@ class Quantity:
     """The unit of the measured column."""
     measured: Array
     simulated: Array
+    series: Array
+    """All of the simulated series over the measured range, at `Comparison.series_x`."""
+    by_revolution: Array
+    """RMS error, had the first measured point been in each of the simulated revolutions; shape (revolutions,)."""
 
     @property
     def norms(self) -> dict[str, float]:
-        """RMS and largest error, that of mean and of peak (simulated less measured, SI), and the correlation coefficient."""
+        """RMS and largest error, that of mean and of peak (simulated less measured, SI), and the correlation coefficient.
+
+        All of them at the measured points alone: a peak of the simulation between these counts for nothing.
+        """
         difference = self.simulated - self.measured
         peaks = [float(np.abs(one).max()) for one in (self.simulated, self.measured)]
         return {
@@ -91,6 +100,10 @@ class Comparison:
     """How: in words."""
     revolutions: int
     """Simulated revolutions, continued periodically."""
+    revolution: int
+    """Which of them, from 1, the first measured point was compared with."""
+    series_x: Array
+    """Measured angle, rad, or time, s, of the whole simulated series; shape (t,)."""
     quantities: tuple[Quantity, ...]
 
     def _repr_html_(self) -> str:
@@ -139,35 +152,73 @@ def compare(
     shown = response.isel(time=np.flatnonzero(inside))
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
+    _check_names(names or {}, columns)
     pairs = [(column, *_series(shown, column, names or {})) for column in columns[1:]]
     measured = [column.si(str(one.attrs.get("units", "1"))) for column, _, one in pairs]
     simulated = [_periodic(place, one.to_numpy()) for _, _, one in pairs]
     how = ("angle" if axis == "angle" else "correlation") if align == "auto" else align
-    shift, words = 0.0, "not aligned"
-    if how == "angle":
-        if axis != "angle":
-            remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
-            raise InputError("--align", how, f"{path} has no angle", remedy)
-        # the table says where in a revolution, not in which of the simulated ones
-        steps: Array = 2.0 * np.pi * np.arange(float(turns))
-        shift = _best(to_place(given), simulated, measured, steps)
-        words = "by crank angle"
-    elif how == "correlation":
-        span = float(np.ptp(place))
-        shift = _best(
-            to_place(given),
-            simulated,
-            measured,
-            np.linspace(0, span, SHIFTS * turns, endpoint=False),
-            refine=True,
-        )
-        words = "by the largest correlation"
+    if how == "angle" and axis != "angle":
+        remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
+        raise InputError("--align", how, f"{path} has no angle", remedy)
+    span = float(place[-1])
+    shift, words = _aligned(how, to_place(given), simulated, measured, span, turns)
     at = to_place(given) + shift
+    revolution = int(np.mod(at[0], span) / span * turns + 1e-9) % turns + 1
+    others = span / turns * (np.arange(turns) + 1 - revolution)
+    every = _every(place, at)
     quantities = tuple(
-        Quantity(name, str(one.attrs.get("units", "1")), column.unit, own, curve(at))
+        Quantity(
+            name,
+            str(one.attrs.get("units", "1")),
+            column.unit,
+            own,
+            curve(at),
+            curve(every),
+            np.array([np.sqrt(np.mean((curve(at + one) - own) ** 2)) for one in others]),
+        )
         for (column, name, one), own, curve in zip(pairs, measured, simulated, strict=True)
     )
-    return Comparison(axis, columns[0].unit, given, shift, words, turns, quantities)
+    series_x = _measured_axis(shown, axis, given, at, every)
+    return Comparison(
+        axis, columns[0].unit, given, shift, words, turns, revolution, series_x, quantities
+    )
+
+
+def _aligned(
+    how: str,
+    at: Array,
+    simulated: list[Callable[[Array], Array]],
+    measured: list[Array],
+    span: float,
+    turns: int,
+) -> tuple[float, str]:
+    """What to add to the measured places `at` (n,), and how that was found, in words."""
+    if how == "angle":
+        # the table says where in a revolution, not in which of the simulated ones
+        steps: Array = 2.0 * np.pi * np.arange(float(turns))
+        return _best(at, simulated, measured, steps), "by crank angle"
+    if how == "correlation":
+        shifts = np.linspace(0, span, SHIFTS * turns, endpoint=False)
+        found = _best(at, simulated, measured, shifts, refine=True)
+        return found, "by the largest correlation"
+    return 0.0, NOT_ALIGNED
+
+
+def _every(place: Array, at: Array) -> Array:
+    """Places of all instants within the range of the measured ones, the series being continued periodically."""
+    span = float(place[-1])
+    rounds = np.arange(np.floor(at.min() / span), np.floor(at.max() / span) + 1.0)
+    every = (place[None, :-1] + span * rounds[:, None]).ravel()
+    return every[(every >= at.min()) & (every <= at.max())]
+
+
+def _measured_axis(response: xr.Dataset, axis: str, given: Array, at: Array, every: Array) -> Array:
+    """What the measured axis shows at places of the simulation; angles within a turn where it has them so."""
+    sense = motion.crank_angle(response)[1] if axis == "angle" else 1
+    x: Array = given[0] + sense * (every - at[0])
+    if axis == "angle" and np.ptp(at) > np.ptp(given) + 1e-9:
+        x = given.min() + np.mod(x - given.min(), 2.0 * np.pi)
+    return x
 
 
 def read_columns(path: Path) -> list[Column]:
@@ -184,6 +235,15 @@ def read_columns(path: Path) -> list[Column]:
         Column(one.heading, one.name, one.unit, np.array([sheet.number(one, row) for row in rows]))
         for one in columns
     ]
+
+
+def _check_names(names: Mapping[str, str], columns: list[Column]) -> None:
+    """InputError unless each named column is one of the table's, by its heading or without its unit."""
+    known = [name for one in columns[1:] for name in dict.fromkeys((one.name, one.heading))]
+    for name, quantity in names.items():
+        if name not in known:
+            reason = f"the table has no column {name!r}"
+            raise InputError("--name", f"{name}={quantity}", reason, nearest(name, known))
 
 
 def _axis(column: Column) -> tuple[str, str]:

@@ -2,17 +2,20 @@
 
 import io
 import json
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
 from hpcclear.report import spread, xlsx
-from hpcclear.report.tables import identifier, to_table
+from hpcclear.report.tables import Units, identifier, to_table
 from hpcclear.results import dataset, files
+from hpcclear.scene.units import factor
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -54,51 +57,95 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
     return table
 
 
-def statistics(
-    paths: Sequence[str | Path], output: str | Path, thresholds: Sequence[str] = ()
-) -> "DataFrame":
-    """Write the statistics of several samples: a row for each statistic with its interval, a column for each file.
-
-    Parameters
-    ----------
-    paths : sequence of path
-        Result files of `sample`; those of run times are passed over.
-    output : path
-        As `export`.
-    thresholds : sequence of str
-        Values such as "peak_contact_force=3 kN", beyond which shares are stated.
+def read_samples(paths: Sequence[str | Path]) -> dict[str, xr.Dataset]:
+    """Return the samples of several result files, by the names of these; those of run times are passed over.
 
     Raises
     ------
     InputError
-        As `export`, and if a file is no sample.
+        A file cannot be read or holds no samples.
+    """
+    found: dict[str, xr.Dataset] = {}
+    for path in map(Path, paths):
+        if path.name.endswith(".timing.nc"):
+            continue
+        content = dataset.read(path)
+        if (kind := content.attrs["hpcclear_kind"]) != "samples":
+            reason = f"statistics need samples, and it holds a {kind}"
+            remedy = "Make samples with hpcclear sample SCENE.toml -o samples.nc"
+            raise InputError("--statistics", str(path), reason, remedy)
+        name = path.stem if path.stem not in found else str(path)
+        found[name] = content.assign_attrs(path=str(path))
+    return found
+
+
+def statistics(
+    every: Mapping[str, xr.Dataset],
+    output: str | Path,
+    lines: spread.Lines,
+    units: Sequence[str] = (),
+) -> "DataFrame":
+    """Write the statistics of several samples: a row for each, and for each file columns of value and interval, as numbers.
+
+    Parameters
+    ----------
+    every : mapping of str to xarray.Dataset
+        As `read_samples`.
+    output : path
+        As `export`.
+    lines : mapping
+        As `hpcclear.report.spread.side_by_side` of these.
+    units : sequence of str
+        As `hpcclear.report.tables.to_table`.
+
+    Raises
+    ------
+    InputError
+        As `export`.
     """
     from pandas import DataFrame
 
     check_format(Path(output))
-    columns: dict[str, dict[str, str]] = {}
-    for path in map(Path, paths):
-        if path.name.endswith(".timing.nc"):
-            continue
-        samples = dataset.read(path, "samples")
-        units = {str(name): row.attrs.get("units", "1") for name, row in samples.data_vars.items()}
-        levels = [spread.beyond(units, words) for words in thresholds]
-        lines = [("samples", str(samples.sizes["sample"])), *spread.statistics(samples, levels)]
-        name = path.stem if path.stem not in columns else str(path)
-        columns[name] = dict(lines)
-    labels = dict.fromkeys(label for column in columns.values() for label in column)
-    rows = {name: [column.get(label, "") for label in labels] for name, column in columns.items()}
-    table = DataFrame({"statistic": list(labels), **rows})
+    table = DataFrame(_columns(lines, Units(next(iter(every.values())), units)))
+    about = [(f"file {name}", one.attrs["path"]) for name, one in every.items()]
+    about += [
+        (f"{what} {name}", line.text)
+        for name, own in lines.items()
+        for what, line in own.items()
+        if not line.estimate.known
+    ]
+    scenes = [
+        f"# {name}: scene {one.attrs.get('scene_hash', '')}\n{one.attrs.get('scene', '')}"
+        for name, one in every.items()
+    ]
     table.attrs = {
-        "units": {},
-        "long_names": {},
-        "title": "Statistics of samples",
-        "scene": "",
-        "scene_hash": "",
-    }
+        "units": {}, "long_names": {}, "title": "Statistics of samples", "about": about,
+        "scene": "\n".join(scenes), "scene_hash": "",
+    }  # fmt: skip
     content, mark = FORMATS[Path(output).suffix.lower()](table)
     files.write_bytes(Path(output), content, mark)
     return table
+
+
+def _columns(lines: spread.Lines, units: Units) -> dict[str, list[Any]]:
+    """Label and unit, then value and interval of each samples; lines without numbers are left out."""
+    rows = {
+        (label, line.estimate.unit): units.chosen(line.estimate.unit)
+        for own in lines.values()
+        for label, line in own.items()
+        if line.estimate.known
+    }
+    shown = [unit or si for (_, si), unit in rows.items()]
+    columns: dict[str, list[Any]] = {"statistic": [label for label, _ in rows], "unit": shown}
+    for name, own in lines.items():
+        for k, end in enumerate(spread.Estimate._fields[:3]):
+            cells = columns[f"{name} {end}"] = []
+            for (label, si), unit in rows.items():
+                line = own.get(label)
+                same = line is not None and line.estimate.unit == si
+                number = line.estimate.ends[k] if line is not None and same else math.nan
+                cells.append(number / float(factor(unit, si)) if unit else number)
+    return columns
 
 
 def check_format(output: Path) -> None:
@@ -165,16 +212,17 @@ def _xlsx(table: "DataFrame") -> Written:
     units, words = attributes["units"], attributes["long_names"]
     data = zip(*(table[heading].tolist() for heading in table.columns), strict=True)
     single = [(key, attributes[key]) for key in attributes if key in units]
-    about = [(key, attributes[key]) for key in ("title", "scene_hash")]
+    about = [(key, attributes[key]) for key in ("title", "scene_hash") if attributes[key]]
     sheets = {
         "data": [tuple(table.columns), *data],
         "quantities": [("heading", "unit", "meaning"), *((h, units[h], words[h]) for h in units)],
         "about": [
-            ("what", "value"), *single, *about,
+            ("what", "value"), *single, *about, *attributes.get("about", ()),
             *(("scene", line) for line in attributes["scene"].splitlines()),
         ],
     }  # fmt: skip
-    return xlsx.book(sheets), xlsx.MARK
+    known = {name: rows for name, rows in sheets.items() if name == "data" or len(rows) > 1}
+    return xlsx.book(known), xlsx.MARK
 
 
 def _arrow() -> tuple[Any, Any]:

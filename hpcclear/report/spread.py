@@ -4,6 +4,7 @@ The `sample` command prints these lines, and the page shows them. No number is s
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +13,12 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.objectives import Objective
-from hpcclear.base.outcome import Status
+from hpcclear.base.outcome import FIELDS, Status
 from hpcclear.base.student import student
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.results.names import KINDS
+from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.units import UnitError, to_si
 from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_interval, share_interval
 
@@ -46,6 +48,16 @@ class Estimate(NamedTuple):
     upper: float = np.nan
     unit: str = ""
 
+    @property
+    def ends(self) -> tuple[float, float, float]:
+        """The value and the ends of its interval."""
+        return self.value, self.lower, self.upper
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a number."""
+        return bool(np.isfinite(self.value))
+
 
 class Line(NamedTuple):
     """One line: its subject, its text, and the numbers of the text where there are some."""
@@ -55,41 +67,64 @@ class Line(NamedTuple):
     estimate: Estimate = Estimate()
 
 
+Lines = Mapping[str, Mapping[str, Line]]
+"""Lines of several samples: by the name of each, then by label."""
+
+
 class Beyond(NamedTuple):
-    """A threshold of a result: a variable of the samples, and the value to exceed, SI."""
+    """A threshold of a result: a variable of the samples, the value to exceed, SI, and a joint; "" for the largest of all."""
 
     name: str
     value: float
+    joint: str = ""
 
 
-def beyond(units: Mapping[str, str], words: str) -> Beyond:
-    """Return the threshold that a user writes as ``"3 kN"`` (of f) or ``"peak_contact_force=3 kN"``; plain numbers are SI.
+def beyond(units: Mapping[str, str], words: str, joints: Sequence[str] = ()) -> Beyond:
+    """Return the threshold that a user writes as ``"3 kN"`` (of f) or ``"peak_contact_force crank_rod=3 kN"``.
 
     Parameters
     ----------
     units : mapping of str to str
         SI unit of each result, by its name.
+    joints : sequence of str
+        Joints that may follow the name, as in the headings of tables.
 
     Raises
     ------
     InputError
-        There is no such result, or the value has another unit.
+        There is no such result or joint, or the value has another unit or none.
     """
-    name, equals, text = (part.strip() for part in words.rpartition("="))
-    name = name if equals else "objective"
+    heading, equals, text = (part.strip().strip("\"'") for part in words.rpartition("="))
+    name, _, joint = (heading if equals else "objective").partition(" ")
     if name not in units:
         remedy = nearest(name, sorted(units))
         raise InputError("--beyond", words, f"samples have no result {name!r}", remedy)
+    known = joints if _of_joints(name) else ()
+    if joint and joint not in known:
+        remedy = nearest(joint, list(known)) if known else "Leave the joint out"
+        raise InputError("--beyond", words, f"{name} has no joint {joint!r}", remedy)
+    unit = units[name].removeprefix("1")
+    plain = np.nan
+    with suppress(ValueError):
+        plain = float(text)
+    if np.isfinite(plain) and unit:
+        remedy = f'Write it with a unit that fits {unit}, such as "{text} {_usual(unit)}"'
+        raise InputError("--beyond", words, "the value has no unit", remedy)
+    if np.isfinite(plain):
+        return Beyond(name, plain, joint)
     try:
-        value = float(text)
-        if np.isfinite(value):
-            return Beyond(name, value)
-    except ValueError:
-        pass
-    try:
-        return Beyond(name, to_si(text.strip("\"'"), "" if units[name] == "1" else units[name]))
+        return Beyond(name, to_si(text, unit), joint)
     except UnitError as error:
         raise InputError("--beyond", words, error.reason, error.remedy) from None
+
+
+def _of_joints(name: str) -> bool:
+    return name in FIELDS and "joint" in FIELDS[name].per
+
+
+def _usual(unit: str) -> str:
+    """A unit that people write for one of SI."""
+    return {"m": "mm", "N": "kN", "Pa": "MPa"}.get(unit, unit)
 
 
 def units_of(objective: Objective) -> dict[str, str]:
@@ -131,6 +166,7 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
         if np.nanmax(peak, initial=0.0) > 0.0:
             lines.append(Line(f"P95 peak force, {joint}", *_quantile(peak, 0.95, "N", drawn)))
     lines += [_share(samples, one, drawn) for one in thresholds]
+    lines += _length_of_peaks(samples)
     if len(known) < len(f):
         left_out = f"{len(f) - len(known)} of {len(f)}, left out of mean and standard deviation"
         lines.append(Line("failed", left_out))
@@ -148,14 +184,15 @@ def side_by_side(
     found = {}
     for name, samples in every.items():
         units = {str(key): row.attrs.get("units", "1") for key, row in samples.data_vars.items()}
-        levels = [beyond(units, words) for words in thresholds]
+        joints = [str(joint) for joint in samples["joint"].to_numpy()]
+        levels = [beyond(units, words, joints) for words in thresholds]
         count = samples.sizes["sample"]
         lines = [Line("samples", str(count), Estimate(count)), *statistics(samples, levels)]
         found[name] = {line.label: line for line in lines}
     return found
 
 
-def rows_of(found: Mapping[str, Mapping[str, Line]]) -> list[list[str]]:
+def rows_of(found: Lines) -> list[list[str]]:
     """Return the texts of `side_by_side` in rows: a label, then a text of each samples, "" where one has no such line."""
     names = dict.fromkeys(label for lines in found.values() for label in lines)
     return [
@@ -177,6 +214,18 @@ def remarks(samples: xr.Dataset) -> list[str]:
     counts = [(int((good & ((flags & flag) != 0)).sum()), flag) for flag in bearings.WARNED]
     found += [(count, bearings.REMARKS[flag]) for count, flag in counts if count]
     return [f"{count} of {len(f)} samples: {text}" for count, text in found]
+
+
+def _length_of_peaks(samples: xr.Dataset) -> list[Line]:
+    """Of how many revolutions each peak is the largest, since it grows with their number."""
+    try:
+        numerics = scene_of_text(str(samples.attrs.get("scene", "")), "scene").numerics
+    except InputError:
+        return []
+    if numerics.target_error is not None:
+        return []
+    count = numerics.averaged_revolutions
+    return [Line("peaks", f"largest of {count} revolution{'' if count == 1 else 's'}")]
 
 
 def _values(samples: xr.Dataset, name: str) -> Array:
@@ -223,10 +272,13 @@ def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
     """Share of samples beyond a threshold, with Clopper and Pearson's confidence interval."""
     if one.name not in samples:
         return Line(one.name, "not recorded in these samples")
-    values = _values(samples, one.name)
+    chosen = samples.sel(joint=[one.joint]) if one.joint else samples
+    values = _values(chosen, one.name)
     failed, total = int(np.isnan(values).sum()), len(values)
     above = int((values > one.value).sum())
     name = "f" if one.name == "objective" else one.name.replace("_", " ")
+    if _of_joints(one.name):
+        name += f" {one.joint or 'in any joint'}"
     label = f"{name} > {labels.quantity(one.value, str(samples[one.name].attrs['units']))}"
     share, low, high = above / (total - failed) if total > failed else np.nan, np.nan, np.nan
     text = f"{_percent(share)} of the samples" if total > failed else "–"

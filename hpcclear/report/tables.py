@@ -14,7 +14,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
-from hpcclear.scene.loading import parse
+from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.units import UnitError, factor
 
@@ -49,8 +49,6 @@ MOST_COLUMNS = 128
 SI = "SI"
 """Word for the units of the result file, in place of those of the scene."""
 
-_QUANTITY = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([^\d\s.].*)")
-
 
 def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
     """Return a result as a table.
@@ -83,7 +81,7 @@ def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
     if kind not in ROWS:
         reason = "the dataset is no result of hpcclear"
         raise InputError("kind", kind, reason, "Give a dataset that hpcclear wrote or returned")
-    made = _Table(content, ROWS[kind], _Units(content, units))
+    made = _Table(content, ROWS[kind], Units(content, units))
     for variable in dict.fromkeys([*ROWS[kind], *map(str, content.variables)]):
         made.add(variable)
     table = pd.DataFrame(made.columns)
@@ -103,7 +101,7 @@ def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
 class _Table:
     """A table in the making."""
 
-    def __init__(self, content: xr.Dataset, rows: tuple[str, ...], units: "_Units") -> None:
+    def __init__(self, content: xr.Dataset, rows: tuple[str, ...], units: "Units") -> None:
         self.content, self.rows, self._units = content, rows, units
         self.shape = tuple(content.sizes[dim] for dim in rows)
         self.columns: dict[str, np.ndarray] = {}
@@ -168,7 +166,7 @@ def _label(content: xr.Dataset, dim: str, place: int) -> str:
     return f"{value:g}" if isinstance(value, np.floating) else str(value)
 
 
-class _Units:
+class Units:
     """Units in which quantities are shown."""
 
     def __init__(self, content: xr.Dataset, asked: Sequence[str]) -> None:
@@ -191,10 +189,16 @@ class _Units:
             return _words(variable), ""
         if unit in ("", "1") or values.dtype.kind != "f":
             return values, ""
-        for chosen in (*self._asked, *self._own(variable), *self._usual):
-            if _fits(chosen, unit):
-                return values / float(factor(chosen, unit)), chosen
-        return values, labels.plain(unit)
+        chosen = self.chosen(unit, self._own(variable))
+        return (
+            (values, labels.plain(unit))
+            if not chosen
+            else (values / float(factor(chosen, unit)), chosen)
+        )
+
+    def chosen(self, unit: str, own: Sequence[str] = ()) -> str:
+        """The unit that shows quantities of a unit of SI, before which come those of a variable's own entry; "" for SI."""
+        return next((u for u in (*self._asked, *own, *self._usual) if _fits(u, unit)), "")
 
     def _own(self, variable: xr.DataArray) -> list[str]:
         """Units of the scene's own entry of a design variable."""
@@ -220,15 +224,12 @@ def _strings(text: str) -> dict[str, str]:
         content = dict(flatten(parse(text, "scene")))
     except InputError:
         return {}
-    overrides = (line[len("# set: ") :] for line in text.splitlines() if line.startswith("# set: "))
-    content |= dict(line.partition("=")[::2] for line in overrides)
-    found = {}
-    for path, value in content.items():
-        for k, one in enumerate(value if isinstance(value, list) else [value]):
-            match = _QUANTITY.fullmatch(one.strip(" \"'")) if isinstance(one, str) else None
-            if match:
-                found[f"{path}.{k}" if isinstance(value, list) else path.strip()] = match[1]
-    return found
+    notes = [line for line in text.splitlines() if line.startswith(("# set: ", AS_WRITTEN))]
+    for line in notes:
+        path, _, value = line.removeprefix("# set: ").removeprefix(AS_WRITTEN).partition("=")
+        content[path.strip()] = value
+    matches = {path: QUANTITY.fullmatch(one) for path, one in quantities(content.items()).items()}
+    return {path: match[1] for path, match in matches.items() if match is not None}
 
 
 def _words(variable: xr.DataArray) -> np.ndarray:

@@ -127,7 +127,7 @@ class ConsistentTables(SceneTables):
             raise invalid(
                 "a clearance joint needs a contact law",
                 'Add contact = { law = "lankarani-nikravesh", restitution = 0.9 }, '
-                "or make the joints ideal",
+                'or make the joints ideal (kind = "ideal")',
                 key="effects.contact",
                 value=None,
             )

@@ -117,5 +117,5 @@ class Effects(Table):
                     key=key,
                     value=data[key],
                 )
-        words = ("friction", "slider_load", "guide_friction")
+        words = ("contact", "friction", "slider_load", "guide_friction")
         return {key: value for key, value in data.items() if not (key in words and value == "none")}

@@ -4,7 +4,7 @@ import ast
 import itertools
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import tomli_w
 from hpcclear.base.errors import InputError
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.measured import files_named, with_values
+from hpcclear.scene.paths import flatten
 from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene, scene_of
 from hpcclear.scene.tables import plain
@@ -27,6 +28,10 @@ _DOTTED = re.compile(
 
 
 _NOTE = "# set: "  # before each override, at the head of a scene's text
+AS_WRITTEN = "# as written: "
+"""Before each quantity with its unit, at the head of a text that is no longer that of the scene file."""
+QUANTITY = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([^\d\s.].*)")
+"""A number with its unit."""
 _CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
 
 
@@ -60,7 +65,7 @@ def load_scene(
     for override in overrides:
         content = entry_replaced(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
-    named = files_named(content)
+    named, written = files_named(content), quantities(flatten(content)).items()
     filled, read_as = with_values(content, folder)
     content = dict(filled)
     own_plugins = "plugins" in content
@@ -73,13 +78,25 @@ def load_scene(
     if (
         text is None or named or own_plugins
     ):  # results carry the values: whoever has one need not have the file
-        scene._text = "".join(f"# {line}\n" for line in read_as) + scene.to_toml()
+        head = [f"# {line}\n" for line in read_as]
+        head += () if text is None else [f"{AS_WRITTEN}{path} = {q}\n" for path, q in written]
+        scene._text = "".join(head) + scene.to_toml()
         scene._readings = (*scene.readings, *read_as)
     else:
         # an empty line ends the notes, whatever a file's own first comment says
         own = "\n" + text if text.startswith((_NOTE, _CHANGE)) else text
         scene._text = notes + own + _plugins(scene)
     return scene
+
+
+def quantities(entries: Iterable[tuple[str, Any]]) -> dict[str, str]:
+    """Return the text of every quantity with its unit among entries (path, value), by its path; in a list by its place."""
+    found = {}
+    for path, value in entries:
+        for k, one in enumerate(value if isinstance(value, list) else [value]):
+            if isinstance(one, str) and one.isprintable() and QUANTITY.fullmatch(one.strip(" \"'")):
+                found[f"{path}.{k}" if isinstance(value, list) else path] = one.strip(" \"'")
+    return found
 
 
 def scene_of_text(text: str, name: str) -> Scene:

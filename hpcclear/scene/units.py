@@ -1,7 +1,8 @@
 """Strings with a unit ("0.3 mm", "5000 rpm") to numbers in SI.
 
-The grammar is deliberately small: a decimal number, then unit names with whole powers, products, quotients and brackets. Scene
-files come from anywhere, and a general expression parser would evaluate whatever stands in them. `unit_names` has the names.
+The grammar is deliberately small: a decimal number, then unit names with powers (whole, or as in N/mm^1.4 and N/m^(7/5)),
+products, quotients and brackets. Scene files come from anywhere, and a general expression parser would evaluate whatever
+stands in them. `unit_names` has the names.
 
 An angle is a dimension of its own here; plain dimensional analysis takes a turn a second for 6.28 Hz. Three quantities have a
 unit of 1/s, and each entry declares its own: "rad/s" an angular speed, "Hz" a frequency in cycles, "1/s" a rate that counts
@@ -14,6 +15,7 @@ import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
 from math import pi
@@ -36,7 +38,9 @@ if TYPE_CHECKING:
 _NUMBER = r"[+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:[eE][+-]?\d{1,3})?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
 _TOKEN = re.compile(
-    r"\s*(?:(?P<name>[A-Za-zμ%‰°\"]{1,20})\.?(?![A-Za-z])(?:(?:\^|\*\*)?\(?(?P<power>-?\d)\)?(?!\d))?|(?P<sign>\*\*?|[/()]))\s*"
+    r"\s*(?:(?P<name>[A-Za-zμ%‰°\"]{1,20})\.?(?![A-Za-z])"
+    r"(?:(?:\^|\*\*)(?:\((?P<ratio>-?\d{1,3}/[1-9]\d{0,2})\)|\(?(?P<decimal>-?\d\.\d{1,6})\)?)(?!\d)"
+    r"|(?:\^|\*\*)?\(?(?P<power>-?\d)\)?(?!\d))?|(?P<sign>\*\*?|[/()]))\s*"
 )
 _CRANK_ANGLE = re.compile(r"(deg|°)\s*(CA|KW|crank|[ab][TB]DC|[AB]TDC)\b")
 _FOREIGN = str.maketrans(
@@ -113,7 +117,7 @@ def _tidy(text: str) -> str:
     return re.sub(r"(?<=[A-Za-z\d])[.-](?=[A-Za-z])", "*", plain)
 
 
-def _factors(text: str) -> list[tuple[str, int, int]]:
+def _factors(text: str) -> list[tuple[str, Fraction, int]]:
     """Names, powers, and 1 or -1 for above or below the line, of a unit in the characters of a keyboard; raises _NoUnit."""
     tokens, at = list[re.Match[str]](), 0
     text = re.sub(r"^1\s*(?=/)", "", text)
@@ -123,11 +127,12 @@ def _factors(text: str) -> list[tuple[str, int, int]]:
             raise _NoUnit
         tokens.append(found)
         at = found.end()
-    factors, sides, side, awaited = list[tuple[str, int, int]](), [1], 1, True
+    factors, sides, side, awaited = list[tuple[str, Fraction, int]](), [1], 1, True
     for token in tokens:
         sign = token["sign"]
         if sign is None:
-            factors.append((token["name"], int(token["power"] or 1), sides[-1] * side))
+            power = Fraction(token["ratio"] or token["decimal"] or token["power"] or 1)
+            factors.append((token["name"], power, sides[-1] * side))
             side, awaited = 1, False
         elif sign == "(":
             sides.append(sides[-1] * side)
@@ -143,6 +148,15 @@ def _factors(text: str) -> list[tuple[str, int, int]]:
     return factors
 
 
+def _raised(size: Fraction, power: Fraction) -> Fraction:
+    """A size to a power: exact of whole ones, else to so many digits that the nearest float is the same."""
+    if power.denominator == 1:
+        return size ** int(power)
+    with localcontext(prec=50):
+        base, exponent = (Decimal(one.numerator) / one.denominator for one in (size, power))
+        return Fraction(base**exponent)
+
+
 @lru_cache(maxsize=256)
 def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
     """Factor to base units, dimensions, and those of each unit named; ValueError says why there are none."""
@@ -150,8 +164,8 @@ def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
     factors = _factors(_tidy(unit))
     for name, power, side in factors:
         *before, last = _named(name)
-        for (part, (size, own)), raised in ((last, power), *((one, 1) for one in before)):
-            scale *= size ** (raised * side)
+        for (part, (size, own)), raised in ((last, power), *((one, Fraction(1)) for one in before)):
+            scale *= _raised(size, raised * side)
             names[part] = own
             for base, exponent in own.items():
                 powers[base] = powers.get(base, Fraction(0)) + exponent * raised * side
@@ -180,8 +194,9 @@ def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
         text = ""
         for name, (_, power, side) in zip(names, factors, strict=True):
             sign = ("1/" if not text else "/") if side < 0 else ("*" if text else "")
-            text += sign + name + (f"^{power}" if power != 1 else "")
-        if fits(text):
+            shown = f"^{power}" if power.denominator == 1 else f"^({power})"
+            text += sign + name + (shown if power != 1 else "")
+        if text not in found and fits(text):
             found.append(text)
     return found
 

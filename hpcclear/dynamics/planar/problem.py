@@ -11,7 +11,8 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.assembly import Assembly, assemble
+from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
+from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
@@ -291,11 +292,8 @@ def poses_at_start(scene: Scene, turned: float = 0.0) -> dict[str, tuple[float, 
             for one in mechanism.bodies
         )
         mechanism = replace(mechanism, bodies=bodies)
-    made = put_together(mechanism)
-    forest = made.loops.forest
-    found = {}
-    for body in made.loops.mechanism.bodies:
-        rows = [forest.index(kind, body.name) for kind in ("x", "y", "angle")]
-        x, y, angle = (0.0 if row is None else float(made.q[row]) for row in rows)
-        found[body.name] = (x, y, angle)
+    made, found = put_together(mechanism), {}
+    for body in mechanism.bodies:
+        centre, _, angle, _ = placed(made, f"{body.name}.{CENTER}", body.center)
+        found[body.name] = (float(centre.real), float(centre.imag), float(angle))
     return found

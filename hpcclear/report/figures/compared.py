@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 @style.drawn
 def overlay_figure(comparison: "Comparison") -> "Figure":
-    """Each quantity, measured and simulated, over the measured time or angle, in the units of the measurement."""
+    """Each quantity over the measured time or angle, in the units of the measurement: the measured points, and the simulation
+    at all of its instants."""
     figure, axes = style.grid(
         len(comparison.quantities), 1, 10.0 + 38.0 * len(comparison.quantities), sharex=True
     )
@@ -23,12 +24,15 @@ def overlay_figure(comparison: "Comparison") -> "Figure":
     across = scale(comparison.shown, base)
     order = np.argsort(comparison.x, kind="stable")
     x = comparison.x[order] * across.factor
+    along = comparison.series_x * across.factor
+    steps = np.diff(along, prepend=along[:1])
+    begins = steps * np.sign(np.median(steps)) < 0.0  # an angle that starts again from 0
     for panel, one in zip(axes[:, 0], comparison.quantities, strict=True):
         unit = scale(one.shown, one.unit)
         dots: dict[str, object] = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
         panel.plot(x, one.measured[order] * unit.factor, ".", label="measured", **dots)
-        line = one.simulated[order] * unit.factor
-        panel.plot(x, line, color=style.PALETTE["blue"], label="simulated")
+        line = np.where(begins, np.nan, one.series * unit.factor)
+        panel.plot(along, line, color=style.PALETTE["blue"], label="simulated")
         panel.set_ylabel(
             unit.label(labels.literal(one.name.replace("_", " ").replace(" ", "\n", 1)))
         )

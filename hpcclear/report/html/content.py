@@ -69,7 +69,8 @@ def read(*places: str | Path) -> Content:
     names: dict[str, str] = {}
     responses: dict[str, xr.Dataset] = {}
     several: dict[str, dict[str, xr.Dataset]] = {}
-    troubles, others = [], []
+    troubles: list[str] = []
+    others: list[str] = []
     found = dataset.each_in(place) if whole else ((one, dataset.read(one)) for one in chosen)
     for path, one in found:
         if isinstance(one, InputError):

@@ -174,7 +174,7 @@ def statistics(content: Content) -> list[object] | None:
 
 
 def compared(content: Content) -> list[object]:
-    """Statistics of several samples, a column for each file."""
+    """Statistics of several samples in one table, a column for each file."""
     every = {name: own["samples"] for name, own in content.samples.items()}
     rows = spread.rows_of(spread.side_by_side(every))
     words = f"The files {', '.join(content.samples)} are compared here; a part on each follows."
