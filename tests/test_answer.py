@@ -55,7 +55,7 @@ DEVIATION = [6e-5, 4e-5, 2e-5, 4.1e-5, 1e-5]
 
 
 def told(content) -> dict[str, str]:
-    return dict(answer({"verification": content}, "out"))
+    return {line.label: line.text for line in answer({"verification": content}, "out")}
 
 
 def test_the_design_to_take_is_the_one_that_nearly_all_machines_stay_lowest_with():
@@ -113,7 +113,7 @@ def test_total_indices_are_printed_and_what_is_negligible(total, error, words, n
         {"parameter": ["m2", "C", "m3"]},
     )
     files = {"verification": verified(MEAN, DEVIATION), "sensitivity": found}
-    lines = dict(answer(files, ""))
+    lines = {line.label: line.text for line in answer(files, "")}
     assert lines.get("interactions", "").partition("%): ")[2] == (words or "")
     assert lines.get("negligible", "").partition(" (total")[0] == (negligible or "")
 

@@ -117,7 +117,7 @@ def verified(verdict: str, excess: list[float]):
 )
 def test_no_design_is_recommended_within_constraints_that_it_may_break(verdict, excess, nearest):
     lines = answer({"verification": verified(verdict, excess)}, "out")
-    text = dict(lines)
+    text = {line.label: line.text for line in lines}
     assert text["recommended"].startswith("none: ")
     assert text["recommended"].endswith(f"nearest: {nearest}")
     assert "within the constraints" not in " ".join(one.text for one in lines)
@@ -126,7 +126,10 @@ def test_no_design_is_recommended_within_constraints_that_it_may_break(verdict, 
 
 
 def test_a_design_that_surely_satisfies_them_is_recommended():
-    text = dict(answer({"verification": verified("kept", [-0.1, -0.2, -0.3])}, "out"))
+    text = {
+        line.label: line.text
+        for line in answer({"verification": verified("kept", [-0.1, -0.2, -0.3])}, "out")
+    }
     assert text["recommended"] == "robust alpha"
     assert text["criterion"].startswith("lowest mean of f within the constraints of 3")
     assert text["constraint"].endswith(": satisfied")

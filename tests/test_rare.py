@@ -205,7 +205,9 @@ def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
     for share, text in zip(shares, found["constraints"].to_numpy(), strict=True):
         assert not (": kept" in str(text) and share > 5e-4)
     best = found.sel(design="heavy alpha")
-    assert dict(answer({"verification": found}, "out"))["recommended"] == "heavy alpha"
+    assert {line.label: line.text for line in answer({"verification": found}, "out")}[
+        "recommended"
+    ] == "heavy alpha"
     assert ": kept" in str(best["constraints"].item())
     assert int(best["rare_samples"]) > 0
     grid = [(a, b) for a in np.linspace(0.105, 0.42, 22) for b in np.linspace(0.07, 0.28, 106)]
