@@ -83,7 +83,7 @@ def indices(first, total, error=0.01):
 
 def lines_of(**files):
     told = answer({"verification": data.verification(), **files}, "")
-    return {label: [text for name, text in told if name == label] for label, _ in told}
+    return {label: [text for name, text, *_ in told if name == label] for label, *_ in told}
 
 
 def test_first_order_and_total_indices_stand_apart_with_their_errors():
