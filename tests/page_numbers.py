@@ -89,7 +89,7 @@ def summed(content: xr.Dataset) -> Iterator[float]:
 
 
 def _loads(content: xr.Dataset) -> Iterator[float]:
-    """Forces, contact and torque over the averaged revolutions, by the trapezoidal rule, and the recorded peaks and gaps."""
+    """Forces, contact and torque over the averaged revolutions, work over angle, and the recorded peaks and gaps."""
     first = int(content.attrs.get("transient_turns", 0))
     angle = content["crank_angle"].to_numpy()
     inside = np.abs(angle - angle[0]) / (2.0 * np.pi) > first - 1e-6
@@ -98,6 +98,9 @@ def _loads(content: xr.Dataset) -> Iterator[float]:
         values = content[name].to_numpy()[inside]
         yield from np.ravel(np.trapezoid(values, time, axis=0) / (time[-1] - time[0]))
         yield from np.ravel(np.abs(values).max(axis=0))
+    work = content["driving_work"].to_numpy()[inside]
+    turned = angle[inside]
+    yield float((work[-1] - work[0]) / (turned[-1] - turned[0]))
     touching = (content["penetration"].to_numpy()[inside] > 0.0).astype(float)
     yield from np.ravel(np.trapezoid(touching, time, axis=0) / (time[-1] - time[0]))
     for name in ("peak_contact_force", "mean_gap", "objective", "objective_uncertainty"):

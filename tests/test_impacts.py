@@ -321,7 +321,7 @@ def test_bands_that_the_drive_does_not_reach_are_refused(changes, words):
     ("changes", "words"),
     [
         ({"numerics.levels": [100.0 * 2**k for k in range(5)]}, "4"),
-        ({"numerics.levels": [1e3], "numerics.target_error": 0.01}, "number of revolutions"),
+        ({"numerics.levels": [1e3], "numerics.target_error": 0.01}, "target_error"),
         ({"numerics.objective": "frame-force-level-at-1kHzz"}, "not a known objective"),
     ],
 )

@@ -713,4 +713,4 @@ def test_entries_of_automatic_averages_alone_are_left_out_as_they_were_unused() 
 @pytest.mark.parametrize("value", [0.0, 1.0, '"some"', "nan", "[1]"])
 def test_a_standard_error_that_is_no_share_is_refused(value) -> None:
     with pytest.raises(InputError, match=r"numerics\.objective_tolerance"):
-        with_numerics(averaged_revolutions="auto", objective_tolerance=value)
+        with_numerics(averaged_revolutions="auto", objective="mean-gap", objective_tolerance=value)

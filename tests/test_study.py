@@ -338,7 +338,7 @@ def test_a_formula_has_no_chaos_and_the_study_says_so(results):
     assert line.text.startswith("0 of ")
     spoilt = found.copy(deep=True)
     spoilt["chaotic"][:], spoilt["chaos_share"][:] = 0.5, 0.4
-    lines = dict(answer(files | {"chaos": spoilt}, "here"))
+    lines = {one.label: one.text for one in answer(files | {"chaos": spoilt}, "here")}
     assert (
         "change 50% of the recommended design's samples and explain 40% of its variance"
         in lines["chaos"]
