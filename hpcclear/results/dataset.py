@@ -230,7 +230,8 @@ def samples_dataset(
     if not np.isfinite(values).all():
         raise ValueError("a design is not finite")
     order = np.argsort(records["sample"], kind="stable")
-    records, values = records[order], values[order]
+    if np.any(np.diff(order) < 0):
+        records, values = records[order], values[order]
     if np.any(np.diff(records["sample"]) == 0):
         raise ValueError("a sample occurs twice")
     data = {variable_name(name): values[:, i] for i, name in enumerate(names)}
