@@ -94,10 +94,12 @@ def test_responses_side_by_side_have_the_bytes_of_single_ones():
     made = [scene.with_(changes) for changes in (*alike, *others, {**ideal, "effects": {}})]
     assert [kernel_of(one) == kernel_of(made[0]) for one in made] == [True] * 3 + [False] * 4
     assert kernel_of(made[3]) == kernel_of(made[4])
-    found = dict(simulate_together(made))
+    copies = [0, 2, 1, 0, 0, 3, 0]
+    found = dict(simulate_together(made, copies))
     assert sorted(found) == list(range(len(made)))
-    for k, one in enumerate(made):
-        xr.testing.assert_identical(found[k], simulate(one, checked=False))
+    for k, (one, copy) in enumerate(zip(made, copies, strict=True)):
+        xr.testing.assert_identical(found[k], simulate(one, copy=copy, checked=False))
+    assert not found[1].equals(simulate(made[1], checked=False))
     assert [int(found[k]["status"]) for k in range(len(made))] == [
         0,
         0,

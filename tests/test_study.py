@@ -304,7 +304,6 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
 
     monkeypatch.setattr(Ranks, "run_points", counted)
     monkeypatch.setattr(responses, "simulate", respond)
-    monkeypatch.setattr(single, "simulate", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
     at_most = ("check", "infill", "verification", "chaos") if len(overrides) > 1 else ()
@@ -753,7 +752,6 @@ def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch)
         return response.isel(time=slice(5)).assign(status=int(Status.STEP_CAP))
 
     monkeypatch.setattr(responses, "simulate", failing)
-    monkeypatch.setattr(single, "simulate", failing)
     told: list[str] = []
     run_study(scene_of(), tmp_path, alone(), progress_style="quiet", notify=told.append)
     (about,) = (text for text in told if "has no file" in text)

@@ -102,7 +102,7 @@ def simulate(
         perturbations = (
             alone(scene.numerics.rtol) if checked and not copy and steady is None else ()
         )
-        recording = Recording(scene, copy, perturbations, objective)
+        recording = Recording(scene, (copy,), perturbations, objective)
         collected = Collected(scene, recording.samples[0])
         for rows in recording.chunks():
             collected.take(rows)
@@ -110,10 +110,13 @@ def simulate(
     return _response(named, scene, found, objective, steady)
 
 
-def simulate_together(scenes: Sequence[Scene]) -> Iterator[tuple[int, xr.Dataset]]:
+def simulate_together(
+    scenes: Sequence[Scene], copies: Sequence[int]
+) -> Iterator[tuple[int, xr.Dataset]]:
     """Simulate scenes that differ in numbers only in one batch; yield their places in the sequence and responses, in any order.
 
-    Every response has the bytes of ``simulate(scene, checked=False)``. A scene whose kernel differs is simulated alone.
+    Every response has the bytes of ``simulate(scene, copy=..., checked=False)``, with a number of `copies` for each. A scene
+    whose kernel differs is simulated alone.
     """
     groups: dict[Any, list[int]] = {}
     for k, scene in enumerate(scenes):
@@ -121,10 +124,11 @@ def simulate_together(scenes: Sequence[Scene]) -> Iterator[tuple[int, xr.Dataset
         groups.setdefault((k,) if kernel is None else kernel, []).append(k)
     for numbers in groups.values():
         if len(numbers) == 1:
-            yield numbers[0], simulate(scenes[numbers[0]], checked=False)
+            (k,) = numbers
+            yield k, simulate(scenes[k], copy=copies[k], checked=False)
             continue
         first, *others = (scenes[k] for k in numbers)
-        recording = Recording(first, beside=others)
+        recording = Recording(first, [copies[k] for k in numbers], beside=others)
         collected = [
             Collected(scenes[k], one) for k, one in zip(numbers, recording.samples, strict=True)
         ]

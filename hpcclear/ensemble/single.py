@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.dynamics.response import simulate, simulate_together
+from hpcclear.dynamics.response import simulate_together
 from hpcclear.ensemble.simulate import content_of
 from hpcclear.ranks.team import Ranks, Task
 from hpcclear.scene import Scene, load_scene
@@ -99,16 +99,10 @@ class Responses:
         return next(self._begun)
 
     def _records(self, taken: Sequence[tuple[int, int, int]]) -> Iterator[np.ndarray]:
-        """Yield records (1,) of responses; those without a perturbed start are simulated in one batch."""
+        """Yield records (1,) of responses, simulated in one batch."""
         scenes = [self._scene.with_(self._variants[variant]) for _, variant, _ in taken]
-        plain = [k for k, (_, _, copy) in enumerate(taken) if not copy]
-        for k, (_, _, copy) in enumerate(taken):
-            if copy:
-                yield self._record(
-                    taken[k][0], scenes[k], simulate(scenes[k], copy=copy, checked=False)
-                )
-        for k, response in simulate_together([scenes[k] for k in plain]):
-            yield self._record(taken[plain[k]][0], scenes[plain[k]], response)
+        for k, response in simulate_together(scenes, [copy for _, _, copy in taken]):
+            yield self._record(taken[k][0], scenes[k], response)
 
     def _record(self, sample: int, scene: Scene, response: xr.Dataset) -> np.ndarray:
         """The record (1,) of a response."""

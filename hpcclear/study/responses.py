@@ -9,7 +9,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.single import responses_of
+from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.report.figures.motion import phase
 from hpcclear.results.dataset import variable_name
 from hpcclear.results.provenance import provenance
@@ -84,6 +84,7 @@ def simulate_all(run: StudyRun, designs: Sequence[Choice]) -> Result:
         run.ranks,
         "responses: simulations",
         copies=settings.response_copies,
+        together=TOGETHER,
     )
     return {"names": np.array([name for name, _ in chosen]), "statistics": table}
 

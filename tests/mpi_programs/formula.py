@@ -186,10 +186,10 @@ def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=scene.objective)
 
 
-def respond_together(scenes: Sequence[Scene]):
+def respond_together(scenes: Sequence[Scene], copies: Sequence[int]):
     """Those of a batch, each by what simulates one."""
-    for k, scene in enumerate(scenes):
-        yield k, single.simulate(scene, checked=False)
+    for k, (scene, copy) in enumerate(zip(scenes, copies, strict=True)):
+        yield k, responses.simulate(scene, copy=copy, checked=False)
 
 
 def replace_dynamics(set_attribute: Callable[[object, str, object], None] = setattr) -> None:
@@ -197,7 +197,6 @@ def replace_dynamics(set_attribute: Callable[[object, str, object], None] = seta
     set_attribute(simulate, "make_evaluator", make_formula)
     set_attribute(compiling, "compile_share", compile_nothing)
     set_attribute(responses, "simulate", respond)
-    set_attribute(single, "simulate", respond)
     set_attribute(single, "simulate_together", respond_together)
 
 

@@ -90,7 +90,7 @@ class SoundingEvaluator:
 
     def _recorded(self, index: list[int], design: Points) -> Iterator[Records | None]:
         recording = Recording(
-            self.scene, 0, self._perturbations, self.scene.objective, design=design
+            self.scene, (), self._perturbations, self.scene.objective, design=design
         )
         heard = [_Heard(self.scene, sample, self._count) for sample in recording.samples]
         for rows in recording.chunks():

@@ -112,8 +112,9 @@ class Recording:
     Parameters
     ----------
     scene : Scene
-    copy : int
-        Perturb the start in the direction of this number (`hpcclear.dynamics.evaluation.steady.copies`); 0 does not.
+    copies : sequence of int
+        Perturb the starts of the scene and of those beside it in the directions of these numbers
+        (`hpcclear.dynamics.evaluation.steady.copies`); 0 does not, and is the default.
     perturbations, objective
         Replicas beside it, and what they give a half-width, as of `hpcclear.dynamics.evaluation.evaluator.Evaluator`.
     beside : sequence of Scene
@@ -125,7 +126,7 @@ class Recording:
     def __init__(
         self,
         scene: Scene,
-        copy: int = 0,
+        copies: Sequence[int] = (),
         perturbations: Sequence[int] = (),
         objective: Objective = MEAN_GAP,
         beside: Sequence[Scene] = (),
@@ -140,8 +141,9 @@ class Recording:
         ]
         self._beside, self._values = beside, design.values
         self._refused = refused_of(scene) if alone else None
-        if copy:
-            start = [perturbed(start[0], scales(scene), range(copy, copy + 1))]
+        for k, (one, copy) in enumerate(zip((scene, *beside), copies, strict=False)):
+            if copy:
+                start[k] = perturbed(start[k], scales(one), range(copy, copy + 1))
         self._par = np.concatenate(par)
         self._start = Start(np.concatenate([begin.rows for begin in start]))
         kept = len(self._par)
