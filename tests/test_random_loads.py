@@ -155,7 +155,7 @@ def test_random_loads_move_linkages_as_in_the_dense_model(seed):
     early = time[time <= 0.25 * time[-1]]
     y = solve_ivp(
         lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, early[-1]), start.ravel(),
-        method="DOP853", rtol=1e-10, atol=1e-12, t_eval=early,
+        method="DOP853", rtol=1e-12, atol=1e-14, t_eval=early,
     ).y  # fmt: skip
     for k, name in enumerate(("body_x", "body_y", "body_angle")):
         seen = response[name].to_numpy()[: len(early)]
