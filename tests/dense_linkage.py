@@ -14,6 +14,7 @@ import numpy as np
 from dense_mechanism import Touch, touching
 
 from hpcclear.dynamics.linkage import parts as m
+from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.loads.cylinder import Cylinder
 from hpcclear.dynamics.linkage.loads.drag import Drag
 from hpcclear.dynamics.linkage.loads.torsion_spring import TorsionSpring
@@ -411,3 +412,13 @@ def admissible(dense, q, wanted, t):
         return wanted
     given = -dense.along(q, np.zeros(dense.n), t)[1]
     return wanted - np.linalg.lstsq(J, J @ wanted - given, rcond=None)[0]
+
+
+def start_of(dense):
+    """Coordinates and velocities, (2, n), that a linkage starts with."""
+    made = assemble(dense.mechanism)
+    start = np.zeros((2, dense.n))
+    for k, one in enumerate(made.loops.forest.coordinates):
+        place = dense.first[one.body] + ("x", "y", "angle").index(one.kind)
+        start[:, place] = made.q[k], made.v[k]
+    return start

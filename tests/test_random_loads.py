@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from dense_linkage import Dense
+from dense_linkage import Dense, start_of
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 from hpcclear import load_scene, simulate
-from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.planar.problem import linkage_of, poses_at_start
 
 GRAVITY = 9.81
@@ -139,13 +138,7 @@ def test_random_loads_move_linkages_as_in_the_dense_model(seed):
     scene, curves = random_scene(seed)
     mechanism = linkage_of(scene).mechanism
     dense = Dense(mechanism, [], GRAVITY, curves=curves)
-    assembly = assemble(mechanism)
-    order = [
-        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
-        for one in assembly.loops.forest.coordinates
-    ]
-    start = np.zeros((2, dense.n))
-    start[0, order], start[1, order] = assembly.q, assembly.v
+    start = start_of(dense)
     response = simulate(scene)
     for body, pose in poses_at_start(scene).items():  # what `hpcclear check` and sketches say
         now = response.sel(body=body).isel(time=0)

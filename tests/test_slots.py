@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dense_linkage import Contact, Dense
+from dense_linkage import Contact, Dense, start_of
 from scipy.integrate import solve_ivp
 from test_guides import CHI, GRAVITY, MU, RAMP
 from test_loads import machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.compiled import module_text
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.setup.problem import problem_of
@@ -153,13 +152,7 @@ def test_random_slots_move_as_in_the_dense_model(seed):
     mechanism = linkage_of(scene).mechanism
     laws = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
     dense = Dense(mechanism, [laws], GRAVITY)
-    assembly = assemble(mechanism)
-    order = [
-        dense.first[one.body] + ("x", "y", "angle").index(one.kind)
-        for one in assembly.loops.forest.coordinates
-    ]
-    start = np.zeros((2, dense.n))
-    start[0, order], start[1, order] = assembly.q, assembly.v
+    start = start_of(dense)
     response = simulate(scene)
     n, time = dense.n, response["time"].to_numpy()
     pressed = response["contact_force"].to_numpy().max(axis=1) > 1.0

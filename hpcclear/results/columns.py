@@ -266,7 +266,7 @@ WORST: Columns = {
 CLAIMS: Columns = {
     "claim": count(("claim",), "number of the claim"),
     "text": text(("claim",), "what is claimed", required=True),
-    "verdict": text(("claim",), "holds, does not hold, or cannot be told (undecided)", required=True),
+    "verdict": text(("claim",), "holds, does not hold, or is undecided", required=True),
     "figure": text(("claim",), "number on which the verdict is based", required=True),
 }
 
@@ -390,7 +390,7 @@ EFFECTS: Columns = {
 
 ACCURACY: Columns = {
     "integrator": text(("integrator",), "integrator"),
-    "rung": count(("rung",), "tolerance level"),
+    "rung": count(("rung",), "number of the tolerance, from the loosest"),
     "quantity": text(("quantity",), "quantity of the error"),
     "setting": number(("integrator", "rung"), "1",
         "relative tolerance, or step over period for fixed steps", required=True),

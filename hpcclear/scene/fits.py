@@ -36,7 +36,7 @@ class Tolerance(Table):
     towards: Literal["upper", "lower"] | None = None
     """Limit of size towards which the mean is shifted if `cpk` is less than `cp`."""
     inspected: bool = True
-    """Whether parts outside the limits of size are sorted out by inspection."""
+    """Whether inspection rejects parts outside the limits of size."""
 
     @model_validator(mode="before")
     @classmethod
