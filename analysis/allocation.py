@@ -200,7 +200,7 @@ def judged(
     """An allocation, and what simulations of scatter of its own say of it; printed."""
     one = deviation(base, parts * wide, "judge")
     cost = sum(0.5 * cost / part for cost, part in zip(COSTS.values(), parts, strict=True))
-    row = {"found_by": name, "cost": round(cost, 4)}
+    row = {"found_by": name, "cost": round(float(cost), 4)}
     row |= dict(zip(COSTS, np.round(parts, 3).tolist(), strict=True))
     row |= {"above_threshold": round(one.value / threshold - 1.0, 5), "error": round(one.error / threshold, 5)}  # fmt: skip
     print(row, flush=True)
