@@ -26,7 +26,7 @@ from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, R
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import linkage_of, refused_of
+from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
@@ -219,9 +219,12 @@ def _turns(scene: Scene) -> int:
 
 
 def _reason(scene: Scene) -> dict[str, str | int]:
-    """Where a linkage that cannot turn locks, as an attribute."""
+    """Where a linkage that cannot turn locks, or what is to be known of one that turns, as an attribute."""
     refusal = refused_of(scene)
-    return {} if refusal is None else {"ended": refusal[1].reason}
+    if refusal is not None:
+        return {"ended": refusal[1].reason}
+    cautions = cautions_of(scene)
+    return {"cautions": "\n".join(cautions)} if cautions else {}
 
 
 _REPORTED = (
