@@ -24,18 +24,17 @@ ENDS = {"least mean": "mean", "least standard deviation": "deviation"}
 OTHERS = ("original", "paper alpha", "paper beta")  # verified for comparison, on no front
 
 
-def processor_time() -> float:
-    """User and system time of all processes that have ended, s."""
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime
+def _processor_time() -> float:
+    return sum(
+        resource.getrusage(resource.RUSAGE_CHILDREN)[:2]
+    )  # user and system, of all that has ended
 
 
 def study(root: Path, out: Path, seed: int) -> pd.DataFrame:
     """Run the study of a version; its cost and the ends of its fronts, a row each with the ends of the interval."""
-    began = processor_time()
-    scene = str(root / "jobs" / "robust_slider_crank.toml")
+    began, scene = _processor_time(), str(root / "jobs" / "robust_slider_crank.toml")
     run(root, ["run", scene, "-o", str(out), "--set", f"study.seed={seed}"], 2)
-    spent = processor_time() - began
+    spent = _processor_time() - began
     with xr.open_dataset(out / "verification.nc") as verified:
         samples = int(verified["samples"].sum())
         costs = {
@@ -69,7 +68,7 @@ def report(rows: pd.DataFrame) -> None:
     for name, pair in pairs.groupby("quantity", sort=False):
         before, after = pair["value_before"], pair["value_after"]
         low, middle, high = np.quantile(after / before, (0.25, 0.5, 0.75))
-        words = f"{name:52s} {before.median():10.4g} {after.median():10.4g} {middle:7.3f} {low:6.3f}-{high:.3f}"
+        words = f"{name:44s} {before.median():10.4g} {after.median():10.4g} {middle:7.3f} {low:6.3f}-{high:.3f}"
         if pair["lower_before"].notna().all():
             apart = np.maximum(pair["lower_before"], pair["lower_after"])
             agree = apart <= np.minimum(pair["upper_before"], pair["upper_after"])
@@ -78,8 +77,7 @@ def report(rows: pd.DataFrame) -> None:
 
 
 def main() -> None:
-    style = argparse.RawTextHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=style)
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("commit", help="of the earlier version, or a directory with its source")
     parser.add_argument("--after", help="of the later one; by default this checkout")
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
@@ -89,16 +87,16 @@ def main() -> None:
         place = Path(folder)
         versions = {"before": words.commit, "after": words.after}
         roots = {name: sources(one, place / name) for name, one in versions.items()}
-        rows = []
+        rows: list[pd.DataFrame] = []
         for name, root in roots.items():
-            scene = str(root / "jobs" / "quickstart.toml")
-            run(root, ["run", scene, "-o", str(place / f"compiled-{name}")], 2)
+            quickstart = str(root / "jobs" / "quickstart.toml")
+            run(root, ["run", quickstart, "-o", str(place / f"compiled-{name}")], 2)
         for seed in words.seeds:
-            for name in sorted(roots, reverse=bool(seed % 2)):
+            for name in sorted(roots, reverse=bool(len(rows) // 2 % 2)):
                 found = study(roots[name], place / f"{name}-{seed}", seed)
                 rows.append(found.assign(seed=seed, version=name))
             pd.concat(rows).to_csv(words.csv, index=False, float_format="%.6g")
-    print(f"{'quantity':52s} {'before':>10s} {'after':>10s} {'ratio':>7s} {'quarters':>12s}")
+    print(f"{'quantity':44s} {'before':>10s} {'after':>10s} {'ratio':>7s} {'quarters':>12s}")
     report(pd.concat(rows))
 
 
