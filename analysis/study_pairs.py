@@ -9,7 +9,7 @@ standard deviation, by simulation. They agree if their 95 % confidence intervals
 """
 
 import argparse
-import resource
+import os
 import tempfile
 from pathlib import Path
 
@@ -24,33 +24,23 @@ ENDS = {"least mean": "mean", "least standard deviation": "deviation"}
 OTHERS = ("original", "paper alpha", "paper beta")  # verified for comparison, on no front
 
 
-def _processor_time() -> float:
-    return sum(
-        resource.getrusage(resource.RUSAGE_CHILDREN)[:2]
-    )  # user and system, of all that has ended
-
-
 def study(root: Path, out: Path, seed: int) -> pd.DataFrame:
     """Run the study of a version; its cost and the ends of its fronts, a row each with the ends of the interval."""
-    began, scene = _processor_time(), str(root / "jobs" / "robust_slider_crank.toml")
+    began, scene = os.times(), str(root / "jobs" / "robust_slider_crank.toml")
     run(root, ["run", scene, "-o", str(out), "--set", f"study.seed={seed}"], 2)
-    spent = _processor_time() - began
+    spent = sum(os.times()[2:4]) - sum(began[2:4])  # user and system time of children
     with xr.open_dataset(out / "verification.nc") as verified:
         samples = int(verified["samples"].sum())
-        costs = {
-            "processor time [s]": spent,
-            "verification samples": samples,
-            "processor time per verification sample [ms]": 1e3 * spent / samples,
-        }
-        rows = [*((*cost, np.nan, np.nan) for cost in costs.items()), *ends(verified)]
+        costs = [("processor time [s]", spent), ("verification samples", samples)]
+        costs += [("processor time per verification sample [ms]", 1e3 * spent / samples)]
+        rows = [*((*cost, np.nan, np.nan) for cost in costs), *ends(verified)]
     return pd.DataFrame(rows, columns=["quantity", "value", "lower", "upper"])
 
 
 def ends(verified: xr.Dataset) -> list[tuple[str, float, float, float]]:
     """Least mean and least standard deviation of each case, with their intervals, mm."""
     columns = [f"{n}_{e}" for n in ENDS.values() for e in ("true", "lower", "upper")]
-    table = 1e3 * verified[columns].to_dataframe()
-    found = []
+    table, found = 1e3 * verified[columns].to_dataframe(), []
     for case in dict.fromkeys(verified["case"].values.tolist()):
         others = table.index.isin([f"{case} {name}" for name in OTHERS])
         own = table[(verified["case"].values == case) & ~others]
