@@ -11,8 +11,9 @@ from hpcclear.accuracy.surrogate import region_of
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.host import process_fields
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
-from hpcclear.ranks.schedule import COLUMNS
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks import leading
+from hpcclear.ranks.schedule import COLUMNS, Task
+from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
@@ -72,7 +73,7 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     stage = _stage(number, samples)
     task = Task(stage, make_evaluator, payload_of(scene, points), workers=number)
     started = time.perf_counter()
-    ranks.run_points(task, points.values, keep=False)
+    leading.run_points(ranks, task, points.values, keep=False)
     wall = time.perf_counter() - started
     return float(wall - ranks.stage_seconds[stage][0, COLUMNS.index("compile")])
 

@@ -9,7 +9,7 @@ import numpy as np
 from hpcclear.accuracy.profile import Profile
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.outcome import Status
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box, to_physical

@@ -9,7 +9,8 @@ import re
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -276,7 +277,7 @@ class Session:
         self, names: Sequence[str] = (), units: Mapping[str, str] | None = None
     ) -> Checkpoint:
         """What an earlier run left unfinished; `names` and `units` are those of its design variables."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             self._checkpoint = Checkpoint(
                 self.place.parts,
                 self.key,
@@ -296,9 +297,15 @@ class Session:
             self.notify(problem)
         self._reported = len(problems)
 
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Count the time inside as output of files."""
+        with self.ranks.stage("files"), self.ranks.writing():
+            yield
+
     def write(self, content: xr.Dataset) -> xr.Dataset:
         """Write the result file; returns what was written."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             dataset.write(content, self.place.output)
         return content
 

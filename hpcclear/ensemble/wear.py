@@ -22,8 +22,8 @@ from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
+from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ranks.progress import LivesProgress, Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint

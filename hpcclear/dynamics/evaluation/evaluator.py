@@ -9,7 +9,7 @@ from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
-from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective, asked
 from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.joint_laws import has_pressure, widest_contact
@@ -21,6 +21,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -207,6 +208,24 @@ class Evaluator:
             if (group["flags"] & _ARRIVED).all():
                 done.append(joined(sample, self._partial.pop(sample), self._objective))
         return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
+
+
+class Judge:
+    """A rank's worker: an evaluator whose records contain the requested objective; see `hpcclear.ranks.schedule.Worker`."""
+
+    def __init__(self, evaluator: Worker, objective: Objective) -> None:
+        self._evaluator, self._objective = evaluator, objective
+        self.lanes = evaluator.lanes
+        self.submit = evaluator.submit
+
+    @property
+    def pending(self) -> int:
+        """Samples submitted and not finished."""
+        return self._evaluator.pending
+
+    def advance(self, seconds: float) -> Records:
+        """Work for about `seconds`; records of what finished meanwhile."""
+        return asked(self._evaluator.advance(seconds), self._objective)
 
 
 def with_pressures(
