@@ -24,14 +24,13 @@ from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
 from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
 from hpcclear.dynamics.planar.problem import linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
-from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.parameters import has_pressure, parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, effects_of, integrator_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec

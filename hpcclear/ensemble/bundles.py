@@ -14,7 +14,7 @@ from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.parts import PARTIAL, packed, part_length, take_parts
 from hpcclear.ensemble.raw import raw_files
 from hpcclear.scene import load_scene
-from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import BLOCK
 

@@ -18,7 +18,8 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 from hpcclear.scene.units import UnitError, note, to_si
 
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]

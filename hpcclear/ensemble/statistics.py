@@ -33,7 +33,7 @@ from hpcclear.ranks.schedule import COLUMNS, Points, Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
 from hpcclear.statistics.streams.summary import BLOCK, ROWS, Summary
 

@@ -14,7 +14,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.dynamics.setup.parameters import Numbers, wave_paths
+from hpcclear.dynamics.setup.further import wave_paths
 from hpcclear.dynamics.wear.curves import DEEPEST
 from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Asking, Plan, Seen, life
@@ -29,7 +29,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
 from hpcclear.scene.sampling import monte_carlo
 
 PERTURBATION = 1e-9

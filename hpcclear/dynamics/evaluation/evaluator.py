@@ -12,18 +12,17 @@ from hpcclear.base.jit import doubles_in_a_vector
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective, asked
 from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.joint_laws import has_pressure, widest_contact
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.planar import energy
-from hpcclear.dynamics.setup.parameters import Numbers, parameters
+from hpcclear.dynamics.setup.parameters import has_pressure, parameters, widest_contact
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
 
 VECTORS = 4
 """Vectors that the lanes of an ensemble fill at most: enough for the processor to work on one while another waits for a root or

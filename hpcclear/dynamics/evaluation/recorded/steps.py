@@ -16,10 +16,9 @@ from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import failed
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator, with_pressures
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
-from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.layout.views import Rates, Start
 from hpcclear.dynamics.planar.problem import refused_of
-from hpcclear.dynamics.setup.parameters import parameters
+from hpcclear.dynamics.setup.parameters import has_pressure, parameters
 from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec
