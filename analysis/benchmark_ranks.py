@@ -87,6 +87,7 @@ def inside(task: str, count: int) -> int:
     from hpcclear.ranks.leading import run_points
     from hpcclear.ranks.schedule import COLUMNS, Task
     from hpcclear.ranks.team import Ranks
+    from hpcclear.scene.record import record_of
 
     line = LINE
 
@@ -102,7 +103,7 @@ def inside(task: str, count: int) -> int:
                 statistics.run_statistics(scene, output, ranks, samples=count, options=options)
                 spent = ranks.stage_seconds["statistics"]
         else:
-            work = Task("samples", make_watched, payload_of(scene, points))
+            work = Task("samples", make_watched, payload_of(scene, points), record_of(scene))
             records = run_points(ranks, work, points.values)
             spent = ranks.stage_seconds["samples"]
             cost = records["rhs_evaluations"]

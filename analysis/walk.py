@@ -7,6 +7,7 @@ of what came of it and write the file: every file of the package that is on the 
 docs/architecture.md has them in its walk, besides those of the kernel, whose calls Python does not see.
 """
 
+import contextlib
 import importlib
 import sys
 import tempfile
@@ -98,12 +99,9 @@ def main() -> None:
     def program() -> None:
         with tempfile.TemporaryDirectory() as folder:
             scene = ROOT.parent / "jobs" / "quickstart.toml"
-            try:
-                command(
-                    ["sample", str(scene), "--set", "study.samples=8", "-o", f"{folder}/s.nc"]
-                )
-            except SystemExit:
-                pass
+            words = ["sample", str(scene), "--set", "study.samples=8", "-o", f"{folder}/s.nc"]
+            with contextlib.suppress(SystemExit):
+                command(words)
 
     found = passed(program)
     for k, (name, station) in enumerate(found.items(), 1):

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import recast
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble import simulate
 from hpcclear.ensemble.identity import sample_key
@@ -23,6 +24,7 @@ from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, expanded
+from hpcclear.scene.record import record_of
 from hpcclear.scene.sampling import sampled
 from hpcclear.scene.table import read_points
 
@@ -150,6 +152,7 @@ def sample_points(
     stage: str = "samples",
     first: int = 0,
     maker: Maker | None = None,
+    record: np.dtype | None = None,
 ) -> np.ndarray:
     """Simulate a design on all ranks; call it on root.
 
@@ -166,10 +169,12 @@ def sample_points(
         Number of the first point in the checkpoint, for designs that come one after the other.
     maker : function of a payload and the ranks, optional
         Makes a rank's worker; by default `make_evaluator`.
+    record : dtype, optional
+        Type of the records; by default that of the scene (`hpcclear.scene.record.record_of`).
 
     Returns
     -------
-    structured ndarray of `hpcclear.base.outcome.OUTCOME`, shape (n,)
+    structured ndarray of `record`, shape (n,)
         In the points' order; samples numbered from 0.
 
     Raises
@@ -180,10 +185,12 @@ def sample_points(
         The disk refuses.
     """
     sent = expanded(scene.study, points)  # rows of catalogues as the numbers they stand for
-    task = Task(stage, maker or simulate.make_evaluator, simulate.payload_of(scene, sent))
+    record = record_of(scene) if record is None else record
+    payload = simulate.payload_of(scene, sent)
+    task = Task(stage, maker or simulate.make_evaluator, payload, record)
     if checkpoint is None:
         return leading.run_points(ranks, task, sent.values, progress=progress)
-    completed = checkpoint.completed(first, len(points))
+    completed = recast(checkpoint.completed(first, len(points)), record)
     completed["sample"] -= first
 
     def take(records: np.ndarray) -> None:

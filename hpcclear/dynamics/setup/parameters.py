@@ -25,6 +25,7 @@ from hpcclear.dynamics.setup.further import (
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import length_path
 from hpcclear.scene.points import Numbers, Points
+from hpcclear.scene.record import has_pressure
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
@@ -199,12 +200,6 @@ def _inertia(scene: Scene, get: Numbers, p: Array) -> Array:
     turning = np.abs(p[:, at.SPEED])
     pin = turning * p[:, at.DRIVEN_LENGTH]
     return np.maximum(_mass(scene, get) * pin * turning, 1e-300)
-
-
-def has_pressure(scene: Scene) -> bool:
-    """Whether the geometry of a scene's contacts has a pressure."""
-    law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
-    return law is not None and law.geometry is not None and law.geometry.pressure is not None
 
 
 def widest_contact(scene: Scene, get: Numbers, forces: Array) -> dict[str, Array]:
