@@ -140,7 +140,7 @@ class Process(Protocol):
         """No sample is in hand any more."""
 
     def timed(self, name: str, /) -> AbstractContextManager[np.ndarray]:
-        """Book the wall time inside; the table to fill, see `COLUMNS`."""
+        """Book the wall time inside; the table to fill, shape (ranks, 4), columns as in `COLUMNS`."""
 
     def raise_if_stopped(self) -> None:
         """Raise `Stopped` if requested to end early."""

@@ -33,7 +33,8 @@ def has_waves(scene: Scene) -> bool:
 
 
 def with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
-    """With the waves of surfaces that are out of round, and thresholds of wear; of joints without the former are 0."""
+    """Parameters (m, PARAMETERS) with the waves of surfaces that are out of round, and thresholds of wear; of joints without
+    the former are 0."""
     rows = np.zeros((len(p), at.FURTHER))
     rows[:, : p.shape[1]] = p
     for joint in scene.pins():
@@ -106,7 +107,13 @@ def _place(scene: Scene, joint: str) -> int:
 
 
 def with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
-    """With what films are solved for once a bearing."""
+    """Parameters (m, PARAMETERS) with what films are solved for once a bearing.
+
+    Raises
+    ------
+    InputError
+        If samples differ in length over diameter of such a film.
+    """
     rows = np.zeros((len(p), further_rows(scene)))
     rows[:, : p.shape[1]] = p
     for joint, further in _solved_films(scene).items():
