@@ -29,7 +29,7 @@ INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""
 
 _FANOUT = 8
-_KEPT = 50_000  # samples of a part that stay in memory, too: 20 MB; more are read from its file when they are asked for
+_KEPT = 50_000  # samples of a part that stay in memory, too: some MB; more are read from its file when they are asked for
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
 _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
 _DONE = "done.nc"  # all that follows from the other files is written, and they are being removed

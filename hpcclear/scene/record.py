@@ -1,4 +1,4 @@
-"""The record of a sample as a scene asks for it: the one place that decides its type.
+"""The record of a sample as a scene requests it: the one place that decides its type.
 
 Workers, ranks, checkpoints and statistics take it from here, so that a sample costs the memory of what was requested.
 """
