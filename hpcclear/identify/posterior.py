@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -267,12 +268,8 @@ def _scatter(unknowns: Array, missed: Array) -> tuple[Callable[[Array], Array], 
     common = float(squares.mean())
 
     def relative(places: Array) -> Array:
-        near = np.zeros((len(places), len(unknowns)))
-        for column, own in zip(
-            places.T, unknowns.T, strict=False
-        ):  # further columns are nuisance inputs
-            near += (column[:, None] - own) ** 2
-        weight = np.exp(-0.5 * near / NEAR**2)
+        near = cdist(places[:, : unknowns.shape[1]], unknowns, "sqeuclidean")
+        weight = np.exp(-0.5 / NEAR**2 * near)
         return np.asarray((weight @ squares + common) / (weight.sum(1) + 1.0))
 
     scale = relative(unknowns)
