@@ -4,18 +4,20 @@ A place, its lock, what a killed run left there, the key that says whether resul
 them, and at the end the times and the removal of what was unfinished.
 """
 
+from __future__ import annotations
+
 import os
 import re
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
@@ -39,6 +41,9 @@ from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.record import record_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -266,7 +271,7 @@ class Session:
         """Whether all these files of the directory are there; another run's are refused."""
         there = [path for name in names if (path := self.place.output / name).exists()]
         for path in there:
-            check_key(dataset.read(path), self.key, path)
+            check_key(dataset.content_in(path), self.key, path)
         return len(there) == len(names)
 
     def describe(self, scene: Scene, mapped: bool = False) -> None:
@@ -282,7 +287,7 @@ class Session:
         self, names: Sequence[str] = (), units: Mapping[str, str] | None = None
     ) -> Checkpoint:
         """What an earlier run left unfinished; `names` and `units` are those of its design variables."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             self._checkpoint = Checkpoint(
                 self.place.parts,
                 self.key,
@@ -303,9 +308,15 @@ class Session:
             self.notify(problem)
         self._reported = len(problems)
 
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Count the time inside as output of files."""
+        with self.ranks.stage("files"), self.ranks.writing():
+            yield
+
     def write(self, content: xr.Dataset) -> xr.Dataset:
         """Write the result file; returns what was written."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             dataset.write(content, self.place.output)
         return content
 
