@@ -4,6 +4,8 @@ A place, its lock, what a killed run left there, the key that says whether resul
 them, and at the end the times and the removal of what was unfinished.
 """
 
+from __future__ import annotations
+
 import os
 import re
 import shlex
@@ -13,10 +15,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME
@@ -37,6 +38,9 @@ from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.record import record_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -264,7 +268,7 @@ class Session:
         """Whether all these files of the directory are there; another run's are refused."""
         there = [path for name in names if (path := self.place.output / name).exists()]
         for path in there:
-            check_key(dataset.read(path), self.key, path)
+            check_key(dataset.content_in(path), self.key, path)
         return len(there) == len(names)
 
     def describe(self, scene: Scene, mapped: bool = False) -> None:
