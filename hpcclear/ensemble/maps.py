@@ -10,8 +10,8 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.samples import sample_points, saving
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
+from hpcclear.ensemble.samples import sample_points, samples_of, saving
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks

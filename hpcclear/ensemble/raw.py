@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcclear.ensemble.session import samples_of
+from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import collection, dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.pages import MonteCarloPoints

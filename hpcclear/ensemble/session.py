@@ -19,9 +19,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
@@ -39,7 +37,6 @@ from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
 from hpcclear.scene.record import record_of
 
 if TYPE_CHECKING:
@@ -338,28 +335,6 @@ class Session:
         spent = sum(self.ranks.stage_seconds.values(), spent)
         seconds = time.perf_counter() - began
         return Finished(content, self.place.output, self.place.timing, seconds, spent)
-
-
-def samples_of(
-    points: Points,
-    records: Records,
-    attributes: Mapping[str, str],
-    objective: Objective = MEAN_GAP,
-    joints: Sequence[str] = JOINTS,
-) -> xr.Dataset:
-    """A dataset of kind ``samples`` of points and what became of them, a record each."""
-    drawn = {"sampling": points.sampling} if points.sampling else {}
-    return dataset.samples_dataset(
-        points.names,
-        points.values,
-        dict(zip(points.names, points.units, strict=True)),
-        records,
-        {**attributes, **drawn},
-        objective,
-        points.words,
-        joints,
-        points.labels,
-    )
 
 
 def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.Dataset:
