@@ -1,21 +1,32 @@
-"""The `sample` command: points -> ranks -> one dataset, checkpointed on the way."""
+"""Designs of a scene through the dynamics, on all ranks, checkpointed on the way; the `sample` command, which writes them."""
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import recast
 from hpcclear.dynamics.evaluation.steady.wording import recorded
+from hpcclear.ensemble import simulate
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
-from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ensemble.split import Part
+from hpcclear.ranks import leading
 from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.schedule import Maker, Task
+from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import read_points, sampled
+from hpcclear.scene.points import Points, expanded
+from hpcclear.scene.record import record_of
+from hpcclear.scene.sampling import sampled
+from hpcclear.scene.table import read_points
 
 MEMORY = 2.3e-6
 """GB that root takes for a sample (`analysis/many_ranks.py`)."""
@@ -106,6 +117,98 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.
     records["sample"] += first
     attributes = session.attributes | recorded(scene, records)
     with saving(checkpoint.flush):  # what came since the last save, if the file cannot be written
-        return session.write(
-            samples_of(points, records, attributes, scene.objective, session.joints)
+        content = samples_of(points, records, attributes, scene.objective, session.joints)
+        with session.writing():
+            dataset.write(content, session.place.output)
+    return content
+
+
+@contextmanager
+def saving(save: Callable[[], object]) -> Iterator[None]:
+    """Save what is finished when an exception ends the block, even if a save itself was what failed.
+
+    A fault may be gone a moment later. When the last save fails as well, its own error says so after
+    a stop, for which all was to be saved; after an error, that error is what the caller hears of.
+    """
+    try:
+        yield
+    except Stopped:
+        save()
+        raise
+    except BaseException as error:  # noqa: BLE001 - raised again
+        try:
+            save()
+        finally:
+            raise error from error.__cause__  # without the context: it is the failed save, if any
+
+
+def sample_points(
+    scene: Scene,
+    points: Points,
+    ranks: Ranks,
+    checkpoint: Checkpoint | None = None,
+    progress: Progress | None = None,
+    *,
+    stage: str = "samples",
+    first: int = 0,
+    maker: Maker | None = None,
+    record: np.dtype | None = None,
+) -> np.ndarray:
+    """Simulate a design on all ranks; call it on root.
+
+    Parameters
+    ----------
+    points : Points
+        Designs, SI.
+    checkpoint : Checkpoint, optional
+        Knows the samples finished earlier, and gets each new one; its names are those of `points`.
+        When this raises, everything finished is on disk, unless the disk refused it twice.
+    stage : str
+        Name for reports and timing.
+    first : int
+        Number of the first point in the checkpoint, for designs that come one after the other.
+    maker : function of a payload and the ranks, optional
+        Makes a rank's worker; by default `make_evaluator`.
+    record : dtype, optional
+        Type of the records; by default that of the scene (`hpcclear.scene.record.record_of`).
+
+    Returns
+    -------
+    structured ndarray of `record`, shape (n,)
+        In the points' order; samples numbered from 0.
+
+    Raises
+    ------
+    Stopped, RankFailed, InputError
+        As `hpcclear.ranks.leading.run_points`.
+    StorageError
+        The disk refuses.
+    """
+    sent = expanded(scene.study, points)  # rows of catalogues as the numbers they stand for
+    record = record_of(scene) if record is None else record
+    payload = simulate.payload_of(scene, sent)
+    task = Task(stage, maker or simulate.make_evaluator, payload, record)
+    if checkpoint is None:
+        return leading.run_points(ranks, task, sent.values, progress=progress)
+    completed = recast(checkpoint.completed(first, len(points)), record)
+    completed["sample"] -= first
+
+    def take(records: np.ndarray) -> None:
+        numbered = records.copy()
+        numbered["sample"] += first
+        checkpoint.add(numbered, points.values[records["sample"]])
+
+    def save() -> None:
+        with ranks.stage(stage), ranks.writing():
+            checkpoint.flush()
+
+    with saving(save):
+        return leading.run_points(
+            ranks,
+            task,
+            sent.values,
+            completed=completed,
+            on_records=take,
+            save=checkpoint.flush_when_due,
+            progress=progress,
         )

@@ -20,8 +20,9 @@ from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
+from hpcclear.scene.streams import generator
 from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.study import extent, goals, truth, verdicts
 from hpcclear.study.optimisation import Choice
