@@ -2,24 +2,26 @@
 
     python analysis/allocation.py ranks         # ten designs: halving each tolerance, by simulation; a few minutes
     python analysis/allocation.py ranks --seed 101
-    python analysis/allocation.py mechanism     # widths of three inputs of a slider-crank on a grid of costs; some minutes
+    python analysis/allocation.py mechanism     # widths of three inputs; some minutes; writes analysis/results/allocation.csv
 
 `ranks`: of each design the fall of the standard deviation of f with half the scatter of each input, as a study prints it from
 the samples that verify the design, beside the fall that simulations with half the scatter show. The criterion: a design is
 right if each two inputs whose simulated falls differ by more than three standard errors are predicted in the same order. It was
 fixed on seed 1; other seeds judge it.
 
-`mechanism`: a study minimises the cost of three widths while the standard deviation of f stays below a threshold. All widths
-of a grid that keep it are simulated beside it.
+`mechanism`: a study minimises the cost of three widths while the standard deviation of f stays below a threshold. Beside it a
+search by simulations alone (COBYLA, `JUDGED` of them for each widths, the same random numbers for all) minimises the same.
 """
 
 import argparse
+import csv
 import itertools
 import tempfile
 import tomllib
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import minimize
 
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ranks.boundary import alone
@@ -27,13 +29,17 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.statistics.random.replicates import moments
+from hpcclear.statistics.random.replicates import Estimate, moments
 from hpcclear.statistics.sensitivity.contributions import contributions
 from hpcclear.study import run_study
 
 ROOT = Path(__file__).parent.parent
+RESULTS = Path(__file__).parent / "results" / "allocation.csv"
 REPLICATES, LENGTH = 16, 64
 """Randomised Sobol sequences and their length: 1024 simulations of each standard deviation."""
+
+JUDGED = 2048
+"""Simulations of each standard deviation that judges an allocation."""
 
 SURE = 3.0
 """Standard errors beyond which two falls differ: with 15 pairs of inputs a design, 2 would call one wrong in half of them."""
@@ -129,8 +135,12 @@ COSTS = {"C12": 1.0, "m3": 0.3, "u2": 0.6}
 """Costs of three widths at half of their largest values, reciprocal."""
 
 
+START = 0.4
+"""Part of each largest width from which the search by simulations alone begins."""
+
+
 def mechanism() -> None:
-    """Compare the allocation of a study with all of a grid of widths."""
+    """Compare the allocation of a study with what simulations alone find."""
     plain = scene_of(DESIGNS[1])
     study: dict = {
         "seed": 1,
@@ -155,7 +165,8 @@ def mechanism() -> None:
         }  # fmt: skip
     content = plain.resolved()
     base = load_scene(content | {"study": study})
-    threshold = deviation(base, {name: 0.5 * largest[name] for name in COSTS})
+    wide, costs = np.array(list(largest.values())), np.array(list(COSTS.values()))
+    threshold = deviation(base, 0.5 * wide).value
     study["cases"] = {
         "cheap": {
             "random": list(COSTS), "objectives": ["cost"],
@@ -167,35 +178,52 @@ def mechanism() -> None:
         run_study(load_scene(content | {"study": study}), place, alone(), progress_style="quiet")
         verified = dataset.read(Path(place) / "verification.nc")
     best = verified.sel(design="cheap alpha")
-    print(
-        f"threshold {threshold:.4g} m; at the same widths for all: cost {sum(COSTS.values()):.4g}"
-    )
-    print(f"study: cost {float(best['first_true']):.4g}, {best['constraints'].item()}")
-    grid = np.linspace(0.2, 1.0, 9)
-    found = []
-    for parts in itertools.product(grid, repeat=len(COSTS)):
-        cost = sum(c * 0.5 / part for c, part in zip(COSTS.values(), parts, strict=True))
-        found.append((cost, parts))
-    for cost, parts in sorted(found):  # the cheapest that keeps the threshold
-        widths = {name: part * largest[name] for name, part in zip(COSTS, parts, strict=True)}
-        if deviation(base, widths) <= threshold:
-            print(f"grid: cost {cost:.4g}, {widths}")
-            break
-    print({name: float(best[f"t_{name}"]) for name in COSTS})
+    print(f"threshold {threshold:.4g} m; half of the largest widths cost {costs.sum():.4g}")
+    print(f"study: {best['constraints'].item()}")
+    parts = np.array([float(best[f"t_{name}"]) for name in COSTS]) / wide
+    rows = [judged(base, "study", parts, wide, threshold)]
+    found = minimize(
+        lambda parts: (0.5 * costs / parts).sum(), np.full(len(costs), START), method="COBYLA",
+        constraints={"type": "ineq", "fun": lambda parts: 1.0 - deviation(base, parts * wide).value / threshold},
+        bounds=[(0.1, 1.0)] * len(costs), options={"rhobeg": 0.1, "maxiter": 50}, tol=2e-3,
+    )  # fmt: skip
+    rows.append(judged(base, "simulations alone", found.x, wide, threshold))
+    with RESULTS.open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(rows)
 
 
-def deviation(scene: Scene, widths: dict[str, float]) -> float:
+def judged(
+    base: Scene, name: str, parts: np.ndarray, wide: np.ndarray, threshold: float
+) -> dict[str, object]:
+    """An allocation, and what simulations of scatter of its own say of it; printed."""
+    one = deviation(base, parts * wide, "judge")
+    cost = sum(0.5 * cost / part for cost, part in zip(COSTS.values(), parts, strict=True))
+    row = {"found_by": name, "cost": round(float(cost), 4)}
+    row |= dict(zip(COSTS, np.round(parts, 3).tolist(), strict=True))
+    row |= {"above_threshold": round(one.value / threshold - 1.0, 5), "error": round(one.error / threshold, 5)}  # fmt: skip
+    print(row, flush=True)
+    return row
+
+
+def deviation(scene: Scene, widths: np.ndarray, purpose: str = "search") -> Estimate:
     """Standard deviation of f with other half-widths, by simulation."""
-    values = []
-    for k in range(REPLICATES):
-        points = monte_carlo(
-            scene, LENGTH, random=list(COSTS), replicate=k,
-            design={f"t_{name}": width for name, width in widths.items()},
-        )  # fmt: skip
-        values.append(points)
-    whole = Points(values[0].names, np.concatenate([one.values for one in values]), values[0].paths)
+    design = {f"t_{name}": float(width) for name, width in zip(COSTS, widths, strict=True)}
+    made = [
+        monte_carlo(
+            scene,
+            JUDGED // REPLICATES,
+            random=list(COSTS),
+            design=design,
+            purpose=purpose,
+            replicate=k,
+        )
+        for k in range(REPLICATES)
+    ]
+    whole = Points(made[0].names, np.concatenate([one.values for one in made]), made[0].paths)
     f = evaluate_records(scene, whole)["objective"]
-    return moments(f.reshape(REPLICATES, LENGTH))[1].value
+    return moments(f.reshape(REPLICATES, -1))[1]
 
 
 if __name__ == "__main__":

@@ -86,6 +86,7 @@ def inside(task: str, count: int) -> int:
     from hpcclear.ranks.boundary import run_on_ranks
     from hpcclear.ranks.schedule import COLUMNS
     from hpcclear.ranks.team import Ranks, Task
+    from hpcclear.scene.record import record_of
 
     line = LINE
 
@@ -101,7 +102,7 @@ def inside(task: str, count: int) -> int:
                 statistics.run_statistics(scene, output, ranks, samples=count, options=options)
                 spent = ranks.stage_seconds["statistics"]
         else:
-            work = Task("samples", make_watched, payload_of(scene, points))
+            work = Task("samples", make_watched, payload_of(scene, points), record_of(scene))
             records = ranks.run_points(work, points.values)
             spent = ranks.stage_seconds["samples"]
             cost = records["rhs_evaluations"]

@@ -1,16 +1,21 @@
 """How far the recommended design of a study with a rough objective is from the best that many more simulations find.
 
-    python analysis/regret.py OUT                          # all studies; each some minutes on one core
-    python analysis/regret.py OUT press my_study.toml      # some of them, or a scene with one case of one's own
+    python analysis/regret.py OUT                      # ten studies, an hour on one core; writes analysis/results/regret.csv
+    python analysis/regret.py OUT press my_study.toml  # some of them, or a scene with one case of one's own
 
 Each study is carried out with models of f (`study.surrogate.of = "f"`) and of the statistics over designs. The reference
-is a search by expected improvement over far more designs, with `POINTS` simulations each. The recommended designs and the best
-of the reference are then judged together, each by `JUDGED` simulations of the same scatter, which no search has seen.
-Regret is what the first objective of a recommended design is above the least that was judged, with the standard error of that
-difference. Results are kept in OUT, so that the command goes on where it was stopped.
+goes on from both: a search by expected improvement with `WIDE` more designs and `ROUNDS` times `BATCH` further ones, each of
+`POINTS` simulations. These are five times the simulations of the search of a study; a hundred times would take a day.
+What counts is what a study recommends by: the first objective, or mean + 2 standard deviations where both are minimised.
+
+The best designs of the reference are compared by `CHOSEN` simulations each. The best of them and the recommended ones
+are then judged by `JUDGED` simulations of another scatter, which no search and no choice has seen, so that none has luck.
+Regret is how far a recommended design is above the least of these three, with the standard error of that difference.
+Results are kept in OUT, so that the command goes on where it was stopped.
 """
 
 import argparse
+import csv
 import json
 import tomllib
 from collections import Counter
@@ -23,10 +28,10 @@ from directly import run_of
 
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.report.merit import recommended
+from hpcclear.report.merit import SPAN, recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
@@ -38,8 +43,20 @@ from hpcclear.study.optimisation import Choice
 
 HERE = Path(__file__).parent
 JOBS = HERE.parent / "jobs"
-WIDE, ROUNDS, BATCH, POINTS = 40, 8, 10, 256
-JUDGED, BEST = 4096, 6
+WIDE, ROUNDS, BATCH, POINTS = 24, 6, 8, 256
+CHOSEN, JUDGED, BEST = 512, 4096, 6
+RESULTS = HERE / "results" / "regret.csv"
+FIELDS = (
+    "study",
+    "searched_by",
+    "r2_of_f",
+    "simulations",
+    "forecast",
+    "least",
+    "regret",
+    "error",
+    "broken",
+)
 
 SMALL: dict[str, Any] = {
     "seed": 5,
@@ -270,28 +287,39 @@ def choice_at(scene: Scene, unit: list[float]) -> Choice:
 
 
 def main() -> None:
-    """Carry out, judge and print studies."""
+    """Carry out, judge, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("studies", nargs="*", default=list(STUDIES))
     parser.add_argument("--seed", type=int, help="another seed than the study's")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="of the reference")
     parser.add_argument("--judged", type=int, default=JUDGED, help="simulations of each design")
+    parser.add_argument("--csv", type=Path, default=RESULTS)
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
-    print(
-        f"{'study':24} {'searched by':12} {'R2 of f':>8} {'simulations':>12}  regret of the first objective"
-    )
+    rows: list[dict[str, Any]] = []
+    print(*FIELDS)
     for name in words.studies:
         scene = scene_of(name)
         if words.seed is not None:
             scene = scene.with_({"study.seed": words.seed})
         label = Path(name).stem + ("" if words.seed is None else f"_{words.seed}")
-        measured(words.out / label, label, scene, words.rounds, words.judged)
+        for row in measured(words.out / label, label, scene, words.rounds, words.judged):
+            rows.append(row)
+            print(*row.values(), flush=True)
+        with words.csv.open("w", newline="") as file:
+            table = csv.DictWriter(file, FIELDS)
+            table.writeheader()
+            table.writerows(rows)
+    for of in ("f", "statistics"):
+        regret = np.array([row["regret"] for row in rows if row["searched_by"] == of])
+        print(f"{of}: regret {np.median(regret):.2%} in the median, {regret.max():.2%} at most")
 
 
-def measured(place: Path, label: str, scene: Scene, rounds: int, judged: int) -> None:
-    """Carry out a study both ways, and print the regret of each."""
+def measured(
+    place: Path, label: str, scene: Scene, rounds: int, judged: int
+) -> list[dict[str, Any]]:
+    """Carry out a study both ways; the regret of each, relative to the least, in rows of the table."""
     place.mkdir(exist_ok=True)
     runs = {}
     for of in ("f", "statistics"):
@@ -303,26 +331,54 @@ def measured(place: Path, label: str, scene: Scene, rounds: int, judged: int) ->
     for directory, _ in runs.values():
         table = dataset.read(directory / "verification.nc", "verification")
         best = table.sel(design=recommended(table))
-        taken.append({name: float(best[name]) for name in names})
+        taken.append([float(best[name]) for name in names])
     kept = place / "reference.npy"
     if not kept.exists():
-        np.save(kept, reference(scene, case, rounds))
-    rows = [list(one.values()) for one in taken] + np.load(kept).tolist()
-    choices = [Choice("", case, dict(zip(names, row, strict=True))) for row in rows]
-    found = told(scene, choices, judged // REPLICATES, "judge")
-    values, shifts = found["goal"][:, 0], found["goal_shifts"][:, 0]
-    broken = found["excess"] > 0.0
+        found = choices_of(scene, case, reference(scene, case, rounds, np.array(taken)))
+        values, _, broken = merits(scene, found, CHOSEN, "chosen")
+        np.save(kept, list(found[int(np.where(broken, np.inf, values).argmin())].design.values()))
+    values, shifts, broken = merits(
+        scene, choices_of(scene, case, [*taken, np.load(kept)]), judged, "judge"
+    )
     least = int(np.where(broken, np.inf, values).argmin())
+    told_of = []
     for row, (of, (directory, count)) in enumerate(runs.items()):
-        error = float(spread((shifts[row] - shifts[least])[None])[0])
-        scale = abs(values[least]) / 100.0
         models = dataset.read(directory / "kriging.nc", "kriging")
-        text = f"{(values[row] - values[least]) / scale:.2f} % ± {error / scale:.2f} %"
-        text += " (breaks a constraint)" if broken[row] else ""
-        changed = scene.with_({"study.surrogate.of": of})
-        said, _ = forecast.expected(changed, partial(evaluated, changed), 1e-3)
-        text += f"; forecast {said / count:.2f} of its simulations"
-        print(f"{label:24} {of:12} {float(models.r2[-1]):8.2f} {count:12} {text}", flush=True)
+        said, _ = forecast.expected(
+            scene.with_({"study.surrogate.of": of}), partial(evaluated, scene), 1e-3
+        )
+        scale = abs(values[least])
+        regret = (values[row] - values[least]) / scale
+        error = float(spread((shifts[row] - shifts[least])[None])[0]) / scale
+        told = (
+            label,
+            of,
+            round(float(models.r2[-1]), 3),
+            count,
+            said,
+            f"{values[least]:.6g}",
+            round(regret, 6),
+            round(error, 6),
+            int(broken[row]),
+        )
+        told_of.append(dict(zip(FIELDS, told, strict=True)))
+    return told_of
+
+
+def choices_of(scene: Scene, case: str, rows: Any) -> list[Choice]:
+    """Designs of a case from their variables."""
+    names = scene.required_study.design_variables(case)
+    return [Choice("", case, dict(zip(names, map(float, row), strict=True))) for row in rows]
+
+
+def merits(
+    scene: Scene, choices: list[Choice], count: int, purpose: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a study recommends designs by, its values in the replicates, and whether designs break a constraint."""
+    found = told(scene, choices, count // REPLICATES, purpose)
+    weights = np.array([1.0, SPAN] if scene.required_study.case(choices[0].case).plain else [1.0])
+    values, shifts = (found[part][:, : len(weights)] for part in ("goal", "goal_shifts"))
+    return values @ weights, np.einsum("nkr,k->nr", shifts, weights), found["excess"] > 0.0
 
 
 def carried_out(scene: Scene, place: Path) -> tuple[Path, int]:
@@ -354,8 +410,8 @@ def told(scene: Scene, choices: list[Choice], length: int, purpose: str) -> dict
     return truth.sequences(run_of(scene), choices, purpose, purpose, length, length * REPLICATES)
 
 
-def reference(scene: Scene, case: str, rounds: int) -> np.ndarray:
-    """The best designs of a long search, (k, d)."""
+def reference(scene: Scene, case: str, rounds: int, start: np.ndarray) -> np.ndarray:
+    """The best designs of a long search, which begins with some designs and others all over the box, (k, d)."""
     run = run_of(scene)
     names = scene.required_study.design_variables(case)
     rng = np.random.default_rng(77)
@@ -363,6 +419,7 @@ def reference(scene: Scene, case: str, rounds: int) -> np.ndarray:
     tried = None
     unit = unit_lhs(WIDE, len(names), rng)
     where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
+    where = np.vstack([to_coordinates(scene, names, start), where])
     for _ in range(rounds + 1):
         choices = refinement._choices(run, case, where)
         found = told(scene, choices, POINTS // REPLICATES, "reference")
@@ -383,10 +440,11 @@ def reference(scene: Scene, case: str, rounds: int) -> np.ndarray:
 
 
 def _ended(run: Any, case: str, known: Known, space: improvement.Space, rng: np.random.Generator) -> list[Choice]:  # fmt: skip
-    """Designs that are believed to have the least first objective, and those that had it."""
+    """Designs that are believed to be the best, and those that were."""
     beliefs = improvement.Beliefs(known, space, rng)
-    order = np.argsort(beliefs.believed[:, 0], kind="stable")[: BEST // 2]
-    lucky = np.argsort(known.values[beliefs.allowed][:, 0], kind="stable")[: BEST // 2]
+    goal = space.directions[-1 if run.study.case(case).plain else 0]
+    order = np.argsort(beliefs.believed @ goal, kind="stable")[: BEST // 2]
+    lucky = np.argsort(known.values[beliefs.allowed] @ goal, kind="stable")[: BEST // 2]
     rows = known.designs[beliefs.allowed][np.union1d(order, lucky)]
     ends = improvement.finalists(known, space, 2, rng)
     return refinement._choices(run, case, np.unique(np.vstack([rows, ends]), axis=0))

@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import sys
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.study import run_study
+from hpcclear.study.surrogates import domain
 
+JOBS = pathlib.Path(__file__).parent.parent / "jobs"
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
 sys.path.insert(0, str(PROGRAMS))
@@ -97,6 +100,17 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     assert "lightest" not in lines.get("near", "")  # widths of masses are no masses
     prices = parts["contributions"]["halving_cost"].sel(design="a alpha").to_numpy()
     assert prices == pytest.approx(costs / widths, rel=1e-9)
+
+
+def test_a_surrogate_holds_where_designs_scatter_though_it_does_not_know_all_variables():
+    """The width of u2 is a variable that only a random input knows; m3 has values, and scatters by 1 % about each."""
+    scene = load_scene(JOBS / "tolerances.toml")
+    study = scene.required_study
+    assert study.models[-1] != study.optimisation
+    region = domain(SimpleNamespace(scene=scene, study=study), study.models[-1])
+    column = region.names.index("m3")
+    assert region.lower[column] == pytest.approx(0.99 * 0.12)
+    assert region.upper[column] == pytest.approx(1.01 * 0.16)
 
 
 # -- all kinds in one study -------------------------------------------------------------------------

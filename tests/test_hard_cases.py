@@ -175,7 +175,7 @@ def test_kernel_survives_every_number_that_is_not_finite(latched: Scene, bad: fl
     lanes.queue(par, start, np.arange(len(par)))
     for _ in hard_cases.chunks(lanes):
         pass
-    outcomes = hard_cases.outcome_records(*lanes.collect())
+    outcomes = hard_cases.outcome_records(*lanes.collect(), hard_cases.record_of(latched))
     assert len(outcomes) == len(par)
     good = hard_cases.run(latched).outcome
     for outcome in outcomes:

@@ -16,6 +16,7 @@ from hpcclear.ranks.team import Ranks, Task
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 from hpcclear.scene.sampling import generator
 
 LOSSES = ("start-up", "compilation", "imbalance", "writing")
@@ -70,7 +71,8 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
     stage = _stage(number, samples)
-    task = Task(stage, make_evaluator, payload_of(scene, points), workers=number)
+    payload = payload_of(scene, points)
+    task = Task(stage, make_evaluator, payload, record_of(scene), workers=number)
     started = time.perf_counter()
     ranks.run_points(task, points.values, keep=False)
     wall = time.perf_counter() - started

@@ -16,6 +16,7 @@ from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sp
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.scene import Scene
 from hpcclear.scene.mechanism import length_path
+from hpcclear.scene.record import has_pressure
 
 Get = Callable[[str], Array]
 
@@ -108,12 +109,6 @@ def swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
     law = with_constants(scene.effects.contact.declared)  # type: ignore[union-attr]
     found: Array = numbers.swing(law, force, _read(law, p, [place], 0))
     return found
-
-
-def has_pressure(scene: Scene) -> bool:
-    """Whether the geometry of a scene's contacts has a pressure."""
-    law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
-    return law is not None and law.geometry is not None and law.geometry.pressure is not None
 
 
 def widest_contact(scene: Scene, get: Get, forces: Array) -> dict[str, Array]:

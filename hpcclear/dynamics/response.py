@@ -25,10 +25,9 @@ from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
 from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import linkage_of, refused_of
+from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
@@ -43,6 +42,7 @@ from hpcclear.results.content import Content
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
+from hpcclear.scene.record import has_pressure, record_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -193,7 +193,7 @@ def _response(
             _turns(scene),
             scene.numerics.interpolation,
         )
-    reported = {name: dataset.at_joints(record[name], labels)[0] for name in names}
+    reported = {name: record[name][0] for name in names}
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
     return dataset.response_content(
         times,
@@ -231,9 +231,12 @@ def _turns(scene: Scene) -> int:
 
 
 def _reason(scene: Scene) -> dict[str, str | int]:
-    """Where a linkage that cannot turn locks, as an attribute."""
+    """Where a linkage that cannot turn locks, or what is to be known of one that turns, as an attribute."""
     refusal = refused_of(scene)
-    return {} if refusal is None else {"ended": refusal[1].reason}
+    if refusal is not None:
+        return {"ended": refusal[1].reason}
+    cautions = cautions_of(scene)
+    return {"cautions": "\n".join(cautions)} if cautions else {}
 
 
 _REPORTED = (
@@ -279,9 +282,7 @@ def _prescribed(scene: Scene) -> Found:
     lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = outcome_records(
-        *lanes.collect(), responses_reported(problem), bool(problem.effects.wear)
-    )
+    record = outcome_records(*lanes.collect(), record_of(scene), responses_reported(problem))
     return *prescribed_series(scene, problem.transient + problem.averaged), record
 
 

@@ -149,12 +149,19 @@ def run_map(
     with Session(place, key, ranks, options) as session:
         content = session.found("samples")
         if content is None:
-            session.describe(scene)
+            session.describe(scene, mapped=True)
             units = dict(zip(points.names, points.units, strict=True))
             checkpoint = session.opened(points.names, units)
             progress = Progress("cells", options.style)
             records = sample_points(
-                scene, points, ranks, checkpoint, progress, stage="map", maker=make_mapper
+                scene,
+                points,
+                ranks,
+                checkpoint,
+                progress,
+                stage="map",
+                maker=make_mapper,
+                record=session.record,
             )
             attributes = {**session.attributes, SHAPE: " ".join(str(n) for n in shape)}
             with saving(checkpoint.flush):

@@ -21,7 +21,7 @@ import numpy as np
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import JOINTS
+from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.schedule import COLUMNS
@@ -39,6 +39,7 @@ from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -218,6 +219,9 @@ class Session:
     ----------
     attributes : dict of str to str
         Of every file of results: what made them, and the key; empty before `describe`.
+    joints : tuple of str
+    record : dtype
+        Labels of the joints, and type of the records of samples.
     """
 
     def __init__(
@@ -233,6 +237,7 @@ class Session:
         self.ranks = ranks
         self.options = options
         self.joints: tuple[str, ...] = JOINTS
+        self.record: np.dtype = OUTCOME
         self.notify = notify
         self.attributes: dict[str, str] = {}
         self._checkpoint: Checkpoint | None = None
@@ -268,9 +273,10 @@ class Session:
             check_key(dataset.content_in(path), self.key, path)
         return len(there) == len(names)
 
-    def describe(self, scene: Scene) -> None:
-        """Set `attributes`, what made the files of this run, and the labels of its joints."""
-        self.joints = scene.joint_labels
+    def describe(self, scene: Scene, mapped: bool = False) -> None:
+        """Set `attributes`, what made the files of this run, the labels of its joints, and the type of its samples' records
+        (arguments as of `record_of`)."""
+        self.joints, self.record = scene.joint_labels, record_of(scene, mapped)
         self.attributes = {
             **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             **key_attribute(self.key),
@@ -289,6 +295,7 @@ class Session:
                 units=units,
                 attributes=self.attributes,
                 joints=self.joints,
+                record=self.record,
             )
         self.notify_problems()
         return self._checkpoint

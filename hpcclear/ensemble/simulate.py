@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from hpcclear.base.objectives import Objective, asked
+from hpcclear.base.outcome import recast
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks, Task
@@ -129,6 +130,7 @@ def sample_points(
     stage: str = "samples",
     first: int = 0,
     maker: "Callable[[Mapping[str, Any], Ranks], Worker] | None" = None,
+    record: np.dtype | None = None,
 ) -> np.ndarray:
     """Simulate a design on all ranks; call it on root.
 
@@ -145,10 +147,12 @@ def sample_points(
         Number of the first point in the checkpoint, for designs that come one after the other.
     maker : function of a payload and the ranks, optional
         Makes a rank's worker; by default `make_evaluator`.
+    record : dtype, optional
+        Type of the records; by default that of the scene (`hpcclear.scene.record.record_of`).
 
     Returns
     -------
-    structured ndarray of `hpcclear.base.outcome.OUTCOME`, shape (n,)
+    structured ndarray of `record`, shape (n,)
         In the points' order; samples numbered from 0.
 
     Raises
@@ -159,14 +163,16 @@ def sample_points(
         The disk refuses.
     """
     from hpcclear.scene.points import expanded
+    from hpcclear.scene.record import record_of
 
     sent = expanded(
         scene.study, points
     )  # columns of rows of catalogues as the numbers they stand for
-    task = Task(stage, maker or make_evaluator, payload_of(scene, sent))
+    record = record_of(scene) if record is None else record
+    task = Task(stage, maker or make_evaluator, payload_of(scene, sent), record)
     if checkpoint is None:
         return ranks.run_points(task, sent.values, progress=progress)
-    completed = checkpoint.completed(first, len(points))
+    completed = recast(checkpoint.completed(first, len(points)), record)
     completed["sample"] -= first
 
     def take(records: np.ndarray) -> None:

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.outcome import recast
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session, samples_of
@@ -21,6 +21,7 @@ from hpcclear.results import dataset
 from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 
 MOST_PARTS = 100_000
 _FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
@@ -143,4 +144,4 @@ def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarr
             "it does not contain the samples of its part",
             "Remove it, and run that part again",
         )
-    return records.astype(OUTCOME)
+    return recast(records, record_of(scene))

@@ -13,7 +13,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.setup.parameters import Numbers, wave_paths
 from hpcclear.dynamics.wear.curves import DEEPEST
 from hpcclear.dynamics.wear.law import Joints, joints_of
@@ -30,6 +29,7 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 from hpcclear.scene.sampling import monte_carlo
 
 PERTURBATION = 1e-9
@@ -214,7 +214,7 @@ def _simulated(
     rows = [states.rows(number, asked) for number, (_, asked) in going.items()]
     design = np.concatenate(rows)
     late = np.concatenate([np.array(asked.copies) % 2 == 1 for _, asked in going.values()])
-    records = np.empty(len(design), OUTCOME)
+    records = np.empty(len(design), record_of(scene))
     for chosen, here in ((~late, scene), (late, waiting_longer(scene))):
         if chosen.any():
             points = states.points(design[chosen])

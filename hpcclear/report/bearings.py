@@ -168,6 +168,7 @@ def remarks(response: Results) -> list[tuple[str, str]]:
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
         found.append(("Warning", sensitive_words(half_width / abs(f), response)))
     found += [("Warning", text) for text in _gaining(response)]
+    found += [("Warning", text) for text in str(response.attrs.get("cautions", "")).splitlines()]
     flags = int(response["flags"])
     warnings = flag_remarks(flags & sum(WARNED))
     notes = flag_remarks(flags & int(Flag.STIFF))

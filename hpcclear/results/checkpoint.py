@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import JOINTS, OUTCOME
+from hpcclear.base.outcome import JOINTS, OUTCOME, recast
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.content import Content, Results, Variable
@@ -29,7 +29,7 @@ INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""
 
 _FANOUT = 8
-_KEPT = 50_000  # samples of a part that stay in memory, too: 20 MB; more are read from its file when they are asked for
+_KEPT = 50_000  # samples of a part that stay in memory, too: some MB; more are read from its file when they are asked for
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
 _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
 _DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
@@ -97,6 +97,8 @@ class Checkpoint:
         Global attributes of the part files (`hpcclear.results.dataset.provenance`).
     joints : sequence of str
         Labels of the joints of the records.
+    record : dtype
+        Their type (`hpcclear.scene.record.record_of`).
     clock : callable
         Seconds since any instant.
 
@@ -123,6 +125,7 @@ class Checkpoint:
         units: Mapping[str, str] | None = None,
         attributes: Mapping[str, object] | None = None,
         joints: Sequence[str] = JOINTS,
+        record: np.dtype = OUTCOME,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.directory = directory
@@ -130,7 +133,7 @@ class Checkpoint:
         self.interval = interval
         self.names = tuple(names)
         self.units = dict(units or {})
-        self.joints = tuple(joints)
+        self.joints, self.record = tuple(joints), record
         self.attributes = {**(attributes or {}), **key_attribute(key)}
         self._watch = Stopwatch()
         self.problems: list[str] = []
@@ -151,14 +154,14 @@ class Checkpoint:
     def add(self, records: np.ndarray, values: ArrayLike | None = None) -> None:
         """Take finished samples into memory; the flushes write them.
 
-        `records` are of `hpcclear.base.outcome.OUTCOME`, shape (n,); `values`, shape (n, k), their
-        designs, a column for each of `names`.
+        `records`, shape (n,), may be of a variant of the scene that requests less than the checkpoint keeps; `values`,
+        shape (n, k), are their designs, a column for each of `names`.
         """
         columns = np.empty((len(records), 0)) if values is None else np.asarray(values, float)
         if columns.shape != (len(records), len(self.names)):
             raise ValueError(f"designs have shape {columns.shape}, names are {self.names}")
         if len(records):
-            self._buffer.append((records.astype(OUTCOME), columns.copy()))
+            self._buffer.append((recast(records, self.record).copy(), columns.copy()))
 
     def flush_when_due(self) -> None:
         """Write what has gathered when the interval is over; raises as `flush`."""
@@ -195,6 +198,8 @@ class Checkpoint:
         records, values = (
             [piece[k][inside] for piece, inside in zip(pieces, rows, strict=True)] for k in (0, 1)
         )
+        if not records:
+            return np.empty(0, self.record), np.empty((0, 0))
         return _join(records, values)
 
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
@@ -219,7 +224,7 @@ class Checkpoint:
         if part.held is not None:
             return part.held
         content = dataset.read(part.path, "samples")
-        return dataset.records(content), self._designs(content)
+        return recast(dataset.records(content), self.record), self._designs(content)
 
     def _designs(self, content: Results) -> np.ndarray:
         """Designs (n, k) of a part, a column for each name."""
@@ -329,7 +334,8 @@ class Checkpoint:
         if set(designs_in(content)) != set(self.names):
             self.problems.append(f"samples of {path.name} are done again: other design variables")
             return
-        self._keep(level, path, dataset.records(content), self._designs(content))
+        records = recast(dataset.records(content), self.record)
+        self._keep(level, path, records, self._designs(content))
 
     @contextmanager
     def _refusing(self) -> Iterator[None]:
@@ -343,15 +349,11 @@ def _join(
     records: Sequence[np.ndarray], values: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """One array of each, by growing sample number, each sample once."""
-    if not records:
-        return np.empty(0, OUTCOME), np.empty((0, 0))
     joined, designs = (
         one[0] if len(one) == 1 else np.concatenate(one) for one in (records, values)
     )
     numbers = joined["sample"]
-    if (
-        numbers[1:] > numbers[:-1]
-    ).all():  # as a rule; a record has two kilobytes, and copies count
+    if (numbers[1:] > numbers[:-1]).all():  # as a rule; copies count
         return joined, designs
     first = np.unique(numbers, return_index=True)[1]
     return joined[first], designs[first]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec
 
@@ -23,11 +23,11 @@ from hpcclear.base.outcome import (
     JOINTS,
     JUDGED,
     MAPPED,
-    MAX_JOINTS,
     ON_REQUEST,
-    OUTCOME,
     STEADY,
     WAVE_ROWS,
+    record_type,
+    unknown,
 )
 from hpcclear.results import netcdf
 from hpcclear.results.content import Content, Results, Variable
@@ -223,8 +223,8 @@ def samples_dataset(
         Designs, a row for each record, in SI units.
     units : mapping of str to str
         Units of the design variables that are not the paper's.
-    records : array of `hpcclear.base.outcome.OUTCOME`, shape (n,)
-        In any order, each sample once.
+    records : structured array, shape (n,)
+        Of a `hpcclear.base.outcome.record_type`, in any order, each sample once.
     attributes : mapping, optional
         Further global attributes.
     objective : Objective
@@ -232,7 +232,7 @@ def samples_dataset(
     words : mapping of str to str, optional
         Long names of the design variables.
     joints : sequence of str
-        Labels of the scene's joints with clearance: as many places of the records are kept.
+        Labels of the joints of the records.
     labels : sequence of str, length n
         Names of the designs, where they have some.
 
@@ -260,13 +260,15 @@ def samples_dataset(
     if len(data) != len(names):
         raise ValueError(f"two of the names {list(names)} are the same in a file")
     data = {name: values[:, i] for i, name in enumerate(names)}
-    asked = {n for n in (*ON_REQUEST, *STEADY, *MAPPED) if np.isfinite(records[n]).any()}
+    fields = records.dtype.names or ()
+    optional = {*ON_REQUEST, *STEADY, *MAPPED} & {*fields}
+    asked = {name for name in optional if np.isfinite(records[name]).any()}
     if records["regime"].any():  # no period anywhere is an answer as well
         asked |= {*STEADY, "regime"}
     left_out = {"sample", "band", *({*ON_REQUEST, *JUDGED} - asked)}
-    kept = [name for name in OUTCOME.names or () if name not in left_out]
+    kept = [name for name in fields if name not in left_out]
     bands = _bands_of(records)
-    data |= {name: _there(name, records[name], joints, len(bands)) for name in kept}
+    data |= {name: records[name] for name in kept}
     if len(labels):
         data["label"] = np.array(labels, dtype=str)[order]
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
@@ -286,44 +288,25 @@ def _checked(data: Mapping[str, ArrayLike]) -> dict[str, str]:
     return {"objective_half_width": NOT_CHECKED}
 
 
-def at_joints(values: np.ndarray, joints: Sized) -> np.ndarray:
-    """Values of records at the joints there are, shape (n, joints); of a quantity without joints as they are."""
-    of_joints = values.ndim > 1 and values.shape[1] == MAX_JOINTS
-    return values[:, : len(joints)] if of_joints else values
-
-
 def _bands_of(records: np.ndarray) -> np.ndarray:
     """Middles of the bands that records have levels of, Hz, shape (bands,)."""
+    if "band" not in (records.dtype.names or ()):
+        return np.zeros(0)
     known = records["band"][np.isfinite(records["band"]).any(axis=1)]
     return known[0][np.isfinite(known[0])] if len(known) else np.zeros(0)
 
 
-def _there(name: str, values: np.ndarray, joints: Sized, bands: int) -> np.ndarray:
-    """A field of records at the joints and bands there are, a view."""
-    per = FIELDS[name].per.split()
-    values = values[:, : len(joints)] if "joint" in per else values
-    return values[..., :bands] if "band" in per else values
-
-
 def records(samples: Results) -> np.ndarray:
-    """The outcome records in results of kind ``samples``, shape (n,) of `OUTCOME`."""
-    found = np.zeros(samples.sizes["sample"], OUTCOME)
-    for name in OUTCOME.names or ():
-        absent = name in (*ON_REQUEST, *JUDGED) and name not in samples
-        nothing = np.nan if OUTCOME[name].base.kind == "f" else 0
-        if absent:
-            found[name] = nothing
-        else:
-            values = samples[name].to_numpy()
-            if values.ndim == 2:  # places that no joint has are as in a fresh record
-                failed = np.isnan(values).all(axis=1) if values.dtype.kind == "f" else False
-                found[name] = np.where(failed, nothing, 0)[..., None]
-            if "band" in FIELDS[name].per:
-                found[name] = nothing
-            bands = samples.sizes.get("band", 0)
-            _there(name, found[name], samples["joint"].to_numpy(), bands)[...] = values
-    heard = np.isfinite(found["contact_force_level"]).any(axis=(1, 2))
-    found["band"][~heard] = np.nan  # of failed samples
+    """The outcome records in results of kind ``samples``, shape (n,), with the fields that it has."""
+    asked = {FIELDS[str(name)].when for name in samples.variables if name in FIELDS}
+    kind = record_type(samples.sizes["joint"], samples.sizes.get("band", 0), asked)
+    found = unknown(samples.sizes["sample"], kind)
+    for name in kind.names or ():
+        if name in samples:
+            found[name] = samples[name].to_numpy()
+    if "band" in samples:
+        heard = np.isfinite(found["contact_force_level"]).any(axis=(1, 2))
+        found["band"][~heard] = np.nan  # of failed samples
     return found
 
 

@@ -243,15 +243,15 @@ def scene_of(content: Mapping[str, object]) -> Scene:
 
 
 def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[str]:
-    """A sentence for each entry with text that was read as `read` says."""
+    """A sentence for each text that was read as `read` says, with the first entry that has it."""
+    left = dict(read)
     for key, entry in flatten(content):
         level = [entry]
         while level and isinstance(level[0], list):
             level = [one for inner in level if isinstance(inner, list) for one in inner]
         for text in level:
-            if isinstance(text, str) and text.strip() in read:
-                yield f"{key}: {text.strip()!r} is read as {read[text.strip()]}"
-                break  # one of a list says it for all
+            if isinstance(text, str) and text.strip() in left:
+                yield f"{key}: {text.strip()!r} is read as {left.pop(text.strip())}"
 
 
 def _check_corner(

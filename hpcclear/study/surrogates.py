@@ -33,9 +33,9 @@ def coordinate(variable: Variable) -> str:
 
 
 def domain(run: StudyRun, names: Sequence[str]) -> Box:
-    """Where a model holds; the optimisation's is widened so that no random input leaves it."""
+    """Where a model holds; the one that is searched is widened so that no random input leaves it."""
     widen = {name for case in run.study.cases for name in case.random}
-    return box(run.scene, names, sorted(widen) if tuple(names) == run.study.optimisation else ())
+    return box(run.scene, names, sorted(widen) if tuple(names) == run.study.models[-1] else ())
 
 
 def method_of(scene: Scene) -> Method:

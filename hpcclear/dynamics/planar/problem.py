@@ -19,7 +19,7 @@ from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive,
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar import bristles, swings
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
-from hpcclear.dynamics.planar.turning import refused
+from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
@@ -239,6 +239,24 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
         If it cannot be put together.
     """
     return refused(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
+
+
+@lru_cache(maxsize=64)
+def cautions_of(scene: Scene) -> tuple[str, ...]:
+    """What a user should know of the motion of a linkage that turns, a sentence each."""
+    if refused_of(scene) is not None:
+        return ()
+    mechanism = mechanism_of(scene.linkage)
+    at_angles = [
+        f"{angle:.0f}" for angle in changes(mechanism, scene.effects.gravity, rounds_of(scene))
+    ]
+    if not at_angles:
+        return ()
+    return (
+        f"without clearance the linkage passes a change point at {' and '.join(at_angles)} deg of the {mechanism.period.body}. "
+        "With clearance the contact decides which way it moves on: forces near there change with the smallest change of "
+        "the design",
+    )
 
 
 def rounds_of(scene: Scene) -> int:
