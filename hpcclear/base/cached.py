@@ -57,7 +57,7 @@ def features_in_use() -> str:
 def _environment(module: str, constants: list[object], name: str) -> environment.Environment:
     """Make what machine code finds its module and its Python objects by. In place of `environment._rebuild_env`.
 
-    Of Numba's own functions without such objects nothing but the name of the module is ever asked for.
+    Of Numba's own functions without such objects only the name of the module is used.
     """
     if constants or not module.startswith("numba.") or environment.lookup_environment(name):
         return _usual_environment(module, constants, name)

@@ -389,7 +389,7 @@ def read(
 def content_in(
     path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
 ) -> Content:
-    """Read a result file as `read` does, without xarray."""
+    """Read a result file as `read` does, without xarray; raises InputError as it does."""
     place = _path(path)
     content = netcdf.load(place)
     now = {old: new for new, old in FORMER.items() if new not in content}
