@@ -265,7 +265,8 @@ def cautions_of(scene: Scene) -> tuple[str, ...]:
         return ()
     return (
         f"without clearance the linkage passes a change point at {' and '.join(at_angles)} deg of the {mechanism.period.body}. "
-        "With clearance the contact decides how it moves on: forces near there change with the least change of the design",
+        "With clearance the contact decides which way it moves on: forces near there change with the smallest change of "
+        "the design",
     )
 
 
