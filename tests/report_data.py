@@ -353,7 +353,7 @@ def response(revolutions: int = 4, clearance: float = 3e-4, instants: int = 200)
         "status": 0,
         "flags": 0,
     }
-    return dataset.response_dataset(angle / speed, data, ATTRIBUTES)
+    return dataset.response_content(angle / speed, data, ATTRIBUTES).to_xarray()
 
 
 def write_study(directory: Path) -> Path:

@@ -261,10 +261,10 @@ def test_timing_and_response_builders():
     assert str(timing["command"].values) == "hpcclear run x.toml"
     series = {"crank_angle": np.zeros(5), "contact_force": np.zeros((5, 2))}
     scalars = {"objective": 1e-4, "objective_spread": np.nan, "rhs_evaluations": 7, "status": 0}
-    response = dataset.response_dataset(np.linspace(0, 1, 5), {**series, **scalars})
+    response = dataset.response_content(np.linspace(0, 1, 5), {**series, **scalars}).to_xarray()
     assert response["contact_force"].sel(joint="rod_slider").sizes == {"time": 5}
     with pytest.raises(ValueError, match="lacks"):
-        dataset.response_dataset(np.linspace(0, 1, 5), series)
+        dataset.response_content(np.linspace(0, 1, 5), series)
 
 
 # -- files --------------------------------------------------------------------------------------
@@ -292,7 +292,7 @@ def test_numbers_survive_to_the_last_bit(tmp_path):
     values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
     original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
     netcdf.save(original, tmp_path / "x.nc")
-    found = netcdf.load(tmp_path / "x.nc")
+    found = netcdf.load(tmp_path / "x.nc").to_xarray()
     assert found["x"].values.tobytes() == values.tobytes()
     assert found["n"].values.tobytes() == original["n"].values.tobytes()
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.printing import console, quantity, remark, table
+from hpcclear.cli.terminal import console, quantity, remark, table
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread

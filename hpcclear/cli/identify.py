@@ -99,7 +99,8 @@ def identify(written: Written, output: Path, how: How, **settings: Any) -> int:
 
 def describe(found: "Finished") -> int:
     """Print what was identified; the exit code."""
-    from hpcclear.cli.printing import _load, console, fitting, remark, table
+    from hpcclear.cli.printing import _load
+    from hpcclear.cli.terminal import console, fitting, remark, table
     from hpcclear.report import identified
 
     out, content = console(), found.content

@@ -2,9 +2,7 @@
 
 import contextlib
 import functools
-import importlib
 import math
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -220,27 +218,6 @@ def on_ranks(
 
         with noting(lambda text, read: say(f"Note: {text!r} is read as {read}")):
             yield ranks
-
-
-def lightly() -> None:
-    """Load xarray in this process without pint and pyarrow: a fifth and a twentieth of a start, and 200 MB of address space.
-
-    Values of result files are plain numbers, of which xarray need not check whether they are pint's; where a version of it has
-    other names, pint is loaded. pandas finds no pyarrow while it is loaded; who imports that later has it.
-    """
-    if "pyarrow" not in sys.modules:
-        sys.modules["pyarrow"] = None  # type: ignore[assignment]
-        try:
-            importlib.import_module("pandas")
-        finally:
-            del sys.modules["pyarrow"]
-    from xarray.namedarray import pycompat
-
-    known = getattr(pycompat, "_cached_duck_array_modules", {})
-    kind = getattr(pycompat, "DuckArrayModule", None)
-    if kind is not None and "pint" not in sys.modules:
-        absent = known["pint"] = object.__new__(kind)
-        absent.module, absent.version, absent.type, absent.available = None, None, (), False
 
 
 def show(text: str) -> None:

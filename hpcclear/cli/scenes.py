@@ -15,7 +15,6 @@ from hpcclear.cli.options import (
     check_free,
     command,
     flag,
-    lightly,
     of_one_process,
     on_ranks,
     output_option,
@@ -188,11 +187,10 @@ def simulate(written: Written, output: Path) -> int:
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
-    lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
-    from hpcclear.dynamics.response import simulate as simulate_scene
+    from hpcclear.dynamics.response import simulated
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
@@ -202,9 +200,11 @@ def simulate(written: Written, output: Path) -> int:
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
         if output.exists():
-            dataset.read(output, "response")  # an earlier response is replaced, and nothing else
+            dataset.content_in(
+                output, "response"
+            )  # an earlier response is replaced, and nothing else
         began = time.perf_counter()
-        response = simulate_scene(scene)
+        response = simulated(scene)
         dataset.write(response, output)
     describe_response(response, output, time.perf_counter() - began)
     status = Status(int(response["status"]))

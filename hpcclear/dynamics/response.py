@@ -1,10 +1,11 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
@@ -37,10 +38,14 @@ from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.results import dataset
+from hpcclear.results.content import Content
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.record import has_pressure, record_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
@@ -93,6 +98,13 @@ def simulate(
     InputError
         If the scene requires what the kernel cannot do, or time series that do not fit into memory.
     """
+    return simulated(scene, objective, copy, checked=checked).to_xarray()
+
+
+def simulated(
+    scene: Scene, objective: Objective | None = None, copy: int = 0, *, checked: bool = True
+) -> Content:
+    """Simulate a scene as `simulate` does; the content of its file."""
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
     objective = named.objective if objective is None else objective
@@ -138,7 +150,7 @@ def simulate_together(
         for slot, k in enumerate(numbers):
             scene, record = scenes[k], recording.record()[slot : slot + 1]
             found, collected[slot] = collected[slot].finish(record), None  # type: ignore[call-overload]
-            yield k, _response(scene, scene, found, scene.objective)
+            yield k, _response(scene, scene, found, scene.objective).to_xarray()
 
 
 def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
@@ -159,8 +171,8 @@ Found = tuple[Array, dict[str, Any], Records]
 
 def _response(
     named: Scene, scene: Scene, found: Found, objective: Objective, steady: Records | None = None
-) -> xr.Dataset:
-    """The dataset of a scene `named` by a user, whose series are those of `scene`."""
+) -> Content:
+    """The content of the file of a scene `named` by a user, whose series are those of `scene`."""
     times, data, record = found
     still = coordinate_count(scene) == 0
     if steady is not None:
@@ -183,7 +195,7 @@ def _response(
         )
     reported = {name: record[name][0] for name in names}
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
-    return dataset.response_dataset(
+    return dataset.response_content(
         times,
         {**data, **reported},
         provenance(named.text or named.to_toml(), named.hash, named.references)

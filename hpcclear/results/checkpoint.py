@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import JOINTS, OUTCOME, recast
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
+from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.keys import check_key, key_attribute
 from hpcclear.results.names import designs_in
 
@@ -226,7 +226,7 @@ class Checkpoint:
         content = dataset.read(part.path, "samples")
         return recast(dataset.records(content), self.record), self._designs(content)
 
-    def _designs(self, content: xr.Dataset) -> np.ndarray:
+    def _designs(self, content: Results) -> np.ndarray:
         """Designs (n, k) of a part, a column for each name."""
         designs = designs_in(content)
         columns = [designs[name] for name in self.names]
@@ -261,7 +261,7 @@ class Checkpoint:
         """
         with self._watch.running():
             variables = {key: _stage_variable(key, values) for key, values in data.items()}
-            content = xr.Dataset(variables, attrs={**self.attributes, "stage": name})
+            content = Content(variables, {**self.attributes, "stage": name})
             netcdf.save(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
@@ -282,10 +282,9 @@ class Checkpoint:
                 self.problems.append(f"{path.name} is done again: {error.reason}")
                 return None
             check_key(content, self.key, path)
-            found = {str(key): content[key] for key in content.data_vars}
             return {
-                key: values.to_numpy().astype(bool if "truth" in values.attrs else values.dtype)
-                for key, values in found.items()
+                key: one.values.astype(bool) if "truth" in one.attrs else one.values
+                for key, one in content.variables.items()
             }
 
     def _stage_path(self, name: str) -> Path:
@@ -299,7 +298,7 @@ class Checkpoint:
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
         with self._watch.running():
-            netcdf.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
+            netcdf.save(Content({}, self.attributes), self.directory / _DONE)
             discard(self.directory)
             self._parts.clear()
             self._buffer.clear()
@@ -308,7 +307,8 @@ class Checkpoint:
         """Read the parts that are there; the number of the next one."""
         if (self.directory / _DONE).exists():
             discard(self.directory)
-        xr.Dataset(coords={"sample": [0]})  # what xarray loads late is loaded before samples wait
+        # what xarray loads late is loaded before samples wait
+        Content({"sample": Variable(("sample",), np.zeros(1))}).to_xarray()
         self.directory.mkdir(exist_ok=True)
         if self.directory.is_symlink():  # results are written where the user said, nowhere else
             reason = "it is a symbolic link"
@@ -359,9 +359,9 @@ def _join(
     return joined[first], designs[first]
 
 
-def _stage_variable(name: str, values: ArrayLike) -> xr.Variable:
+def _stage_variable(name: str, values: ArrayLike) -> Variable:
     array = np.asarray(values)
     dims = tuple(f"{name}_{axis}" for axis in range(array.ndim))
     if array.dtype.kind == "b":  # NetCDF knows no truth values
-        return xr.Variable(dims, array.astype(np.int8), {"truth": "0 false, 1 true"})
-    return xr.Variable(dims, array)
+        return Variable(dims, array.astype(np.int8), {"truth": "0 false, 1 true"})
+    return Variable(dims, array)

@@ -1,16 +1,19 @@
-"""Result files as xarray datasets: built from plain arrays and records, written whole, checked.
+"""Result files: built from plain arrays and records, written whole, checked; read as datasets of xarray.
 
 The names, dimensions and units come from `hpcclear.results.names`; how bytes reach the disk is in
 `hpcclear.results.netcdf` and `hpcclear.results.files`.
 """
 
+from __future__ import annotations
+
+import functools
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, ParamSpec
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
@@ -27,6 +30,7 @@ from hpcclear.base.outcome import (
     unknown,
 )
 from hpcclear.results import netcdf
+from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.faults import fault_of
 from hpcclear.results.names import (
     DESIGN_VARIABLES,
@@ -40,7 +44,12 @@ from hpcclear.results.names import (
     Kind,
 )
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 CONVENTIONS = "CF-1.11"
+
+P = ParamSpec("P")
 
 
 # -----------------------------------------------------------------------------------------------
@@ -51,7 +60,7 @@ NOT_CHECKED = "not checked: no replicas were simulated"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 
-def dataset(
+def filled(
     kind: str,
     coords: Mapping[str, ArrayLike],
     data: Mapping[str, ArrayLike],
@@ -61,8 +70,8 @@ def dataset(
     words: Mapping[str, str] | None = None,
     *,
     whole: bool = True,
-) -> xr.Dataset:
-    """A dataset of one kind of result file, with every attribute the table knows.
+) -> Content:
+    """The content of one kind of result file, with every attribute the table knows.
 
     Parameters
     ----------
@@ -87,7 +96,7 @@ def dataset(
 
     Returns
     -------
-    xarray.Dataset
+    Content
 
     Raises
     ------
@@ -118,10 +127,23 @@ def dataset(
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
     if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
-    return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
+    return Content(variables, {**fixed, **(attributes or {})})
 
 
-def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> xr.Variable:
+def _of_xarray(build: Callable[P, Content]) -> Callable[P, xr.Dataset]:
+    """Have a function return what it builds as a dataset of xarray."""
+
+    @functools.wraps(build)
+    def made(*parts: P.args, **more: P.kwargs) -> xr.Dataset:
+        return build(*parts, **more).to_xarray()
+
+    return made
+
+
+dataset = _of_xarray(filled)
+
+
+def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> Variable:
     array = np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
     if array.shape != expected:
@@ -137,7 +159,7 @@ def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int
     attributes: dict[str, object] = {"long_name": row.long_name}
     if row.units:
         attributes["units"] = row.units
-    return xr.Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
+    return Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
 
 
 def _design_row(
@@ -274,7 +296,7 @@ def _bands_of(records: np.ndarray) -> np.ndarray:
     return known[0][np.isfinite(known[0])] if len(known) else np.zeros(0)
 
 
-def records(samples: xr.Dataset) -> np.ndarray:
+def records(samples: Results) -> np.ndarray:
     """The outcome records in a dataset of kind ``samples``, shape (n,), with the fields that it has."""
     asked = {FIELDS[str(name)].when for name in samples.variables if name in FIELDS}
     kind = record_type(samples.sizes["joint"], samples.sizes.get("band", 0), asked)
@@ -288,14 +310,14 @@ def records(samples: xr.Dataset) -> np.ndarray:
     return found
 
 
-def response_dataset(
+def response_content(
     time: ArrayLike,
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
     linkage: Mapping[str, Sequence[str] | np.ndarray] | None = None,
-) -> xr.Dataset:
+) -> Content:
     """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
 
     `linkage`: labels or numbers along further dimensions, of what has these.
@@ -306,7 +328,7 @@ def response_dataset(
         for name, words in (linkage or {}).items()
     }
     attrs = {**(attributes or {}), **_checked(data)}
-    return dataset("response", coords, data, attrs, objective=objective)
+    return filled("response", coords, data, attrs, objective=objective)
 
 
 def timing_dataset(
@@ -324,8 +346,8 @@ def timing_dataset(
 # Files
 
 
-def write(content: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset as NetCDF-4, whole or not at all; equal datasets give equal bytes.
+def write(content: Results, path: str | os.PathLike[str]) -> None:
+    """Write results as NetCDF-4, whole or not at all; equal content gives equal bytes.
 
     The file is written under a temporary name in the same directory, synced, and renamed.
 
@@ -361,9 +383,18 @@ def read(
         The file is missing, cut off, changed, foreign, of another kind or scene, or says what
         cannot be.
     """
+    return content_in(path, kind, scene_hash).to_xarray()
+
+
+def content_in(
+    path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
+) -> Content:
+    """Read a result file as `read` does, without xarray."""
     place = _path(path)
     content = netcdf.load(place)
-    content = content.rename({o: n for n, o in FORMER.items() if o in content and n not in content})
+    now = {old: new for new, old in FORMER.items() if new not in content}
+    if now.keys() & content.variables.keys():
+        content = Content({now.get(k, k): v for k, v in content.variables.items()}, content.attrs)
     fault = fault_of(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")

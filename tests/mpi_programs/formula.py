@@ -184,7 +184,8 @@ def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     data = {**series, "crank_angle": angle, "contact_force": pair}
     data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
     scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
-    return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=scene.objective)
+    content = dataset.response_content(angle / 523.0, data | scalars, objective=scene.objective)
+    return content.to_xarray()
 
 
 def respond_together(scenes: Sequence[Scene], copies: Sequence[int]):
