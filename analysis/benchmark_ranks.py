@@ -84,8 +84,10 @@ def inside(task: str, count: int) -> int:
     """One rank: samples or statistics on all of them, then a line about itself."""
     from hpcclear.ensemble.simulate import payload_of
     from hpcclear.ranks.boundary import run_on_ranks
-    from hpcclear.ranks.schedule import COLUMNS
-    from hpcclear.ranks.team import Ranks, Task
+    from hpcclear.ranks.leading import run_points
+    from hpcclear.ranks.schedule import COLUMNS, Task
+    from hpcclear.ranks.team import Ranks
+    from hpcclear.scene.record import record_of
 
     line = LINE
 
@@ -101,8 +103,8 @@ def inside(task: str, count: int) -> int:
                 statistics.run_statistics(scene, output, ranks, samples=count, options=options)
                 spent = ranks.stage_seconds["statistics"]
         else:
-            work = Task("samples", make_watched, payload_of(scene, points))
-            records = ranks.run_points(work, points.values)
+            work = Task("samples", make_watched, payload_of(scene, points), record_of(scene))
+            records = run_points(ranks, work, points.values)
             spent = ranks.stage_seconds["samples"]
             cost = records["rhs_evaluations"]
             line["spread"] = float(np.quantile(cost, 0.99) / np.quantile(cost, 0.01))

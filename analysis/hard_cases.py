@@ -24,7 +24,7 @@ from drawing import described
 
 from hpcclear import __version__
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import PERTURBATIONS, outcome_records
 from hpcclear.dynamics.planar.energy import energies
@@ -37,6 +37,7 @@ from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.rows import Columns, number
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 
 LIBRARY = Path(__file__).parent.parent / "tests" / "hard_cases"
 TOLERANCES = (1e-3, 1e-6, 1e-8)
@@ -50,7 +51,7 @@ NOTHING = Points((), np.empty((1, 0)), ())
 class Run:
     """What one simulation came to."""
 
-    outcome: np.void  # a record of `hpcclear.base.outcome.OUTCOME`
+    outcome: np.void  # a record of `hpcclear.scene.record.record_of`
     residual: float
     implicit: float  # share of implicit steps
     seconds: float
@@ -134,7 +135,7 @@ def run(scene: Scene) -> Run:
             size = max(size, float(largest.max()))
     labels, outcome, finished = lanes.collect()
     return Run(
-        outcome_records(labels, outcome, finished)[0],
+        outcome_records(labels, outcome, finished, record_of(scene))[0],
         off / size,
         float(outcome.stiff_steps[0] / max(outcome.attempts[0], 1.0)),
         time.perf_counter() - began,
@@ -145,12 +146,12 @@ def closed_form(scene: Scene) -> Run:
     """Both joints ideal: nothing is integrated."""
     began = time.perf_counter()
     response = simulate(scene)
-    outcome = np.zeros(1, OUTCOME)[0]
+    outcome = np.zeros(1, record_of(scene))[0]
     if not Status(int(response["status"])).valid:  # numbers of joints that are not there, too
-        for name in OUTCOME.names:
+        for name in outcome.dtype.names:
             if outcome[name].dtype.kind == "f":
                 outcome[name] = np.nan
-    for name in OUTCOME.names:
+    for name in outcome.dtype.names:
         if name in response:
             value = response[name].values
             if value.ndim:  # of joints

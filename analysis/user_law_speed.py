@@ -28,6 +28,7 @@ from hpcclear.dynamics.evaluation.evaluator import (
 )
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
+from hpcclear.scene.record import record_of
 
 SOURCE = """
 import math
@@ -103,7 +104,9 @@ def task(scene: Scene, samples: int) -> Callable[[], np.ndarray]:
     def run() -> np.ndarray:
         outcome = Lanes(made.problem, DEFAULT_LANES).run(made.par, made.start)
         told = responses_reported(made.problem)
-        records = outcome_records(np.arange(samples), outcome, made.par, told, False, objective)
+        records = outcome_records(
+            np.arange(samples), outcome, made.par, record_of(scene), told, objective
+        )
         return np.asarray(asked(records, objective)["objective"])
 
     return run

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.results import dataset
 from hpcclear.results.provenance import provenance
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -54,8 +54,6 @@ def samples(count: int = 60, failed: int = 3) -> xr.Dataset:
     records["flags"][:5] |= Flag.BEYOND_HERTZ
     for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][-failed:] = np.nan
-    for name in ON_REQUEST:
-        records[name] = np.nan
     records["latched"][-failed:] = 0
     records["status"][-failed:] = Status.STEP_CAP
     return dataset.samples_dataset(NAMES, points, {}, records, ATTRIBUTES)
@@ -355,7 +353,7 @@ def response(revolutions: int = 4, clearance: float = 3e-4, instants: int = 200)
         "status": 0,
         "flags": 0,
     }
-    return dataset.response_dataset(angle / speed, data, ATTRIBUTES)
+    return dataset.response_content(angle / speed, data, ATTRIBUTES).to_xarray()
 
 
 def write_study(directory: Path) -> Path:

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.planar.curves import curve_at
-from hpcclear.ensemble.session import samples_of
+from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.fields import CurveOf, MotionTable
@@ -280,7 +280,7 @@ def test_a_column_of_names_is_kept(tmp_path):
     records["sample"] = [1, 0]  # in any order
     content = samples_of(points.take([1, 0]), records, {})
     netcdf.save(content, tmp_path / "s.nc")
-    back = netcdf.load(tmp_path / "s.nc")
+    back = netcdf.load(tmp_path / "s.nc").to_xarray()
     assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
     assert back["m2"].values.tolist() == [0.21, 0.18]
     assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})

@@ -16,7 +16,7 @@ from margins import at_least, fewest
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, Flag
+from hpcclear.base.outcome import OUTCOME, Flag, recast
 from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
@@ -38,6 +38,7 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
+from hpcclear.scene.record import record_of
 from hpcclear.scene.switches import Off, mean_of, switches
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
@@ -501,6 +502,7 @@ def test_what_is_far_dearer_without_an_effect_ends_as_failed():
         trial.variant((0,)).scene.numerics.max_steps == 1_000_000
     )  # what is recommended has its own
     aimed = Trial(load_scene(SCENE, ["numerics.target_error=0.01"]))
+    records = recast(records, record_of(aimed.scene))
     records["steady_revolutions"] = 50.0
     aimed.seen(Asked((), 0, 1), records)
     assert aimed.simulated((0,)).numerics.target_revolutions == 350

@@ -20,34 +20,29 @@ from hypothesis import strategies as st
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.objectives import MEAN_GAP, ORDINALS
-from hpcclear.base.outcome import FIELDS, JOINTS, OUTCOME, Flag, Status, failed
+from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status, failed, record_type
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.results.provenance import provenance
 
 SCENE = '[mechanism]\nkind = "slider-crank"  # Kurbel, naïve\n'
 HASH = "c0ffee" * 10 + "beef"
+WHOLE = record_type(len(JOINTS), 2, {field.when for field in FIELDS.values()})
+"""A record of all that a scene may request, with levels in two bands."""
 
 
 def outcomes(n: int) -> np.ndarray:
     rng = np.random.default_rng(n)
-    found = np.zeros(n, OUTCOME)
-    for name in OUTCOME.names:
-        if OUTCOME[name].base.kind == "f":
+    found = np.zeros(n, WHOLE)
+    for name in WHOLE.names:
+        if WHOLE[name].base.kind == "f":
             found[name] = rng.random(found[name].shape)
-        per = FIELDS[name].per.split()
-        if "band" in per:  # the places of a recorded sample that no band or joint has are NaN
-            found[name][..., 2:] = np.nan
-            if "joint" in per:
-                found[name][:, len(JOINTS) :] = np.nan
-        elif found[name].ndim > 1:
-            found[name][:, len(JOINTS) :] = 0
-    found["band"][:, :2] = 500.0, 1000.0
+    found["band"] = 500.0, 1000.0
     found["sample"] = np.arange(n)
     found["rhs_evaluations"] = rng.integers(1, 2**40, n)
     found["objective_uncertainty"] = np.nan
     if n > 3:
-        found[3] = failed(3, Status.STEP_CAP, 17)[0]
+        found[3] = failed(3, Status.STEP_CAP, 17, WHOLE)[0]
     return found
 
 
@@ -230,8 +225,8 @@ def test_names_that_cannot_be_design_variables_are_refused(name):
 def test_what_is_not_in_the_table_is_refused(change, words):
     records = outcomes(9)
     further = ("wave", "band", "joint band")  # dimensions that this file does not have
-    kept = [name for name in OUTCOME.names if name != "sample" and FIELDS[name].per not in further]
-    data = {name: dataset.at_joints(records[name], JOINTS) for name in kept}
+    kept = [name for name in WHOLE.names if name != "sample" and FIELDS[name].per not in further]
+    data = {name: records[name] for name in kept}
     coords = {"sample": np.arange(9), "joint": np.array(JOINTS)}
     with pytest.raises(ValueError, match=words):
         dataset.dataset("samples", coords, {**data, **change})
@@ -266,10 +261,10 @@ def test_timing_and_response_builders():
     assert str(timing["command"].values) == "hpcclear run x.toml"
     series = {"crank_angle": np.zeros(5), "contact_force": np.zeros((5, 2))}
     scalars = {"objective": 1e-4, "objective_spread": np.nan, "rhs_evaluations": 7, "status": 0}
-    response = dataset.response_dataset(np.linspace(0, 1, 5), {**series, **scalars})
+    response = dataset.response_content(np.linspace(0, 1, 5), {**series, **scalars}).to_xarray()
     assert response["contact_force"].sel(joint="rod_slider").sizes == {"time": 5}
     with pytest.raises(ValueError, match="lacks"):
-        dataset.response_dataset(np.linspace(0, 1, 5), series)
+        dataset.response_content(np.linspace(0, 1, 5), series)
 
 
 # -- files --------------------------------------------------------------------------------------
@@ -297,7 +292,7 @@ def test_numbers_survive_to_the_last_bit(tmp_path):
     values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
     original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
     netcdf.save(original, tmp_path / "x.nc")
-    found = netcdf.load(tmp_path / "x.nc")
+    found = netcdf.load(tmp_path / "x.nc").to_xarray()
     assert found["x"].values.tobytes() == values.tobytes()
     assert found["n"].values.tobytes() == original["n"].values.tobytes()
 

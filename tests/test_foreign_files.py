@@ -19,7 +19,7 @@ from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.plain import plain
 from hpcclear.base.private import private_folder
 from hpcclear.cli import cli
-from hpcclear.cli.printing import console, remark, table
+from hpcclear.cli.terminal import console, remark, table
 from hpcclear.results import dataset, netcdf
 from hpcclear.results.crate import NAME, write_crate
 from hpcclear.scene import load_scene
@@ -147,7 +147,7 @@ def evil(tmp_path_factory) -> Path:
     """A directory of results in whose attributes, names of variables, and units there are escape sequences."""
     place = data.write_study(tmp_path_factory.mktemp("evil"))
     for path in place.glob("*.nc"):
-        content = netcdf.load(path)
+        content = netcdf.load(path).to_xarray()
         for name in content.attrs:
             if isinstance(content.attrs[name], str) and name != "hpcclear_kind":
                 content.attrs[name] = f"{content.attrs[name]}{EVIL}"

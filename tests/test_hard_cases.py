@@ -20,7 +20,8 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 
 CASES = sorted((Path(__file__).parent / "hard_cases").glob("*.toml"))
 # one open joint is a kernel of its own each, which takes long to compile
@@ -175,7 +176,7 @@ def test_kernel_survives_every_number_that_is_not_finite(latched: Scene, bad: fl
     lanes.queue(par, start, np.arange(len(par)))
     for _ in hard_cases.chunks(lanes):
         pass
-    outcomes = hard_cases.outcome_records(*lanes.collect())
+    outcomes = hard_cases.outcome_records(*lanes.collect(), hard_cases.record_of(latched))
     assert len(outcomes) == len(par)
     good = hard_cases.run(latched).outcome
     for outcome in outcomes:

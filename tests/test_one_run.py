@@ -295,7 +295,7 @@ def test_a_stopped_run_ends_with_all_its_samples(tmp_path, kept, monkeypatch, ch
     folder = tmp_path / "elsewhere" if change == "another directory" else folder
     run_statistics(random_scene(), output, alone(), raw=folder, options=QUIET)
     assert contents(folder) == whole
-    assert netcdf.load(output).identical(netcdf.load(kept[0]))
+    assert netcdf.load(output).to_xarray().identical(netcdf.load(kept[0]).to_xarray())
 
 
 # -- files in the directory of a run ----------------------------------------------------------------
@@ -353,7 +353,7 @@ def test_neither_ranks_nor_lanes_are_in_a_key(tmp_path, monkeypatch):
     for command in ("sample", "run", "accuracy"):
         assert not {"ranks", "lanes"} & set(identity.run_key(study_scene(), command))
     sample(tmp_path)
-    content = netcdf.load(tmp_path / "out.nc")
+    content = netcdf.load(tmp_path / "out.nc").to_xarray()
     earlier = json.loads(content.attrs[KEY]) | {"lanes": "64", "ranks": "2"}
     content.attrs[KEY] = json.dumps(earlier)
     netcdf.save(content, tmp_path / "out.nc")

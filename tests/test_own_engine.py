@@ -14,8 +14,9 @@ from own_engine import engine
 import hpcclear
 from hpcclear.base.objectives import OURS
 from hpcclear.cli import cli
-from hpcclear.cli.printing import describe_samples, describe_statistics, quantity
+from hpcclear.cli.printing import describe_samples, describe_statistics
 from hpcclear.cli.response import describe_response
+from hpcclear.cli.terminal import quantity
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics

@@ -13,7 +13,7 @@ from scipy.integrate import simpson
 from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, OF_ALL, OF_JOINTS, OURS, RECORDED, Objective
-from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.outcome import FIELDS, OUTCOME
 from hpcclear.dynamics.laws.objectives import _RANGES, _ROWS, rate_in_lanes
 from hpcclear.ensemble.identity import run_key
 from hpcclear.results import dataset
@@ -244,7 +244,7 @@ def test_a_value_that_fails_in_use_names_the_objective():
 # ---- how they are declared -------------------------------------------------------------------------------------
 def test_every_word_of_a_rate_has_its_row_and_its_range():
     assert set(_ROWS) == OF_JOINTS.keys() | OF_ALL.keys() >= _RANGES.keys()
-    assert RECORDED.keys() <= set(OUTCOME.names)
+    assert RECORDED.keys() <= FIELDS.keys()
 
 
 def test_ours_are_written_as_a_user_writes_them():

@@ -12,16 +12,17 @@ import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.ensemble.bundles import BlockBundles, Bundles
-from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, unpacked
+from hpcclear.ensemble.parts import Parts, Summariser, packed, part_length, partial_of, unpacked
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import collection, dataset
-from hpcclear.scene.sampling import MonteCarloPoints, monte_carlo
+from hpcclear.scene.pages import MonteCarloPoints
+from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.streams.accumulator import Accumulator
-from hpcclear.statistics.streams.summary import ROWS, Summary, columns, empty, merge, summarise
+from hpcclear.statistics.streams.summary import Summary, columns, empty, merge, rows_of, summarise
 
 PROGRAM = Path(__file__).parent / "mpi_programs" / "streaming_run.py"
 sys.path.insert(0, str(PROGRAM.parent))
@@ -51,7 +52,7 @@ def outcomes(samples: int, seed: int = 3) -> np.ndarray:
     records["rhs_evaluations"] = rng.integers(10**4, 10**6, samples)
     records["status"] = np.where(rng.random(samples) < 0.05, Status.STEP_CAP, Status.OK)
     records["flags"] = rng.integers(0, 4, samples)
-    for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force", *ON_REQUEST):
+    for name in ("objective", "objective_spread", "mean_gap", "peak_contact_force"):
         records[name][records["status"] != 0] = np.nan
     return records
 
@@ -85,7 +86,7 @@ def test_statistics_equal_numpy_on_all_samples():
         assert found.count[row] == known.size
         assert found.histogram[row].sum() == known.size
         if known.size == 0:
-            assert ROWS[row] == ("mean_gap", 1)
+            assert rows_of(2)[row] == ("mean_gap", 1)
             assert np.isnan(found.deviation[row])
             continue
         np.testing.assert_allclose(found.mean[row], np.mean(known), rtol=1e-13)
@@ -153,7 +154,7 @@ def test_quantiles_lie_within_a_bin_of_the_true_ones():
     for probability in (0.05, 0.5, 0.9):
         found = sums.result().quantile(probability, sums.edges)
         for name in (0, 1):
-            row = ROWS.index(("peak_contact_force", name))
+            row = rows_of(2).index(("peak_contact_force", name))
             forces = records["peak_contact_force"][:, name]
             true = np.nanquantile(forces, probability)
             assert abs(found[row] - true) <= np.diff(sums.edges[row])[0]
@@ -414,7 +415,7 @@ def test_a_leader_merges_blocks_that_ranks_summed_up_and_wrote():
     leader, wrote = BlockBundles(payload | {"raw": {"folder": "elsewhere"}}), {}
     opened = leader.open(np.array([1, 2]), np.array([[0.0, 8192.0], [8192.0, 8192.0]]))
     assert [blocks.tolist() for blocks in opened] == [[0, 1], [2]]
-    rank = Summariser(MadeUp(), points, sums.edges, wrote.__setitem__)
+    rank = Summariser(MadeUp(), points, OUTCOME, sums.edges, wrote.__setitem__)
     rank.submit(np.array([2, 1]), leader.points[np.array([2, 1])])
     done = np.concatenate([rank.advance(1.0) for _ in range(20)])
     assert sorted(done["sample"]) == [1, 2]
@@ -478,7 +479,8 @@ def test_memory_is_flat_up_to_a_million_samples(tmp_path):
 def summed(records: np.ndarray, sums: Accumulator, first: int, length: int) -> None:
     """What a rank and root do with one part."""
     mine = records[first : first + length]
-    record = packed(0, first, length, mine.size, summarise(mine, sums.edges, length))
+    summary = summarise(mine, sums.edges, length)
+    record = packed(partial_of(OUTCOME), 0, first, length, mine.size, summary)
     sums.add_part(first, length, unpacked(record[0]))
 
 
@@ -521,10 +523,10 @@ def test_a_part_counts_once_and_only_as_one():
     records = outcomes(3 * 4096)
     sums = Accumulator(records.size)
     with pytest.raises(ValueError, match="no part"):
-        sums.add_part(0, 32, empty())  # the edges are not known
+        sums.add_part(0, 32, empty(7))  # the edges are not known
     sums.add(records[:4096])
     with pytest.raises(ValueError, match="no part"):
-        sums.add_part(4096 + 32, 64, empty())
+        sums.add_part(4096 + 32, 64, empty(7))
     summed(records, sums, 4096, 64)
     for first, length in ((4096, 64), (4096 + 32, 32), (4096, 128)):
         with pytest.raises(ValueError, match="before"):
@@ -545,7 +547,7 @@ def test_a_rank_sums_up_what_it_simulates():
     sums = Accumulator(9000)
     sums.add(records[:4096])
     parts = Parts(sums, 1024)
-    rank = Summariser(worker, points, sums.edges)
+    rank = Summariser(worker, points, OUTCOME, sums.edges)
     rank.submit(np.arange(len(parts)), parts[np.arange(len(parts))])
     assert rank.pending == len(parts) == 5
     assert rank.samples_in_hand == list(range(4096, 9000))

@@ -235,7 +235,7 @@ def _script() -> str:
 # -- program errors -----------------------------------------------------------------------------
 
 BEFORE = [
-    "call hpcclear.cli.options:Written.scene",
+    "call hpcclear.scene:load_scene",
     "call hpcclear.ensemble.samples:design",
     "call hpcclear.results.lock:Lock.acquire",
     "call hpcclear.results.checkpoint:Checkpoint._open",
@@ -258,7 +258,7 @@ AFTER = [
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
 STUDY_CASES = [
-    "call hpcclear.cli.options:Written.scene",
+    "call hpcclear.scene:load_scene",
     "import hpcclear.study",
     "call hpcclear.results.checkpoint:Checkpoint._open",
     "call hpcclear.study.sensitivities:analyse",

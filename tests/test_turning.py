@@ -19,7 +19,7 @@ from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import ConstantSpeed, Harmonic, TorqueDrive
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.planar.turning import refused
+from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
@@ -446,6 +446,31 @@ def test_a_rhombus_with_two_drives_passes_where_it_folds(start):
     np.testing.assert_allclose(corner["point_x"], 0.2 * np.cos(turn), atol=1e-9)
     np.testing.assert_allclose(corner["point_y"], 0.0, atol=1e-9)
     assert int(response["status"]) in (Status.OK, Status.NEAR_SINGULAR)
+
+
+def test_change_points_that_clearance_decides_are_named_at_their_angles():
+    """A parallelogram folds where its crank lies along the ground, a rocker whose links differ nowhere."""
+    for pin in ("o2", "o3", "o4"):
+        for a, g in ((0.1, 0.2), (0.07, 0.11), (0.2, 0.13)):
+            base = four_bar(a, g, a, g, 1.0, 1)
+            opened = replace(base, joints=pins((pin,), *FOUR))
+            angles = np.array(changes(opened, 0.0, 1))
+            off = np.minimum(angles % 180.0, -angles % 180.0)
+            assert len(angles) == 2
+            np.testing.assert_allclose(off, 0.0, atol=0.1)
+            assert abs(angles[1] - angles[0]) == pytest.approx(180.0, abs=0.1)
+            assert changes(base, 0.0, 1) == ()  # passed, and judged
+        rocking = four_bar(0.04, 0.12, 0.08, 0.13, 1.0, 1)
+        assert changes(replace(rocking, joints=pins((pin,), *FOUR)), 0.0, 1) == ()
+
+
+def test_a_response_warns_of_change_points_that_clearance_decides():
+    folded = rocker(
+        'mechanism.ground.points.p=["120 mm", "0 mm"]', 'mechanism.bodies.rocker.length="40 mm"',
+        "mechanism.bodies.coupler.start_angle=0", 'mechanism.bodies.rocker.start_angle="25 deg"',
+    )  # fmt: skip
+    assert "0 and 180 deg of the crank" in simulate(folded).attrs["cautions"]
+    assert "cautions" not in simulate(rocker()).attrs
 
 
 def test_clearance_decides_at_a_change_point_unless_ideal_joints_alone_depend():

@@ -14,17 +14,16 @@ from hpcclear.base import host, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.evaluation.steady import wording
-from hpcclear.ensemble.samples import design
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.progress import Progress, Style, duration
 from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 from hpcclear.study import extent, forecast, lives
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
@@ -132,7 +131,7 @@ class Plan:
 
     def disk(self, simulations: int) -> float:
         """Bytes of the samples and of the checkpoint that stands beside them meanwhile."""
-        return 2.0 * simulations * (OUTCOME.itemsize + 8 * self.columns)
+        return 2.0 * simulations * (record_of(self.rows[0].scene).itemsize + 8 * self.columns)
 
 
 def measure(

@@ -14,7 +14,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import FIELDS, IMPACTS, LEVELS, OUTCOME, RESPONSES, WIDEST
+from hpcclear.base.outcome import FIELDS, IMPACTS, LEVELS, RESPONSES, WIDEST
 
 Function = Callable[..., Any]
 
@@ -111,9 +111,7 @@ class Objective:
         recorded = () if self.value is None else arguments(self.value)
         rubs = self.rate is not None and not self.whole
         return (
-            rubs
-            or self.name == "mean-gap"
-            or any(OUTCOME[n].shape for n in recorded if n in RECORDED)
+            rubs or self.name == "mean-gap" or any(FIELDS[n].per for n in recorded if n in RECORDED)
         )
 
     @property
@@ -139,7 +137,7 @@ class Objective:
         return {"mean": mean, "rms": np.sqrt(np.maximum(mean, 0.0)), "peak": peak}[self.made]
 
     def of(self, records: Records) -> Array:
-        """Its value of records (n,), NaN where something that it is made of is.
+        """Its value of records (n,), NaN where something that it is made of is, or was not recorded.
 
         Raises
         ------
@@ -147,8 +145,11 @@ class Objective:
             `value` raised something, or gives no number.
         """
         names = ("rate",) if self.value is None else arguments(self.value)
-        columns = [self._column(name, records) for name in names]
         found = np.full(len(records), np.nan)
+        fields = {RATE if name == "rate" else name for name in names}
+        if not fields <= {*(records.dtype.names or ())}:
+            return found
+        columns = [self._column(name, records) for name in names]
         for k, row in enumerate(zip(*columns, strict=True)):
             if not any(np.isnan(one).any() for one in row):
                 found[k] = self._value_of(row)
@@ -312,7 +313,7 @@ def bound(
     return replace(objective, name=name, words=words, places=places, joints=joints)
 
 
-_OF_THE_GAP = tuple(name for name in OUTCOME.names or () if name.startswith("objective_"))
+_OF_THE_GAP = {name for name in FIELDS if name.startswith("objective_")}
 
 
 def asked(records: Records, objective: Objective) -> Records:
@@ -324,6 +325,6 @@ def asked(records: Records, objective: Objective) -> Records:
         return records
     found = records.copy()
     found["objective"] = objective.of(records)
-    for name in _OF_THE_GAP:
+    for name in _OF_THE_GAP & {*(found.dtype.names or ())}:
         found[name] = np.nan
     return found

@@ -3,6 +3,7 @@
 A failed simulation is an outcome, not an exception: its numbers are NaN and its status says why.
 """
 
+from collections.abc import Collection
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -155,7 +156,8 @@ class Field(NamedTuple):
     """"joint", "wave", "band" or "joint band": what there is one for each of; "" for one a sample."""
     when: str = ""
     """What a scene has to require, so that it is no NaN and stands in datasets: "response" or "impact" (an objective of it),
-    "level" (levels in some band), "request" (other effects), "steady" (a target error), "map"; "" of what always does."""
+    "level" (levels in some band), "pressure", "rate" (of the objective), "wear", "energy" (other effects), "steady" (a target
+    error), "map"; "" of what always does."""
     required: bool = False
     """Whether every file with the outcome of a simulation has it."""
 
@@ -196,14 +198,14 @@ FIELDS = {
         )
     },
     "peak_contact_pressure": Field(
-        "Pa", "largest pressure at the peak contact force", per="joint", when="request"),
+        "Pa", "largest pressure at the peak contact force", per="joint", when="pressure"),
     "contact_half_angle": Field(
-        "rad", "half of the angle of contact at the peak contact force", per="joint", when="request"),
-    "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="request"),
-    "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="request"),
+        "rad", "half of the angle of contact at the peak contact force", per="joint", when="pressure"),
+    "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="rate"),
+    "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="wear"),
     "sliding_waves": Field(
-        "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="request"),
-    "energy_error": Field("1", "energy residual over the larger of kinetic energy and driving work", when="request"),
+        "J", "sliding work of a revolution times waves of the contact's angle", per="wave", when="wear"),
+    "energy_error": Field("1", "energy residual over the larger of kinetic energy and driving work", when="energy"),
     "objective_limit": Field(
         "objective", "half-width of the 95 % confidence interval of f as a steady mean", when="steady"),
     "lyapunov_exponent": Field("1", "largest Lyapunov exponent, per revolution", when="steady"),
@@ -237,7 +239,7 @@ WIDEST = {"peak_contact_pressure": "pressure", "contact_half_angle": "half_angle
 LEVELS = _fields("level")
 """Fields of recorded samples: force levels in third-octave bands, and half-widths."""
 
-ON_REQUEST = _fields("response", "impact", "level", "request")
+ON_REQUEST = _fields("response", "impact", "level", "pressure", "rate", "wear", "energy")
 """Fields that are NaN, and left out of datasets, unless a scene requests them."""
 
 STEADY, MAPPED = _fields("steady"), _fields("map")
@@ -246,29 +248,58 @@ STEADY, MAPPED = _fields("steady"), _fields("map")
 JUDGED = (*STEADY, *MAPPED, "regime")
 """All that stands in datasets only where a `regime` was judged."""
 
-_SIZES = {"joint": MAX_JOINTS, "wave": WAVE_ROWS, "band": MAX_BANDS}
-OUTCOME = np.dtype(
-    [
-        (name, one.kind, tuple(_SIZES[per] for per in one.per.split()))
-        for name, one in FIELDS.items()
-    ]
-)
-"""The record of one finished sample, as it travels over ranks and into datasets."""
+
+def record_type(joints: int = len(JOINTS), bands: int = 0, asked: Collection[str] = ()) -> np.dtype:
+    """Type of the record of a sample, as it travels over ranks and into datasets.
+
+    It has the fields that are always known, and those whose `Field.when` is among `asked`. `hpcclear.scene.record.record_of`
+    names the type of a scene.
+    """
+    sizes = {"joint": joints, "wave": WAVE_ROWS, "band": bands}
+    return np.dtype(
+        [
+            (name, one.kind, tuple(sizes[per] for per in one.per.split()))
+            for name, one in FIELDS.items()
+            if one.when in ("", *asked)
+        ]
+    )
+
+
+OUTCOME = record_type()
+"""The record of a slider-crank that requests nothing further."""
 
 NUMBERS = tuple(name for name, one in FIELDS.items() if one.kind == "f8")
 """Fields that are NaN where nothing is known, as in a failed sample."""
 
 
-def unknown(count: int) -> np.ndarray:
-    """Records (count,) of `OUTCOME`: numbers NaN, codes 0."""
-    records = np.zeros(count, OUTCOME)
-    for name in NUMBERS:
-        records[name] = np.nan
+def unknown(count: int, record: np.dtype = OUTCOME) -> np.ndarray:
+    """Records (count,) of a `record_type`: numbers NaN, codes 0."""
+    records = np.zeros(count, record)
+    for name in record.names or ():
+        if name in NUMBERS:
+            records[name] = np.nan
     return records
 
 
-def failed(sample: int, status: Status, rhs_evaluations: int = 0) -> np.ndarray:
-    """A record of one failed sample: numbers NaN, never 0 (shape ``(1,)`` of `OUTCOME`)."""
-    record = unknown(1)
-    record["sample"], record["status"], record["rhs_evaluations"] = sample, status, rhs_evaluations
-    return record
+def failed(
+    sample: int, status: Status, rhs_evaluations: int = 0, record: np.dtype = OUTCOME
+) -> np.ndarray:
+    """A record of one failed sample: numbers NaN, never 0 (shape ``(1,)`` of a `record_type`)."""
+    found = unknown(1, record)
+    found["sample"], found["status"], found["rhs_evaluations"] = sample, status, rhs_evaluations
+    return found
+
+
+def recast(records: np.ndarray, record: np.dtype) -> np.ndarray:
+    """Records (n,) in another `record_type`, without fields and joints that it lacks; those that it adds are unknown.
+
+    The records themselves if they are of this type already.
+    """
+    if records.dtype == record:
+        return records
+    found = unknown(len(records), record)
+    for name in {*(record.names or ())} & {*(records.dtype.names or ())}:
+        shapes = zip(found[name].shape, records[name].shape, strict=True)
+        common = tuple(slice(min(sizes)) for sizes in shapes)
+        found[name][common] = records[name][common]
+    return found

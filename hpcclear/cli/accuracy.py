@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hpcclear.accuracy import spending
 from hpcclear.accuracy.integration import MARGIN
-from hpcclear.cli.printing import console, fitting, table
+from hpcclear.cli.terminal import console, fitting, table
 from hpcclear.report import targets
 from hpcclear.report.figures.accuracy import AIM
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.printing import console, quantity, remark, table
+from hpcclear.cli.terminal import console, quantity, remark, table
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
@@ -51,7 +51,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     out.print(table("Model", rows))
     for text in scene.readings:
         out.print(remark("Note", text))
-    for warning in (*locked, *scene.warnings):
+    for warning in (*locked, *_cautions(scene), *scene.warnings):
         out.print(remark("Warning", warning))
     if scene.study is not None:
         out.print(table("Study", _study_rows(scene)))
@@ -97,6 +97,12 @@ def _locked(scene: Scene) -> list[str]:
     if not varies_geometry(scene):
         raise refusal[1]
     return [f"the scene's own design {refusal[1].reason}; its run time is not measured"]
+
+
+def _cautions(scene: Scene) -> tuple[str, ...]:
+    from hpcclear.dynamics.planar.problem import cautions_of
+
+    return cautions_of(scene)
 
 
 def _mpi(ranks: "Ranks | None") -> str:

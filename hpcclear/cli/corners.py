@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hpcclear.cli.printing import console, fitting, table
+from hpcclear.cli.terminal import console, fitting, table
 from hpcclear.ensemble.corners import MOST, Tried, tried
 from hpcclear.report.failures import Column, sentences, where
 from hpcclear.scene import Scene

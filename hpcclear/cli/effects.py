@@ -12,7 +12,8 @@ from rich.table import Table
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
-from hpcclear.cli.printing import _load, console, fitting, objective_of, table
+from hpcclear.cli.printing import _load
+from hpcclear.cli.terminal import console, fitting, objective_of, table
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.effects import (
     named,

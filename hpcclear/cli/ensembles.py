@@ -1,7 +1,7 @@
 """Commands about many simulations: `sample`, `merge`, `map`, `wear`, `effects`."""
 
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -12,18 +12,17 @@ from hpcclear.cli.options import (
     How,
     Written,
     check_free,
+    command,
     flag,
     of_one_process,
     on_ranks,
     output_option,
     place_of,
+    remarked,
     with_how,
     with_scene,
 )
 from hpcclear.ranks.stopping import Exit
-
-if TYPE_CHECKING:
-    from hpcclear.ranks.team import Ranks
 
 
 def _check_kind(
@@ -45,7 +44,7 @@ def _check_kind(
         raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
 
 
-@click.command(short_help="Simulate many designs.")
+@command(short_help="Simulate many designs.")
 @with_scene
 @output_option("NetCDF file to write.")
 @POINTS
@@ -86,16 +85,17 @@ def sample(
     Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
 
-    def program(ranks: "Ranks") -> None:
+    with on_ranks(how.time_limit) as ranks:
         _check_kind(points, statistics, raw, part, how.fresh, thresholds)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
         from hpcclear.report.spread import beyond, units_of
+        from hpcclear.scene import load_scene
 
         chosen = None if part is None else Part.parse(part)
-        scene, place = written.scene(), place_of(output)
+        scene, place = remarked(load_scene(*written)), place_of(output)
         units, joints = units_of(scene.objective), scene.joint_labels
         levels = [beyond(units, words, joints) for words in thresholds]
         if statistics:
@@ -108,11 +108,10 @@ def sample(
                 scene, place, ranks, table=points, part=chosen, options=how.options()
             )
             describe_samples(found, levels)
+    return Exit.DONE
 
-    return on_ranks(program, how.time_limit)
 
-
-@click.command(short_help="Merge partial result files.")
+@command(short_help="Merge partial result files.")
 @with_scene
 @output_option("NetCDF file to write: the name that was given with each part.")
 @POINTS
@@ -125,16 +124,16 @@ def merge(written: Written, output: Path, points: Path | None) -> int:
     Example: hpcclear merge jobs/quickstart.toml -o results/samples.nc
     """
     from hpcclear.cli.printing import describe_samples
-    from hpcclear.ensemble.samples import design
-    from hpcclear.ensemble.split import run_merge
+    from hpcclear.ensemble.samples import design, run_merge
     from hpcclear.ranks.boundary import alone
+    from hpcclear.scene import load_scene
 
-    scene = written.scene()
+    scene = remarked(load_scene(*written))
     describe_samples(run_merge(scene, design(scene, points), output, alone()))
     return Exit.DONE
 
 
-@click.command("map", short_help="Map periodic and chaotic motion over one or two parameters.")
+@command("map", short_help="Map periodic and chaotic motion over one or two parameters.")
 @with_scene
 @output_option("NetCDF file to write.")
 @click.option(
@@ -155,17 +154,18 @@ def map_command(written: Written, output: Path, x: str, y: str | None, how: How)
     Example: mpiexec -n 2 hpcclear map jobs/hunt_crossley.toml --x C=0.1mm:1mm:40 -o results/map.nc
     """
 
-    def program(ranks: "Ranks") -> None:
+    with on_ranks(how.time_limit) as ranks:
         from hpcclear.cli.printing import describe_map
         from hpcclear.ensemble.maps import run_map
+        from hpcclear.scene import load_scene
 
         axes = (x,) if y is None else (x, y)
-        describe_map(run_map(written.scene(), axes, place_of(output), ranks, how.options()))
+        scene = remarked(load_scene(*written))
+        describe_map(run_map(scene, axes, place_of(output), ranks, how.options()))
+    return Exit.DONE
 
-    return on_ranks(program, how.time_limit)
 
-
-@click.command(short_help="Observe each revolution over a range of one parameter.")
+@command(short_help="Observe each revolution over a range of one parameter.")
 @with_scene
 @output_option("NetCDF file to write.")
 @click.option(
@@ -223,21 +223,20 @@ def bifurcation(
     Example: mpiexec -n 2 hpcclear bifurcation jobs/hunt_crossley.toml --x drive.speed="500 rpm:6000 rpm:12" -o results/b.nc
     """
 
-    def program(ranks: "Ranks") -> None:
+    with on_ranks(how.time_limit) as ranks:
         from hpcclear.cli.printing import describe_bifurcation
         from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
         from hpcclear.ensemble.maps import number_of
+        from hpcclear.scene import load_scene
 
         angle = number_of("--section", section, "rad")
         seen = Observation(name, angle, transient, revolutions)
-        describe_bifurcation(
-            run_bifurcation(written.scene(), x, place_of(output), ranks, seen, how.options())
-        )
-
-    return on_ranks(program, how.time_limit)
+        scene, place = remarked(load_scene(*written)), place_of(output)
+        describe_bifurcation(run_bifurcation(scene, x, place, ranks, seen, how.options()))
+    return Exit.DONE
 
 
-@click.command(short_help="Simulate wear over the service life.")
+@command(short_help="Simulate wear over the service life.")
 @with_scene
 @output_option("NetCDF file to write.")
 @with_how
@@ -251,16 +250,17 @@ def wear(written: Written, output: Path, how: How) -> int:
     Example: mpiexec -n 2 hpcclear wear jobs/wear.toml -o results/wear.nc --set wear.lives=8
     """
 
-    def program(ranks: "Ranks") -> int:
+    with on_ranks(how.time_limit) as ranks:
         from hpcclear.cli.wear import describe
         from hpcclear.ensemble.wear import run_wear
+        from hpcclear.scene import load_scene
 
-        return describe(run_wear(written.scene(), place_of(output), ranks, how.options()))
+        scene = remarked(load_scene(*written))
+        sys.exit(describe(run_wear(scene, place_of(output), ranks, how.options())))
+    return Exit.DONE
 
-    return on_ranks(program, how.time_limit)
 
-
-@click.command(short_help="Find effects that can be neglected.")
+@command(short_help="Find effects that can be neglected.")
 @with_scene
 @output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
 @click.option(
@@ -303,14 +303,15 @@ def effects(
     Example: mpiexec -n 2 hpcclear effects jobs/quickstart.toml --tolerance 2% -o results/effects.nc
     """
 
-    def program(ranks: "Ranks") -> int:
+    with on_ranks(how.time_limit) as ranks:
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted
+        from hpcclear.scene import load_scene
         from hpcclear.study.extent import certificate_extent
 
         allowed = tolerance_of(tolerance)
-        scene = written.scene()
+        scene = remarked(load_scene(*written))
         if reduced is not None:
             check_free(reduced)
         most, budget = certificate_extent(scene, samples)
@@ -326,6 +327,5 @@ def effects(
             from hpcclear.results import files
 
             files.write_bytes(place_of(reduced), found.content.attrs["reduced_scene"].encode())
-        return code
-
-    return on_ranks(program, how.time_limit)
+        sys.exit(code)
+    return Exit.DONE

@@ -1,5 +1,6 @@
 """The command `identify` and what it prints: unknowns with their intervals, the fit, growth, and what to measure."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,10 +11,12 @@ from hpcclear.cli.options import (
     Amount,
     How,
     Written,
+    command,
     flag,
     on_ranks,
     output_option,
     place_of,
+    remarked,
     with_how,
     with_scene,
 )
@@ -21,10 +24,9 @@ from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
-    from hpcclear.ranks.team import Ranks
 
 
-@click.command(short_help="Identify clearances from a measured signal.")
+@command(short_help="Identify clearances from a measured signal.")
 @with_scene
 @output_option("NetCDF file to write.")
 @click.option(
@@ -84,19 +86,21 @@ def identify(written: Written, output: Path, how: How, **settings: Any) -> int:
     --unknown joints.crank_rod.clearance=10um:150um -o results/identify.nc
     """
 
-    def program(ranks: "Ranks") -> int:
+    with on_ranks(how.time_limit) as ranks:
         from hpcclear.identify.answer import run_identify
         from hpcclear.identify.settings import Settings
+        from hpcclear.scene import load_scene
 
         place, made = place_of(output), Settings(**settings)
-        return describe(run_identify(written.scene(), place, ranks, made, how.options()))
-
-    return on_ranks(program, how.time_limit)
+        scene = remarked(load_scene(*written))
+        sys.exit(describe(run_identify(scene, place, ranks, made, how.options())))
+    return Exit.DONE
 
 
 def describe(found: "Finished") -> int:
     """Print what was identified; the exit code."""
-    from hpcclear.cli.printing import _load, console, fitting, remark, table
+    from hpcclear.cli.printing import _load
+    from hpcclear.cli.terminal import console, fitting, remark, table
     from hpcclear.report import identified
 
     out, content = console(), found.content

@@ -26,7 +26,7 @@ def laws() -> int:
     Example: hpcclear laws
     """
     from hpcclear import plugins
-    from hpcclear.cli.printing import console, table
+    from hpcclear.cli.terminal import console, table
     from hpcclear.scene.laws import known_laws
 
     registries = {"contact": plugins.CONTACT_LAWS, "friction": plugins.FRICTION_LAWS}
@@ -52,7 +52,7 @@ _OTHERS = {
 
 def _list(place: str, registry: Any) -> None:
     """Print the names of a registry; of objectives and of what packages offer, what they are."""
-    from hpcclear.cli.printing import console, table
+    from hpcclear.cli.terminal import console, table
 
     names, ours = registry.names(), registry.ours()
     show(f"{place} ({registry.kind}): {', '.join(names)}")

@@ -2,13 +2,10 @@
 
 import contextlib
 import functools
-import importlib
 import math
-import sys
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -110,29 +107,25 @@ PROGRESS = click.option(
 )
 
 
-@dataclass(frozen=True)
-class Written:
-    """A scene as the words of a command have it: a file, and what is changed of it."""
+class Written(NamedTuple):
+    """A scene as the words of a command have it: what `hpcclear.scene.load_scene` takes."""
 
     file: Path
     overrides: tuple[str, ...]
 
-    def scene(self, warn: bool = True) -> "Scene":
-        """The scene; readings of units and likely slips of units are printed, unless the caller prints them."""
-        from hpcclear.scene import load_scene
-        from hpcclear.scene.plausibility import implausible
 
-        scene = load_scene(self.file, self.overrides)
-        if warn:
-            for text in scene.readings:
-                say(f"Note: {text}")
-            for text in implausible(scene):
-                say(f"Warning: {text}")
-        return scene
+def remarked(scene: "Scene") -> "Scene":
+    """The scene; readings of units and likely slips of units are printed."""
+    from hpcclear.scene.plausibility import implausible
+
+    for text in scene.readings:
+        say(f"Note: {text}")
+    for text in implausible(scene):
+        say(f"Warning: {text}")
+    return scene
 
 
-@dataclass(frozen=True)
-class How:
+class How(NamedTuple):
     """How a run is carried out."""
 
     fresh: bool
@@ -147,24 +140,33 @@ class How:
         return Options(self.fresh, self.interval, self.progress)
 
 
-def _gathering(name: str, kind: type, *options: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Gives a command these options, one a field of `kind`, as its one argument `name`."""
-
-    def decorator(command: Callable[..., int]) -> Callable[..., int]:
-        @functools.wraps(command)
-        def gathered(**values: object) -> int:
-            parts = {field.name: values.pop(field.name) for field in fields(kind)}
-            return command(**{name: kind(**parts)}, **values)
-
-        for option in reversed(options):
-            gathered = option(gathered)
-        return gathered
-
-    return decorator
+GATHERED: dict[str, Any] = {"written": Written, "how": How}
+"""Arguments of commands, and what they are gathered of."""
 
 
-with_scene = _gathering("written", Written, FILE, SET)
-with_how = _gathering("how", How, FRESH, LIMIT, INTERVAL, PROGRESS)
+class Command(click.Command):
+    """A command that gets options which belong together as one argument."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse words into `ctx.params`; return those that are left over."""
+        left = super().parse_args(ctx, args)
+        for name, kind in GATHERED.items():
+            if all(field in ctx.params for field in kind._fields):
+                ctx.params[name] = kind(*map(ctx.params.pop, kind._fields))
+        return left
+
+
+command = functools.partial(click.command, cls=Command)
+
+
+def with_scene(function: Callable[..., int]) -> Callable[..., int]:
+    """Give a command a scene file and its overrides, as its argument `written`."""
+    return FILE(SET(function))
+
+
+def with_how(function: Callable[..., int]) -> Callable[..., int]:
+    """Give a command the options of `How`, as its argument `how`."""
+    return FRESH(LIMIT(INTERVAL(PROGRESS(function))))
 
 
 def place_of(output: Path) -> Path:
@@ -201,47 +203,21 @@ SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluati
 STUDYING = (*SIMULATING, "xarray", "hpcclear.ensemble.compiling", "hpcclear.study")
 
 
+@contextlib.contextmanager
 def on_ranks(
-    program: "Callable[[Ranks], int | None]",
-    time_limit: float | None = None,
-    ahead: tuple[str, ...] = SIMULATING,
-    resumes: bool = True,
-) -> int:
-    """Run a command that uses every rank; `ahead`: what the others load meanwhile; `resumes`: what it finishes is kept."""
-    from hpcclear.ranks.boundary import run_on_ranks
+    time_limit: float | None = None, ahead: tuple[str, ...] = SIMULATING, resumes: bool = True
+) -> Iterator["Ranks"]:
+    """All ranks, for what root does in the block; `ahead`: what others load meanwhile; `resumes`: what it finishes is kept."""
+    from hpcclear.ranks.boundary import boundary
 
     stop: StopSwitch = click.get_current_context().obj
     if time_limit is not None:
         stop.limit_time(time_limit)
-
-    def noted(ranks: "Ranks") -> int | None:
+    with boundary(stop, ahead, resumes=resumes) as ranks:
         from hpcclear.scene.units import noting  # here, where the others load what they need
 
         with noting(lambda text, read: say(f"Note: {text!r} is read as {read}")):
-            return program(ranks)
-
-    return run_on_ranks(noted, stop, ahead, resumes=resumes)
-
-
-def lightly() -> None:
-    """Load xarray in this process without pint and pyarrow: a fifth and a twentieth of a start, and 200 MB of address space.
-
-    Values of result files are plain numbers, of which xarray need not check whether they are pint's; where a version of it has
-    other names, pint is loaded. pandas finds no pyarrow while it is loaded; who imports that later has it.
-    """
-    if "pyarrow" not in sys.modules:
-        sys.modules["pyarrow"] = None  # type: ignore[assignment]
-        try:
-            importlib.import_module("pandas")
-        finally:
-            del sys.modules["pyarrow"]
-    from xarray.namedarray import pycompat
-
-    known = getattr(pycompat, "_cached_duck_array_modules", {})
-    kind = getattr(pycompat, "DuckArrayModule", None)
-    if kind is not None and "pint" not in sys.modules:
-        absent = known["pint"] = object.__new__(kind)
-        absent.module, absent.version, absent.type, absent.available = None, None, (), False
+            yield ranks
 
 
 def show(text: str) -> None:

@@ -1,19 +1,16 @@
-"""What the commands print: tables that fit 80 columns, plain when piped."""
+"""What the commands that simulate many designs print."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from rich import box
-from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from hpcclear.base.outcome import Regime, Status
-from hpcclear.base.plain import plain
+from hpcclear.cli.terminal import console, counted, fitting, objective_of, quantity, remark, table
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.report.answer import answer
@@ -24,63 +21,6 @@ from hpcclear.results import dataset
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
-
-WIDTH = 80
-
-
-class _PlainConsole(Console):
-    """Shows texts as they are: nothing in them is markup, and nothing commands the terminal."""
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        """Make a text of a string, for lines, titles and cells alike."""
-        return super().render_str(plain(text), **{**options, "markup": False, "emoji": False})
-
-
-def console() -> Console:
-    """Standard output; at most 80 columns, colours only on a terminal."""
-    screen = Console(highlight=False, soft_wrap=False)
-    width = min(WIDTH, screen.width) if screen.is_terminal else WIDTH
-    return _PlainConsole(highlight=False, width=width)
-
-
-def remark(label: str, text: str) -> Text:
-    """A line that begins with a label in colour."""
-    return Text.assemble((f"{label}:", "yellow"), f" {plain(text)}")
-
-
-def table(title: str, rows: list[tuple[str, str]]) -> Table:
-    """Two columns: what, and its value."""
-    made = Table(
-        title=title, title_justify="left", box=box.SIMPLE_HEAD, show_header=False, pad_edge=False
-    )
-    made.add_column(no_wrap=True)
-    made.add_column(overflow="fold")
-    for row in rows:
-        made.add_row(*row)
-    return made
-
-
-def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """A number for people in a unit of a readable size, "nan" where there is none."""
-    return fitting(labels.quantity(value, unit, digits)) if np.isfinite(value) else "nan"
-
-
-def fitting(text: str) -> str:
-    """A text as the terminal can show it: units in plain letters where it has no others."""
-    if "utf" in (sys.stdout.encoding or "").lower():
-        return text
-    return text.replace("µ", "u").replace("²", "^2").replace("–", "-").replace("±", "+-")
-
-
-def objective_of(content: xr.Dataset) -> tuple[str, str]:
-    """What f is in a file of results, in words, and its unit."""
-    unit = content.get("objective", content.get("objective_mean")).attrs["units"]  # type: ignore[union-attr]
-    return labels.objective(content), str(unit)
-
-
-def counted(ranks: int) -> str:
-    """A number of ranks in words."""
-    return f"{ranks} rank{'' if ranks == 1 else 's'}"
 
 
 def _load(found: "Finished") -> list[tuple[str, str]]:

@@ -3,19 +3,19 @@
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 from rich import box
 from rich.table import Table
 
 from hpcclear.base.outcome import Status
-from hpcclear.cli.printing import console, fitting, objective_of, quantity, remark, table
+from hpcclear.cli.terminal import console, fitting, objective_of, quantity, remark, table
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels, motion
+from hpcclear.results.content import Results
 from hpcclear.scene.citation import TITLE
 
 
-def describe_response(response: xr.Dataset, output: Path, seconds: float | None = None) -> None:
+def describe_response(response: Results, output: Path, seconds: float | None = None) -> None:
     """Print the loads, objective and warnings of one response (kind ``response``), and its file.
 
     `seconds`: run time, printed with a steady mean.
@@ -33,7 +33,7 @@ def describe_response(response: xr.Dataset, output: Path, seconds: float | None 
     out.print(f"written  {output}")
 
 
-def _status_rows(response: xr.Dataset) -> list[tuple[str, str]]:
+def _status_rows(response: Results) -> list[tuple[str, str]]:
     """How the simulation ended, and for a failure its remedy."""
     status = Status(int(response["status"]))
     said = f"{status.name.lower()}: {status.message}"
@@ -77,7 +77,7 @@ def _bearing_table(found: list[bearings.Bearing], *, gaps: bool) -> Table:
     return made
 
 
-def _rows(response: xr.Dataset, seconds: float | None) -> list[tuple[str, str]]:
+def _rows(response: Results, seconds: float | None) -> list[tuple[str, str]]:
     """Everything about the whole mechanism, the objective after the loads."""
     rows = []
     status = Status(int(response["status"]))
@@ -102,7 +102,7 @@ def _rows(response: xr.Dataset, seconds: float | None) -> list[tuple[str, str]]:
     return [*rows, ("force evaluations", f"{int(response['rhs_evaluations'])}")]
 
 
-def _between_instants(response: xr.Dataset) -> list[str]:
+def _between_instants(response: Results) -> list[str]:
     """Joints whose peak force lies between two stored instants, with the largest stored value."""
     if "transient_turns" not in response.attrs:
         return []
@@ -115,7 +115,7 @@ def _between_instants(response: xr.Dataset) -> list[str]:
     ]
 
 
-def _crank(response: xr.Dataset) -> list[tuple[str, str]]:
+def _crank(response: Results) -> list[tuple[str, str]]:
     """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
     if "crank_speed" not in response:
         return []

@@ -98,7 +98,7 @@ def _print_rows(headings: list[str], rows: list[list[str]]) -> None:
     from rich import box
     from rich.table import Table
 
-    from hpcclear.cli.printing import console
+    from hpcclear.cli.terminal import console
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in headings:
@@ -138,7 +138,7 @@ def compare(
 
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """
-    from hpcclear.cli.printing import console, table
+    from hpcclear.cli.terminal import console, table
     from hpcclear.report.compare import NOT_ALIGNED
     from hpcclear.report.compare import compare as compared
     from hpcclear.results import dataset

@@ -1,5 +1,7 @@
 """Commands about one scene: `init`, `import`, `simulate`, `schema`, `check`; about results: `report`, `reproduce`, `crate`."""
 
+import contextlib
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,12 +13,13 @@ from hpcclear.cli.options import (
     TRUST,
     Written,
     check_free,
+    command,
     flag,
-    lightly,
     of_one_process,
     on_ranks,
     output_option,
     place_of,
+    remarked,
     say,
     show,
     with_scene,
@@ -25,7 +28,6 @@ from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
-    from hpcclear.ranks.team import Ranks
     from hpcclear.scene import Scene
 
 
@@ -127,7 +129,7 @@ def import_(source: Path, file: Path, unit: str, sketch: Path | None) -> int:
     return Exit.DONE
 
 
-@click.command(short_help="Validate an input file and estimate run time.")
+@command(short_help="Validate an input file and estimate run time.")
 @with_scene
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample and report its run time.")
 @click.option(
@@ -145,10 +147,16 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
     Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
     """
 
-    def program(ranks: "Ranks") -> int:
-        from hpcclear.cli.check import describe_scene
+    from hpcclear.ranks.boundary import alone
 
-        scene = written.scene(warn=False)
+    launched = is_launched()
+    with (
+        on_ranks(ahead=(), resumes=False) if launched else contextlib.nullcontext(alone()) as ranks
+    ):
+        from hpcclear.cli.check import describe_scene
+        from hpcclear.scene import load_scene
+
+        scene = load_scene(*written)
         turns = describe_scene(scene, cost, ranks)
         if scene.study is not None and scene.study.variables:
             from hpcclear.cli.corners import describe
@@ -156,13 +164,7 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
             describe(scene, cost)
         if sketch is not None:
             _draw(scene, sketch)
-        return Exit.DONE if turns else Exit.FAILED
-
-    if is_launched():
-        return on_ranks(program, ahead=(), resumes=False)
-    from hpcclear.ranks.boundary import alone
-
-    return program(alone())
+        sys.exit(Exit.DONE if turns else Exit.FAILED)
 
 
 def _draw(scene: "Scene", sketch: Path) -> None:
@@ -174,7 +176,7 @@ def _draw(scene: "Scene", sketch: Path) -> None:
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
-@click.command(short_help="Simulate one design.")
+@command(short_help="Simulate one design.")
 @with_scene
 @output_option("NetCDF file to write.")
 @of_one_process
@@ -185,22 +187,24 @@ def simulate(written: Written, output: Path) -> int:
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
-    lightly()
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
-    from hpcclear.dynamics.response import simulate as simulate_scene
+    from hpcclear.dynamics.response import simulated
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
+    from hpcclear.scene import load_scene
 
-    scene = written.scene()
+    scene = remarked(load_scene(*written))
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
         if output.exists():
-            dataset.read(output, "response")  # an earlier response is replaced, and nothing else
+            dataset.content_in(
+                output, "response"
+            )  # an earlier response is replaced, and nothing else
         began = time.perf_counter()
-        response = simulate_scene(scene)
+        response = simulated(scene)
         dataset.write(response, output)
     describe_response(response, output, time.perf_counter() - began)
     status = Status(int(response["status"]))

@@ -1,7 +1,7 @@
 """Commands about a whole study: `run`, what its accuracy costs (`accuracy`), what it will take (`plan`)."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,19 +12,19 @@ from hpcclear.cli.options import (
     STUDYING,
     Amount,
     Written,
+    command,
     directory_option,
     flag,
     on_ranks,
     place_of,
+    remarked,
     say,
     with_scene,
 )
-
-if TYPE_CHECKING:
-    from hpcclear.ranks.team import Ranks
+from hpcclear.ranks.stopping import Exit
 
 
-@click.command(short_help="Run a complete study.")
+@command(short_help="Run a complete study.")
 @with_scene
 @directory_option("Directory for the results.")
 @FRESH
@@ -42,12 +42,13 @@ def run(
     Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
     """
 
-    def program(ranks: "Ranks") -> None:
+    with on_ranks(time_limit, STUDYING) as ranks:
         from hpcclear.cli.printing import describe_study
+        from hpcclear.scene import load_scene
         from hpcclear.study import run_study
 
         place = run_study(
-            written.scene(),
+            remarked(load_scene(*written)),
             place_of(output),
             ranks,
             fresh=fresh,
@@ -55,11 +56,10 @@ def run(
             notify=lambda text: say(text),
         )
         describe_study(place)
+    return Exit.DONE
 
-    return on_ranks(program, time_limit, STUDYING)
 
-
-@click.command(short_help="Plot accuracy against run time.")
+@command(short_help="Plot accuracy against run time.")
 @with_scene
 @directory_option("Directory for accuracy.nc and the figures.")
 @flag("--quick", "Measure with fewer points, in about a minute.")
@@ -80,23 +80,23 @@ def accuracy(
     Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
     """
 
-    def program(ranks: "Ranks") -> None:
+    with on_ranks(time_limit) as ranks:
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.accuracy import describe
         from hpcclear.ensemble.session import Options
+        from hpcclear.scene import load_scene
 
         def notify(text: str) -> None:
             say(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
-        scene, place = written.scene(), place_of(output)
+        scene, place = remarked(load_scene(*written)), place_of(output)
         describe(*run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh)))
+    return Exit.DONE
 
-    return on_ranks(program, time_limit)
 
-
-@click.command(short_help="Estimate the cost of a run.")
+@command(short_help="Estimate the cost of a run.")
 @with_scene
 @click.option(
     "--error",
@@ -117,16 +117,16 @@ def plan(written: Written, error: float | None, workers: int | None) -> int:
     Example: hpcclear plan jobs/quickstart.toml --error 1e-3 --ranks 16
     """
 
-    def program(ranks: "Ranks") -> None:
+    with on_ranks(resumes=False) as ranks:
         from hpcclear.accuracy.plan import ladder, measure
         from hpcclear.cli.plan import describe, preview
+        from hpcclear.scene import load_scene
 
         planned = ranks.size if workers is None else workers
-        scene = written.scene()
+        scene = remarked(load_scene(*written))
         made = measure(
             scene, ranks, ladder(scene, error), planned, say,
             lambda plan: say(preview(plan, planned)), "auto",
         )  # fmt: skip
         describe(made, str(written.file), error, planned)
-
-    return on_ranks(program, resumes=False)
+    return Exit.DONE

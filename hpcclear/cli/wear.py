@@ -7,7 +7,8 @@ import xarray as xr
 
 from hpcclear.base.outcome import Status
 from hpcclear.cli.options import say
-from hpcclear.cli.printing import _load, console, table
+from hpcclear.cli.printing import _load
+from hpcclear.cli.terminal import console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity

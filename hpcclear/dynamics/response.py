@@ -1,10 +1,11 @@
 """One response: the sample of a scene, and the time series of its motion, forces and energies."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base import host
 from hpcclear.base.arrays import Array, Records
@@ -24,10 +25,9 @@ from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
 from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import linkage_of, refused_of
+from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
 from hpcclear.dynamics.planar.response import Seen
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
@@ -38,9 +38,14 @@ from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.results import dataset
+from hpcclear.results.content import Content
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
+from hpcclear.scene.record import has_pressure, record_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
@@ -93,6 +98,13 @@ def simulate(
     InputError
         If the scene requires what the kernel cannot do, or time series that do not fit into memory.
     """
+    return simulated(scene, objective, copy, checked=checked).to_xarray()
+
+
+def simulated(
+    scene: Scene, objective: Objective | None = None, copy: int = 0, *, checked: bool = True
+) -> Content:
+    """Simulate a scene as `simulate` does; the content of its file."""
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
     objective = named.objective if objective is None else objective
@@ -138,7 +150,7 @@ def simulate_together(
         for slot, k in enumerate(numbers):
             scene, record = scenes[k], recording.record()[slot : slot + 1]
             found, collected[slot] = collected[slot].finish(record), None  # type: ignore[call-overload]
-            yield k, _response(scene, scene, found, scene.objective)
+            yield k, _response(scene, scene, found, scene.objective).to_xarray()
 
 
 def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
@@ -159,8 +171,8 @@ Found = tuple[Array, dict[str, Any], Records]
 
 def _response(
     named: Scene, scene: Scene, found: Found, objective: Objective, steady: Records | None = None
-) -> xr.Dataset:
-    """The dataset of a scene `named` by a user, whose series are those of `scene`."""
+) -> Content:
+    """The content of the file of a scene `named` by a user, whose series are those of `scene`."""
     times, data, record = found
     still = coordinate_count(scene) == 0
     if steady is not None:
@@ -181,9 +193,9 @@ def _response(
             _turns(scene),
             scene.numerics.interpolation,
         )
-    reported = {name: dataset.at_joints(record[name], labels)[0] for name in names}
+    reported = {name: record[name][0] for name in names}
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
-    return dataset.response_dataset(
+    return dataset.response_content(
         times,
         {**data, **reported},
         provenance(named.text or named.to_toml(), named.hash, named.references)
@@ -219,9 +231,12 @@ def _turns(scene: Scene) -> int:
 
 
 def _reason(scene: Scene) -> dict[str, str | int]:
-    """Where a linkage that cannot turn locks, as an attribute."""
+    """Where a linkage that cannot turn locks, or what is to be known of one that turns, as an attribute."""
     refusal = refused_of(scene)
-    return {} if refusal is None else {"ended": refusal[1].reason}
+    if refusal is not None:
+        return {"ended": refusal[1].reason}
+    cautions = cautions_of(scene)
+    return {"cautions": "\n".join(cautions)} if cautions else {}
 
 
 _REPORTED = (
@@ -267,9 +282,7 @@ def _prescribed(scene: Scene) -> Found:
     lanes = PrescribedSamples(problem)
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
-    record = outcome_records(
-        *lanes.collect(), responses_reported(problem), bool(problem.effects.wear)
-    )
+    record = outcome_records(*lanes.collect(), record_of(scene), responses_reported(problem))
     return *prescribed_series(scene, problem.transient + problem.averaged), record
 
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.outcome import OUTCOME
-from hpcclear.ensemble.parts import PARTIAL, packed, part_length, take_parts
+from hpcclear.ensemble.parts import packed, part_length, partial_of, take_parts
 from hpcclear.ensemble.raw import raw_files
 from hpcclear.scene import load_scene
-from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.scene.pages import MonteCarloPoints
+from hpcclear.scene.record import record_of
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import BLOCK
 
@@ -58,8 +58,11 @@ class Bundles:
         self.points: Points = points
         files = raw_files(payload["raw"], scene, points)
         self._keeps = files is not None
+        record = record_of(scene)
+        self._kind = partial_of(record)
         self._sums = Accumulator(
             payload["total"],
+            record,
             block=payload["block"],
             edges=payload["edges"],
             whole=set(),
@@ -80,11 +83,11 @@ class Bundles:
         return spans
 
     def take(self, records: np.ndarray) -> None:
-        """Take finished samples, records of `OUTCOME` (m,)."""
-        self._sums.add(records.astype(OUTCOME))
+        """Take finished samples, records (m,)."""
+        self._sums.add(records)
 
     def finished(self) -> np.ndarray:
-        """Summaries (`PARTIAL`, (m,)) of the bundles that are complete, once."""
+        """Summaries (`partial_of`, (m,)) of the bundles that are complete, once."""
         return self._packed(self._sums.hand_on())
 
     def unfinished(self) -> list[np.ndarray]:
@@ -95,10 +98,17 @@ class Bundles:
     def _packed(self, nodes: Sequence[tuple[int, int, Any]]) -> np.ndarray:
         total = self._sums.total
         found = [
-            packed(self._numbers.get(first, 0), first, length, min(length, total - first), summary)
+            packed(
+                self._kind,
+                self._numbers.get(first, 0),
+                first,
+                length,
+                min(length, total - first),
+                summary,
+            )
             for first, length, summary in nodes
         ]
-        return np.concatenate(found) if found else np.zeros(0, PARTIAL)
+        return np.concatenate(found) if found else np.zeros(0, self._kind)
 
 
 class BlockBundles(Bundles):
@@ -117,7 +127,7 @@ class BlockBundles(Bundles):
         ]
 
     def take(self, records: np.ndarray) -> None:
-        """Take the summaries of blocks, records of `PARTIAL` (m,)."""
+        """Take the summaries of blocks, records of `partial_of` (m,)."""
         take_parts(self._sums, records)
 
 

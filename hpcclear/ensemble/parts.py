@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.base.outcome import Flag, Status
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.statistics.streams.accumulator import Accumulator
-from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF, ROWS, Summary, summarise
+from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF, Summary, rows_of, summarise
 
 if TYPE_CHECKING:
     from hpcclear.ranks.schedule import Points, Worker
@@ -23,25 +23,34 @@ if TYPE_CHECKING:
 PARTS_A_RANK = 32
 """A rank gets at least so many parts while they can be short enough, so that none is busy long after the others."""
 
-_ROWS = len(ROWS)
 
-PARTIAL = np.dtype(
-    [
-        ("sample", np.int64),  # which part
-        ("first", np.int64),  # its first sample
-        ("length", np.int64),  # of the node of the tree; the last part of a design may hold less
-        ("samples", np.int64),
-        ("count", np.int64, (_ROWS,)),
-        ("mean", float, (_ROWS,)),
-        ("squares", float, (_ROWS,)),
-        ("minimum", float, (_ROWS,)),
-        ("maximum", float, (_ROWS,)),
-        ("histogram", np.uint32, (_ROWS, BINS + 2)),
-        ("status", np.int64, (len(Status),)),
-        ("flags", np.int64, (len(Flag),)),
-    ]
-)
-"""One part's summary as a record, for the way from rank to root."""
+def partial_of(record: np.dtype) -> np.dtype:
+    """Type of one part's summary as a record, for the way from rank to root; `record`: of its samples."""
+    rows = len(rows_of(record["mean_gap"].shape[0]))
+    return np.dtype(
+        [
+            ("sample", np.int64),  # which part
+            ("first", np.int64),  # its first sample
+            (
+                "length",
+                np.int64,
+            ),  # of the node of the tree; the last part of a design may hold less
+            ("samples", np.int64),
+            ("count", np.int64, (rows,)),
+            ("mean", float, (rows,)),
+            ("squares", float, (rows,)),
+            ("minimum", float, (rows,)),
+            ("maximum", float, (rows,)),
+            ("histogram", np.uint32, (rows, BINS + 2)),
+            ("status", np.int64, (len(Status),)),
+            ("flags", np.int64, (len(Flag),)),
+        ]
+    )
+
+
+def is_partial(records: np.ndarray) -> bool:
+    """Whether records are summaries of parts, not samples."""
+    return "histogram" in (records.dtype.names or ())
 
 
 LONGEST = 2.0
@@ -60,9 +69,11 @@ def part_length(samples: int, ranks: int, block: int, seconds: float = 0.0) -> i
     return length
 
 
-def packed(part: int, first: int, length: int, samples: int, summary: Summary) -> np.ndarray:
-    """One summary as a record of `PARTIAL`, shape (1,)."""
-    record = np.zeros(1, PARTIAL)
+def packed(
+    kind: np.dtype, part: int, first: int, length: int, samples: int, summary: Summary
+) -> np.ndarray:
+    """One summary as a record of `partial_of`, the `kind`, shape (1,)."""
+    record = np.zeros(1, kind)
     record["sample"], record["first"], record["length"], record["samples"] = (
         part, first, length, samples,
     )  # fmt: skip
@@ -72,14 +83,14 @@ def packed(part: int, first: int, length: int, samples: int, summary: Summary) -
 
 
 def unpacked(record: np.void) -> Summary:
-    """The summary in one record of `PARTIAL`."""
+    """The summary in one record of `partial_of`."""
     row = {field.name: record[field.name] for field in fields(Summary)}
     row["histogram"] = row["histogram"].astype(np.int64)
     return Summary(**row)
 
 
 def take_parts(sums: Accumulator, records: np.ndarray) -> None:
-    """Let an accumulator take summaries, records of `PARTIAL` (m,)."""
+    """Let an accumulator take summaries, records of `partial_of` (m,)."""
     for record in records:
         sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
 
@@ -114,6 +125,8 @@ class Summariser:
         Simulates samples.
     points : Points
         Makes the design's points by sample number.
+    record : dtype
+        Type of the records of samples.
     edges : ndarray, shape (rows, bins + 1)
         Of the histograms.
     on_block : callable, optional
@@ -126,11 +139,13 @@ class Summariser:
         self,
         worker: "Worker",
         points: "Points",
+        record: np.dtype,
         edges: Array,
         on_block: Callable[[int, np.ndarray], object] | None = None,
     ) -> None:
         self._worker, self._points, self._edges = worker, points, edges
         self._on_block = on_block
+        self._record, self._kind = record, partial_of(record)
         self._waiting: list[
             tuple[int, int, int]
         ] = []  # number, first sample and length of parts not begun
@@ -170,14 +185,14 @@ class Summariser:
         while self._waiting and self._worker.pending < BLOCK:
             part, first, length = self._waiting.pop(0)
             samples = self._samples(first, length)
-            records = np.zeros(samples.size, OUTCOME)
+            records = np.zeros(samples.size, self._record)
             records["sample"] = -1
             self._open[part], self._places[part] = records, (first, length)
             self._missing[part] = samples.size
             self._worker.submit(samples, self._points[samples])
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Work for about `seconds`; summaries (`PARTIAL`) of the parts finished meanwhile."""
+        """Work for about `seconds`; summaries (`partial_of`) of the parts finished meanwhile."""
         records = self._worker.advance(seconds)
         done = []
         if records.size:
@@ -190,7 +205,7 @@ class Summariser:
                 if self._missing[part] == 0:
                     done.append(self._finish(part))
             self._begin()
-        return np.concatenate(done) if done else np.zeros(0, PARTIAL)
+        return np.concatenate(done) if done else np.zeros(0, self._kind)
 
     def _finish(self, part: int) -> np.ndarray:
         records = self._open.pop(part)
@@ -198,7 +213,8 @@ class Summariser:
         del self._missing[part]
         if self._on_block is not None:
             self._on_block(first // length, records)
-        return packed(part, first, length, records.size, summarise(records, self._edges, length))
+        summary = summarise(records, self._edges, length)
+        return packed(self._kind, part, first, length, records.size, summary)
 
 
 def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
@@ -206,13 +222,15 @@ def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     there if `payload["raw"]` says where (`hpcclear.ensemble.raw.raw_files`)."""
     from hpcclear.ensemble.raw import raw_files
     from hpcclear.scene import load_scene
-    from hpcclear.scene.sampling import MonteCarloPoints
+    from hpcclear.scene.pages import MonteCarloPoints
+    from hpcclear.scene.record import record_of
 
     worker = payload["make"](payload["samples"], ranks)
     scene = load_scene(payload["design"], trust=True)
     points = MonteCarloPoints(scene, payload["total"])
     files = raw_files(payload["raw"], scene, points)
-    return Summariser(worker, points, payload["edges"], None if files is None else files.write)
+    write = None if files is None else files.write
+    return Summariser(worker, points, record_of(scene), payload["edges"], write)
 
 
 class PartsProgress(Progress):
@@ -231,8 +249,8 @@ class PartsProgress(Progress):
         self._history.append(self._origin)
 
     def add(self, records: np.ndarray) -> None:
-        """Count the samples of finished parts, records of `PARTIAL` (m,), or samples that came on their own."""
-        if records.dtype != PARTIAL:
+        """Count the samples of finished parts, records of `partial_of` (m,), or samples that came on their own."""
+        if not is_partial(records):
             super().add(records)
             return
         self._done += int(records["samples"].sum())

@@ -4,23 +4,23 @@ A place, its lock, what a killed run left there, the key that says whether resul
 them, and at the end the times and the removal of what was unfinished.
 """
 
+from __future__ import annotations
+
 import os
 import re
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import xarray as xr
 
-from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import JOINTS
+from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.schedule import COLUMNS
@@ -37,7 +37,10 @@ from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -214,6 +217,9 @@ class Session:
     ----------
     attributes : dict of str to str
         Of every file of results: what made them, and the key; empty before `describe`.
+    joints : tuple of str
+    record : dtype
+        Labels of the joints, and type of the records of samples.
     """
 
     def __init__(
@@ -229,6 +235,7 @@ class Session:
         self.ranks = ranks
         self.options = options
         self.joints: tuple[str, ...] = JOINTS
+        self.record: np.dtype = OUTCOME
         self.notify = notify
         self.attributes: dict[str, str] = {}
         self._checkpoint: Checkpoint | None = None
@@ -261,12 +268,13 @@ class Session:
         """Whether all these files of the directory are there; another run's are refused."""
         there = [path for name in names if (path := self.place.output / name).exists()]
         for path in there:
-            check_key(dataset.read(path), self.key, path)
+            check_key(dataset.content_in(path), self.key, path)
         return len(there) == len(names)
 
-    def describe(self, scene: Scene) -> None:
-        """Set `attributes`, what made the files of this run, and the labels of its joints."""
-        self.joints = scene.joint_labels
+    def describe(self, scene: Scene, mapped: bool = False) -> None:
+        """Set `attributes`, what made the files of this run, the labels of its joints, and the type of its samples' records
+        (arguments as of `record_of`)."""
+        self.joints, self.record = scene.joint_labels, record_of(scene, mapped)
         self.attributes = {
             **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             **key_attribute(self.key),
@@ -276,7 +284,7 @@ class Session:
         self, names: Sequence[str] = (), units: Mapping[str, str] | None = None
     ) -> Checkpoint:
         """What an earlier run left unfinished; `names` and `units` are those of its design variables."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             self._checkpoint = Checkpoint(
                 self.place.parts,
                 self.key,
@@ -285,6 +293,7 @@ class Session:
                 units=units,
                 attributes=self.attributes,
                 joints=self.joints,
+                record=self.record,
             )
         self.notify_problems()
         return self._checkpoint
@@ -296,9 +305,15 @@ class Session:
             self.notify(problem)
         self._reported = len(problems)
 
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Count the time inside as output of files."""
+        with self.ranks.stage("files"), self.ranks.writing():
+            yield
+
     def write(self, content: xr.Dataset) -> xr.Dataset:
         """Write the result file; returns what was written."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             dataset.write(content, self.place.output)
         return content
 
@@ -320,28 +335,6 @@ class Session:
         spent = sum(self.ranks.stage_seconds.values(), spent)
         seconds = time.perf_counter() - began
         return Finished(content, self.place.output, self.place.timing, seconds, spent)
-
-
-def samples_of(
-    points: Points,
-    records: Records,
-    attributes: Mapping[str, str],
-    objective: Objective = MEAN_GAP,
-    joints: Sequence[str] = JOINTS,
-) -> xr.Dataset:
-    """A dataset of kind ``samples`` of points and what became of them, a record each."""
-    drawn = {"sampling": points.sampling} if points.sampling else {}
-    return dataset.samples_dataset(
-        points.names,
-        points.values,
-        dict(zip(points.names, points.units, strict=True)),
-        records,
-        {**attributes, **drawn},
-        objective,
-        points.words,
-        joints,
-        points.labels,
-    )
 
 
 def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.Dataset:

@@ -12,28 +12,31 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
-from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
+from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
 from hpcclear.ensemble.bundles import BlockBundles, Bundles, bundle_length, make_simulator
 from hpcclear.ensemble.identity import statistics_key
 from hpcclear.ensemble.parts import (
-    PARTIAL,
     Parts,
     PartsProgress,
+    is_partial,
     make_summariser,
     part_length,
+    partial_of,
     take_parts,
 )
 from hpcclear.ensemble.raw import NAMES, RawFiles, raw_files
+from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
+from hpcclear.ensemble.simulate import make_evaluator, payload_of
+from hpcclear.ranks import leading
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, Points
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks.schedule import COLUMNS, Points, Task
+from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
-from hpcclear.statistics.streams.summary import BLOCK, ROWS, Summary
+from hpcclear.statistics.streams.summary import BLOCK, QUANTITIES, Summary, rows_of
 
 STAGE = "statistics"
 
@@ -167,6 +170,7 @@ class _Streaming:
         self._points = points
         self._session = session
         self._raw = None
+        self._partial = partial_of(session.record)
         self._checkpoint = session.opened()
         if raw is not None:
             self._raw = {
@@ -192,7 +196,8 @@ class _Streaming:
         self._saved = time.monotonic()
 
     def _new_sums(self) -> Accumulator:
-        return Accumulator(len(self._points), on_block=self._files.write if self._files else None)
+        write = self._files.write if self._files else None
+        return Accumulator(len(self._points), self._session.record, on_block=write)
 
     def _whole_blocks(self) -> Iterator[int]:
         """Numbers of the blocks of which all samples are summed up."""
@@ -230,7 +235,7 @@ class _Streaming:
         if self._leaders:
             self._run_bundles(seconds, by_block=self._raw is not None and length == BLOCK)
         elif self._raw is None or (length == BLOCK and mail.node_size == mail.size):
-            self._run_sums(Task(STAGE, make_summariser, self._summing(), PARTIAL), length)
+            self._run_sums(Task(STAGE, make_summariser, self._summing(), self._partial), length)
         else:
             self._run_samples(self._sums.remaining())
 
@@ -252,8 +257,14 @@ class _Streaming:
     def _run(
         self, task: Task, points: Points, take: Callable[[np.ndarray], None], progress: Progress
     ) -> None:
-        self._session.ranks.run_points(
-            task, points, on_records=take, save=self._save_when_due, progress=progress, keep=False
+        leading.run_points(
+            self._session.ranks,
+            task,
+            points,
+            on_records=take,
+            save=self._save_when_due,
+            progress=progress,
+            keep=False,
         )
 
     def _run_samples(self, left: Remaining) -> float:
@@ -263,12 +274,12 @@ class _Streaming:
             return 0.0
 
         def take(records: np.ndarray) -> None:
-            numbered = records.astype(OUTCOME)
+            numbered = records.copy()
             numbered["sample"] = left.samples(records["sample"])
             self._sums.add(numbered)
 
         progress = Progress("samples", self._session.options.style)
-        task = Task(STAGE, make_evaluator, self._payload)
+        task = Task(STAGE, make_evaluator, self._payload, self._session.record)
         self._run(task, _Left(self._points, left), take, progress)
         busy = self._session.ranks.stage_seconds[STAGE][:, COLUMNS.index("busy")].sum()
         return float(busy) / len(left)
@@ -282,7 +293,7 @@ class _Streaming:
         self._sums.forget_parts(block)
         payload = self._summing() | {"block": block}
         make, share = (make_summariser, BlockBundles) if by_block else (make_simulator, Bundles)
-        self._run_sums(Task(STAGE, make, payload, PARTIAL, share=share), length)
+        self._run_sums(Task(STAGE, make, payload, self._partial, share=share), length)
 
     def _summing(self) -> dict[str, Any]:
         """What those who sum up need to know."""
@@ -303,10 +314,10 @@ class _Streaming:
 
     def _add_sums(self, records: np.ndarray) -> None:
         """Take summaries, or samples that a stop left without."""
-        if records.dtype != PARTIAL:
+        if is_partial(records):
+            take_parts(self._sums, records)
+        else:
             self._sums.add(records)
-            return
-        take_parts(self._sums, records)
 
 
 def statistics_dataset(
@@ -329,15 +340,15 @@ def statistics_dataset(
         "samples_by_status": summary.status,
         "samples_by_flag": summary.flags,
     }
-    for name in dict(ROWS):
+    for name in QUANTITIES:
         data |= _of_quantity(name, summary, edges, len(joints))
     return dataset.dataset("statistics", coords, data, attributes, objective=objective)
 
 
 def _of_quantity(name: str, summary: Summary, edges: Array, joints: int) -> dict[str, np.ndarray]:
     """Variables of one quantity; scalars lose the axis of joints."""
-    rows = [k for k, (quantity, _) in enumerate(ROWS) if quantity == name]
-    chosen = rows[:joints] if len(rows) > 1 else rows[0]
+    rows = [k for k, (quantity, _) in enumerate(rows_of(joints)) if quantity == name]
+    chosen = rows if FIELDS[name].per else rows[0]
     known = summary.count > 0
     return {
         f"{name}_count": summary.count[chosen],

@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hpcclear.base.cores import among_ranks
@@ -57,52 +57,90 @@ def run_on_ranks(
     *,
     resumes: bool = True,
 ) -> int:
-    """Run `program` on root while the other ranks work for it: the boundary no error crosses.
+    """Run `program` on root while the other ranks work for it: the `boundary` no error crosses.
 
     Parameters
     ----------
     program : callable
         Gets the `Ranks`; its return value is the exit code (None is 0).
+    stop, ahead, resumes
+        As `boundary`.
+
+    Returns
+    -------
+    int
+        Exit code for `sys.exit`, the same on every rank.
+    """
+    try:
+        with boundary(stop, ahead, resumes=resumes) as ranks:
+            sys.exit(program(ranks))
+    except SystemExit as error:
+        return int(error.code or Exit.DONE)
+    return Exit.DONE
+
+
+@contextlib.contextmanager
+def boundary(
+    stop: StopSwitch | None = None, ahead: Sequence[str] = (), *, resumes: bool = True
+) -> Iterator[Ranks]:
+    """A block in which root has all ranks, and which no error leaves; the others work for it and do not come in.
+
+    Parameters
+    ----------
     stop : StopSwitch, optional
         Entered already, to hear signals from early on; by default one without a time limit.
     ahead : sequence of str
         Modules that the other ranks load while root reads what is to be done.
     resumes : bool
-        The same program goes on from what this one saved when it was stopped early.
+        The same block goes on from what this one saved when it was stopped early.
 
-    Returns
-    -------
-    int
-        Exit code for `sys.exit`, the same on every rank: 0, or the program's own; 1 after a program
-        error, a refused write or want of memory, reported once; 2 after an `InputError`; 3 after `Stopped`.
+    Raises
+    ------
+    SystemExit
+        On all other ranks instead of the block, and on root unless all went well. The exit code is the same on every rank:
+        0, or that of a `sys.exit` in the block; 1 after a program error, a refused write or want of memory, reported once;
+        2 after an `InputError`; 3 after `Stopped`.
     """
     launcher.pin_threads()
     with contextlib.ExitStack() as stack:
         stop = stack.enter_context(StopSwitch()) if stop is None else stop
         stop.outlook = RESUMES if resumes else ANEW
-        try:
-            check_address_space(launcher.launched_size()[1] > 1)
-            mail = _open_mail()
-        except LimitError as error:  # MPI might end the process with a code of its own
-            launcher.end_job(f"Error: {error}", Exit.FAILED)
-            return Exit.FAILED
-        except InputError as error:
-            if launcher.launched_rank() in (0, None):  # every copy finds the same
-                _say(f"Error: {error}")
-            return Exit.BAD_INPUT
-        stop.last_resort = mail.abort
-        refused = _refused(mail)
-        if refused:
-            return refused
-        ranks = Ranks(mail, stop)
+        ranks = Ranks(_joined(stop), stop)
         if ranks.size > 1:
             among_ranks()
         with _watch(ranks):
-            code = _as_root(ranks, program) if ranks.rank == 0 else _as_worker(ranks, ahead)
+            if ranks.is_root:
+                ended: BaseException | None = None
+                try:
+                    yield ranks
+                except BaseException as error:  # noqa: BLE001 - the rank boundary
+                    ended = error
+                code = _ended(ranks, ended)
+            else:
+                code = _as_worker(ranks, ahead)
         if ranks.size > 1:
             stop.leave_within(LAST_WAIT, code)  # for others that died on their way out
-        mail.finalize()
-        return code
+        ranks.mail.finalize()
+        if code or not ranks.is_root:
+            sys.exit(code)
+
+
+def _joined(stop: StopSwitch) -> Mail:
+    """The mailbox of this rank, all ranks being there; SystemExit where they cannot begin, which is said once."""
+    try:
+        check_address_space(launcher.launched_size()[1] > 1)
+        mail = _open_mail()
+    except LimitError as error:  # MPI might end the process with a code of its own
+        launcher.end_job(f"Error: {error}", Exit.FAILED)
+        sys.exit(Exit.FAILED)
+    except InputError as error:
+        if launcher.launched_rank() in (0, None):  # every copy finds the same
+            _say(f"Error: {error}")
+        sys.exit(Exit.BAD_INPUT)
+    stop.last_resort = mail.abort
+    if refused := _refused(mail):
+        sys.exit(refused)
+    return mail
 
 
 def _watch(ranks: Ranks) -> Watch:
@@ -246,30 +284,32 @@ def _after_mpi() -> Mail:
     return Mail()
 
 
-def _as_root(ranks: Ranks, program: Callable[[Ranks], int | None]) -> int:
-    """Run the program, say how it ended, and send the others home with the same exit code."""
+def _ended(ranks: Ranks, error: BaseException | None) -> int:
+    """Say how root's block ended, and send the others home with the same exit code."""
+    code: int = Exit.DONE
     text = note = ""
-    try:
-        code = program(ranks) or Exit.DONE
-    except Stopped as error:
-        code, text = Exit.STOPPED, f"Stopped early: {error}. {ranks.stop_switch.outlook}."
-    except InputError as error:
-        code, text = Exit.BAD_INPUT, f"Error: {error}"
-    except StorageError as error:
-        code, text = Exit.FAILED, f"Error: {error}"
-    except RankFailed as error:
-        code, note = error.code, str(error)
-    except SystemExit as error:
-        code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
-    except BaseException as error:  # noqa: BLE001 - the rank boundary
-        user_error = isinstance(mendable(error), InputError)
-        code = Exit.BAD_INPUT if user_error else Exit.FAILED
-        text = _report(ranks, error)
+    match error:
+        case None:
+            pass
+        case Stopped():
+            code, text = Exit.STOPPED, f"Stopped early: {error}. {ranks.stop_switch.outlook}."
+        case InputError():
+            code, text = Exit.BAD_INPUT, f"Error: {error}"
+        case StorageError():
+            code, text = Exit.FAILED, f"Error: {error}"
+        case RankFailed():
+            code, note = error.code, str(error)
+        case SystemExit():
+            code = error.code if isinstance(error.code, int) else Exit(error.code is not None)
+        case _:
+            user_error = isinstance(mendable(error), InputError)
+            code = Exit.BAD_INPUT if user_error else Exit.FAILED
+            text = _report(ranks, error)
     if text or note:
         ranks.stop_switch.reported = True
     if text:
         _say(text)
-    return _dismiss(ranks, int(code), note)
+    return _dismiss(ranks, code, note)
 
 
 def _dismiss(ranks: Ranks, code: int, note: str = "") -> int:

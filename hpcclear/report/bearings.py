@@ -6,12 +6,12 @@ from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
+from hpcclear.results.content import Results
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.mechanism import length_path
 
@@ -72,14 +72,15 @@ class Torque(NamedTuple):
     """Work of the drive over the angle that it turned; NaN where there are several drives, or one that swings."""
 
 
-def bearings(response: xr.Dataset) -> list[Bearing]:
+def bearings(response: Results) -> list[Bearing]:
     """Return the loads of each joint with clearance of a response (kind ``response``), in its order."""
     inside = averaged(response)
     angles = response["crank_angle"].to_numpy()[inside]
     areas = _projected_areas(response)
     found = []
     for k, joint in enumerate(map(str, response["joint"].to_numpy())):
-        if float(response["mean_gap"][k]) == float(response["peak_contact_force"][k]) == 0.0:
+        peak, gap = (_known(response, name, k) for name in ("peak_contact_force", "mean_gap"))
+        if gap == peak == 0.0:
             continue  # an ideal joint of a slider-crank
         force = response["contact_force"].to_numpy()[inside, k]
         at = int(force.argmax()) if len(force) else 0
@@ -87,7 +88,7 @@ def bearings(response: xr.Dataset) -> list[Bearing]:
         found.append(
             Bearing(
                 joint,
-                float(response["peak_contact_force"][k]),
+                peak,
                 float(force[at]) if len(force) else np.nan,
                 float(angles[at] % (2.0 * np.pi)) if len(force) else np.nan,
                 mean,
@@ -95,13 +96,13 @@ def bearings(response: xr.Dataset) -> list[Bearing]:
                 _known(response, "peak_contact_pressure", k),
                 _known(response, "contact_half_angle", k),
                 touching,
-                float(response["mean_gap"][k]),
+                gap,
             )
         )
     return found
 
 
-def torque(response: xr.Dataset) -> Torque:
+def torque(response: Results) -> Torque:
     """Return the torque of the drive; NaN if no averaged revolution is stored."""
     inside = averaged(response)
     if not inside.any():
@@ -126,7 +127,7 @@ def torque_words(drive: Torque) -> str:
     return f"{largest}, mean {labels.quantity(drive.mean, 'N m')}" if known else largest
 
 
-def _means(response: xr.Dataset, k: int, inside: Booleans) -> tuple[float, float]:
+def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
     """Time mean of the contact force of joint k, N, and its share of contact.
 
     Of the integrals that every step adds to; where the response has none, of the stored instants.
@@ -138,8 +139,8 @@ def _means(response: xr.Dataset, k: int, inside: Booleans) -> tuple[float, float
         period, cycle = (
             float(np.ptp(one)) / response.sizes["revolution"] for one in (time, turned)
         )
-        flown = float(response["contact_loss"][k]) / cycle
-        return float(response["contact_impulse"][k]) / period, min(max(1.0 - flown, 0.0), 1.0)
+        flown = _known(response, "contact_loss", k) / cycle
+        return _known(response, "contact_impulse", k) / period, min(max(1.0 - flown, 0.0), 1.0)
     weight = _weights(response["time"].to_numpy()[inside])
     if not len(weight):
         return np.nan, np.nan
@@ -147,7 +148,7 @@ def _means(response: xr.Dataset, k: int, inside: Booleans) -> tuple[float, float
     return float(weight @ response["contact_force"].to_numpy()[inside, k]), float(weight @ touching)
 
 
-def _one_drive(response: xr.Dataset) -> bool:
+def _one_drive(response: Results) -> bool:
     """Whether all work is that of a single drive; a slider-crank has no other."""
     return "drive_phase" not in response or _drives_in(str(response.attrs.get("scene"))) == 1
 
@@ -160,13 +161,14 @@ def _drives_in(text: str) -> int:
         return 0  # of another version
 
 
-def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
+def remarks(response: Results) -> list[tuple[str, str]]:
     """Return every remark on a response as terminal and page print it: "Warning" or "Note", and its text."""
     found = []
     f, half_width = float(response["objective"]), float(response["objective_uncertainty"])
     if "regime" not in response and half_width > SENSITIVE * abs(f) > 0.0:
         found.append(("Warning", sensitive_words(half_width / abs(f), response)))
     found += [("Warning", text) for text in _gaining(response)]
+    found += [("Warning", text) for text in str(response.attrs.get("cautions", "")).splitlines()]
     flags = int(response["flags"])
     warnings = flag_remarks(flags & sum(WARNED))
     notes = flag_remarks(flags & int(Flag.STIFF))
@@ -175,7 +177,7 @@ def remarks(response: xr.Dataset) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-def _gaining(response: xr.Dataset) -> list[str]:
+def _gaining(response: Results) -> list[str]:
     """A sentence for each joint whose impacts gain energy, beyond the half-width of what they lose."""
     if "impact_energy" not in response:
         return []
@@ -188,7 +190,7 @@ def _gaining(response: xr.Dataset) -> list[str]:
     ]
 
 
-def validity(response: xr.Dataset) -> str:
+def validity(response: Results) -> str:
     """Return in plain words whether the model is valid for a response."""
     status, flags = Status(int(response["status"])), int(response["flags"])
     if not status.valid:
@@ -235,12 +237,12 @@ def degrees(one: Bearing) -> str:
     return f"{np.degrees(one.angle):.0f} deg" if known else "–"
 
 
-def sensitive_words(relative: float, content: xr.Dataset) -> str:
+def sensitive_words(relative: float, content: Results) -> str:
     """Return the warning of a half-width of f that is so large, relative to f, of a response or samples."""
     return _SENSITIVE_WORDS.format(relative, remedy(content))
 
 
-def remedy(content: xr.Dataset) -> str:
+def remedy(content: Results) -> str:
     """Return what makes the objective of a response or samples surer; only the mean gap has steady means."""
     if "objective" in content.attrs:  # as files have of other objectives only
         return "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
@@ -252,7 +254,7 @@ def flag_remarks(flags: int) -> list[str]:
     return [text for flag, text in REMARKS.items() if flags & flag]
 
 
-def averaged(response: xr.Dataset) -> Booleans:
+def averaged(response: Results) -> Booleans:
     """Return which instants (time,) lie in the averaged revolutions; all where the file does not say."""
     turned = motion.turns(response)
     first = int(response.attrs.get("transient_turns", 0))
@@ -260,9 +262,9 @@ def averaged(response: xr.Dataset) -> Booleans:
     return inside
 
 
-def _known(response: xr.Dataset, name: str, k: int) -> float:
+def _known(response: Results, name: str, k: int) -> float:
     """A number of joint k; NaN where the response has none."""
-    return float(response[name][k]) if name in response else np.nan
+    return float(response[name].to_numpy()[k]) if name in response else np.nan
 
 
 def _weights(time: Array) -> Array:
@@ -274,7 +276,7 @@ def _weights(time: Array) -> Array:
     return weights / weights.sum()
 
 
-def _projected_areas(response: xr.Dataset) -> dict[str, float]:
+def _projected_areas(response: Results) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
     try:
         return _areas_in(str(response.attrs["scene"]))

@@ -1,10 +1,10 @@
 """Impact and noise in one response, in words: what a revolution has of impacts in each joint, and how loud its forces are."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
+from hpcclear.results.content import Results
 
 HEADER = ("joint", "impacts", "energy lost", "in flight", "RMS force")
 """Columns of the rows of `joints`."""
@@ -15,28 +15,31 @@ LOUDEST = 3
 """Third-octave bands that are named, the loudest first."""
 
 
-def joints(response: xr.Dataset) -> list[list[str]]:
+def joints(response: Results) -> list[list[str]]:
     """Return a row of `HEADER` for each joint with clearance; none where the response has no measures of impact."""
     if "impact_energy" not in response:
         return []
     names = [str(name) for name in response["joint"].to_numpy()]
     found = []
     for joint in (one.joint for one in bearings.bearings(response)):
-        at = response.isel(joint=names.index(joint))
-        flown = np.degrees([float(at["contact_loss"]), float(at["contact_loss_limit"])])
+        at = names.index(joint)
+        flown, reach = (
+            float(np.degrees(response[name].to_numpy()[at]))
+            for name in ("contact_loss", "contact_loss_limit")
+        )
         found.append(
             [
                 joint,
-                _mean(at, "impacts"),
-                _mean(at, "impact_energy"),
-                _with(flown[0], flown[1], "deg"),
-                _mean(at, "rms_contact_force"),
+                _mean(response, "impacts", at),
+                _mean(response, "impact_energy", at),
+                _with(flown, reach, "deg"),
+                _mean(response, "rms_contact_force", at),
             ]
         )
     return found
 
 
-def frame(response: xr.Dataset) -> list[tuple[str, str]]:
+def frame(response: Results) -> list[tuple[str, str]]:
     """Return what the force on the frame is, and its loudest third octaves, each with its name."""
     if "rms_frame_force" not in response:
         return []
@@ -62,8 +65,8 @@ def band_name(centre: float) -> str:
     return f"{value / 1e3:g} kHz" if value >= 1e3 else f"{value:g} Hz"
 
 
-def _mean(response: xr.Dataset, name: str) -> str:
-    value, reach = float(response[name]), float(response[f"{name}_limit"])
+def _mean(response: Results, name: str, at: int | tuple[()] = ()) -> str:
+    value, reach = (float(response[one].to_numpy()[at]) for one in (name, f"{name}_limit"))
     return _with(value, reach, str(response[name].attrs["units"]))
 
 

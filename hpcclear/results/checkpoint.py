@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import JOINTS, OUTCOME
+from hpcclear.base.outcome import JOINTS, OUTCOME, recast
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
+from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.keys import check_key, key_attribute
 from hpcclear.results.names import designs_in
 
@@ -29,7 +29,7 @@ INTERVAL = 5.0
 """Seconds between two part files: what a kill costs at most."""
 
 _FANOUT = 8
-_KEPT = 50_000  # samples of a part that stay in memory, too: 20 MB; more are read from its file when they are asked for
+_KEPT = 50_000  # samples of a part that stay in memory, too: some MB; more are read from its file when they are asked for
 _PART = re.compile(r"part-(\d{2})-(\d{6,12})\.nc")
 _STAGE = re.compile(r"stage-([A-Za-z0-9_-]+)\.nc")
 _DONE = "done.nc"  # all that follows from the other files is written, and they are being removed
@@ -97,6 +97,8 @@ class Checkpoint:
         Global attributes of the part files (`hpcclear.results.dataset.provenance`).
     joints : sequence of str
         Labels of the joints of the records.
+    record : dtype
+        Their type (`hpcclear.scene.record.record_of`).
     clock : callable
         Seconds since any instant.
 
@@ -123,6 +125,7 @@ class Checkpoint:
         units: Mapping[str, str] | None = None,
         attributes: Mapping[str, object] | None = None,
         joints: Sequence[str] = JOINTS,
+        record: np.dtype = OUTCOME,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.directory = directory
@@ -130,7 +133,7 @@ class Checkpoint:
         self.interval = interval
         self.names = tuple(names)
         self.units = dict(units or {})
-        self.joints = tuple(joints)
+        self.joints, self.record = tuple(joints), record
         self.attributes = {**(attributes or {}), **key_attribute(key)}
         self._watch = Stopwatch()
         self.problems: list[str] = []
@@ -151,14 +154,14 @@ class Checkpoint:
     def add(self, records: np.ndarray, values: ArrayLike | None = None) -> None:
         """Take finished samples into memory; the flushes write them.
 
-        `records` are of `hpcclear.base.outcome.OUTCOME`, shape (n,); `values`, shape (n, k), their
-        designs, a column for each of `names`.
+        `records`, shape (n,), may be of a variant of the scene that requests less than the checkpoint keeps; `values`,
+        shape (n, k), are their designs, a column for each of `names`.
         """
         columns = np.empty((len(records), 0)) if values is None else np.asarray(values, float)
         if columns.shape != (len(records), len(self.names)):
             raise ValueError(f"designs have shape {columns.shape}, names are {self.names}")
         if len(records):
-            self._buffer.append((records.astype(OUTCOME), columns.copy()))
+            self._buffer.append((recast(records, self.record).copy(), columns.copy()))
 
     def flush_when_due(self) -> None:
         """Write what has gathered when the interval is over; raises as `flush`."""
@@ -195,6 +198,8 @@ class Checkpoint:
         records, values = (
             [piece[k][inside] for piece, inside in zip(pieces, rows, strict=True)] for k in (0, 1)
         )
+        if not records:
+            return np.empty(0, self.record), np.empty((0, 0))
         return _join(records, values)
 
     def _write_part(self, level: int, records: np.ndarray, values: np.ndarray) -> None:
@@ -219,9 +224,9 @@ class Checkpoint:
         if part.held is not None:
             return part.held
         content = dataset.read(part.path, "samples")
-        return dataset.records(content), self._designs(content)
+        return recast(dataset.records(content), self.record), self._designs(content)
 
-    def _designs(self, content: xr.Dataset) -> np.ndarray:
+    def _designs(self, content: Results) -> np.ndarray:
         """Designs (n, k) of a part, a column for each name."""
         designs = designs_in(content)
         columns = [designs[name] for name in self.names]
@@ -256,7 +261,7 @@ class Checkpoint:
         """
         with self._watch.running():
             variables = {key: _stage_variable(key, values) for key, values in data.items()}
-            content = xr.Dataset(variables, attrs={**self.attributes, "stage": name})
+            content = Content(variables, {**self.attributes, "stage": name})
             netcdf.save(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
@@ -277,10 +282,9 @@ class Checkpoint:
                 self.problems.append(f"{path.name} is done again: {error.reason}")
                 return None
             check_key(content, self.key, path)
-            found = {str(key): content[key] for key in content.data_vars}
             return {
-                key: values.to_numpy().astype(bool if "truth" in values.attrs else values.dtype)
-                for key, values in found.items()
+                key: one.values.astype(bool) if "truth" in one.attrs else one.values
+                for key, one in content.variables.items()
             }
 
     def _stage_path(self, name: str) -> Path:
@@ -294,7 +298,7 @@ class Checkpoint:
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
         with self._watch.running():
-            netcdf.save(xr.Dataset(attrs=self.attributes), self.directory / _DONE)
+            netcdf.save(Content({}, self.attributes), self.directory / _DONE)
             discard(self.directory)
             self._parts.clear()
             self._buffer.clear()
@@ -303,7 +307,8 @@ class Checkpoint:
         """Read the parts that are there; the number of the next one."""
         if (self.directory / _DONE).exists():
             discard(self.directory)
-        xr.Dataset(coords={"sample": [0]})  # what xarray loads late is loaded before samples wait
+        # what xarray loads late is loaded before samples wait
+        Content({"sample": Variable(("sample",), np.zeros(1))}).to_xarray()
         self.directory.mkdir(exist_ok=True)
         if self.directory.is_symlink():  # results are written where the user said, nowhere else
             reason = "it is a symbolic link"
@@ -329,7 +334,8 @@ class Checkpoint:
         if set(designs_in(content)) != set(self.names):
             self.problems.append(f"samples of {path.name} are done again: other design variables")
             return
-        self._keep(level, path, dataset.records(content), self._designs(content))
+        records = recast(dataset.records(content), self.record)
+        self._keep(level, path, records, self._designs(content))
 
     @contextmanager
     def _refusing(self) -> Iterator[None]:
@@ -343,23 +349,19 @@ def _join(
     records: Sequence[np.ndarray], values: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """One array of each, by growing sample number, each sample once."""
-    if not records:
-        return np.empty(0, OUTCOME), np.empty((0, 0))
     joined, designs = (
         one[0] if len(one) == 1 else np.concatenate(one) for one in (records, values)
     )
     numbers = joined["sample"]
-    if (
-        numbers[1:] > numbers[:-1]
-    ).all():  # as a rule; a record has two kilobytes, and copies count
+    if (numbers[1:] > numbers[:-1]).all():  # as a rule; copies count
         return joined, designs
     first = np.unique(numbers, return_index=True)[1]
     return joined[first], designs[first]
 
 
-def _stage_variable(name: str, values: ArrayLike) -> xr.Variable:
+def _stage_variable(name: str, values: ArrayLike) -> Variable:
     array = np.asarray(values)
     dims = tuple(f"{name}_{axis}" for axis in range(array.ndim))
     if array.dtype.kind == "b":  # NetCDF knows no truth values
-        return xr.Variable(dims, array.astype(np.int8), {"truth": "0 false, 1 true"})
-    return xr.Variable(dims, array)
+        return Variable(dims, array.astype(np.int8), {"truth": "0 false, 1 true"})
+    return Variable(dims, array)

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.results import netcdf
+from hpcclear.results.content import Content, Variable
 
 NAME = "samples.nc"
 """What it is called, in the directory of the others."""
@@ -49,22 +49,24 @@ def write(folder: Path, names: Sequence[str]) -> None:
         The disk refuses.
     """
     pieces: dict[str, list[tuple[int, str, tuple[int, ...]]]] = {}
-    known: dict[str, xr.Variable] = {}
+    known: dict[str, Variable] = {}
     ends: dict[str, tuple[int, ...]] = {}  # shapes beyond the samples
     attributes: dict[str, object] = {}
     total = 0
     for name in names:
         keys, samples = _variables(folder / name)
         if not keys <= set(known):
-            content = netcdf.load(folder / name).isel(sample=slice(1))  # what it is called and is
-            known |= {str(key): found for key, found in content.variables.items()}
-            ends = {k: v.shape[1:] for k, v in known.items() if v.dims[:1] == ("sample",)}
-            attributes = dict(content.attrs)
+            content = netcdf.load(folder / name)
+            of_samples = {k: v for k, v in content.variables.items() if v.dims[:1] == ("sample",)}
+            known |= content.variables
+            known |= {k: Variable(v.dims, v.values[:1], v.attrs) for k, v in of_samples.items()}
+            ends |= {k: v.values.shape[1:] for k, v in of_samples.items()}
+            attributes = content.attrs
         for key in keys & set(ends):
             pieces.setdefault(key, []).append((total, name, (samples, *ends[key])))
         total += samples
     elsewhere = {key: netcdf.Elsewhere((total, *ends[key]), rows) for key, rows in pieces.items()}
-    netcdf.save(xr.Dataset(known, attrs=attributes), folder / NAME, elsewhere)
+    netcdf.save(Content(known, attributes), folder / NAME, elsewhere)
 
 
 def _variables(path: Path) -> tuple[set[str], int]:

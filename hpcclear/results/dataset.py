@@ -1,16 +1,19 @@
-"""Result files as xarray datasets: built from plain arrays and records, written whole, checked.
+"""Result files: built from plain arrays and records, written whole, checked; read as datasets of xarray.
 
 The names, dimensions and units come from `hpcclear.results.names`; how bytes reach the disk is in
 `hpcclear.results.netcdf` and `hpcclear.results.files`.
 """
 
+from __future__ import annotations
+
+import functools
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, ParamSpec
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
@@ -20,13 +23,14 @@ from hpcclear.base.outcome import (
     JOINTS,
     JUDGED,
     MAPPED,
-    MAX_JOINTS,
     ON_REQUEST,
-    OUTCOME,
     STEADY,
     WAVE_ROWS,
+    record_type,
+    unknown,
 )
 from hpcclear.results import netcdf
+from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.faults import fault_of
 from hpcclear.results.names import (
     DESIGN_VARIABLES,
@@ -40,7 +44,12 @@ from hpcclear.results.names import (
     Kind,
 )
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 CONVENTIONS = "CF-1.11"
+
+P = ParamSpec("P")
 
 
 # -----------------------------------------------------------------------------------------------
@@ -51,7 +60,7 @@ NOT_CHECKED = "not checked: no replicas were simulated"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 
-def dataset(
+def filled(
     kind: str,
     coords: Mapping[str, ArrayLike],
     data: Mapping[str, ArrayLike],
@@ -61,8 +70,8 @@ def dataset(
     words: Mapping[str, str] | None = None,
     *,
     whole: bool = True,
-) -> xr.Dataset:
-    """A dataset of one kind of result file, with every attribute the table knows.
+) -> Content:
+    """The content of one kind of result file, with every attribute the table knows.
 
     Parameters
     ----------
@@ -87,7 +96,7 @@ def dataset(
 
     Returns
     -------
-    xarray.Dataset
+    Content
 
     Raises
     ------
@@ -118,10 +127,23 @@ def dataset(
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
     if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
-    return xr.Dataset(variables, attrs={**fixed, **(attributes or {})})
+    return Content(variables, {**fixed, **(attributes or {})})
 
 
-def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> xr.Variable:
+def _of_xarray(build: Callable[P, Content]) -> Callable[P, xr.Dataset]:
+    """Have a function return what it builds as a dataset of xarray."""
+
+    @functools.wraps(build)
+    def made(*parts: P.args, **more: P.kwargs) -> xr.Dataset:
+        return build(*parts, **more).to_xarray()
+
+    return made
+
+
+dataset = _of_xarray(filled)
+
+
+def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> Variable:
     array = np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
     if array.shape != expected:
@@ -137,7 +159,7 @@ def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int
     attributes: dict[str, object] = {"long_name": row.long_name}
     if row.units:
         attributes["units"] = row.units
-    return xr.Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
+    return Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
 
 
 def _design_row(
@@ -201,8 +223,8 @@ def samples_dataset(
         Designs, a row for each record, in SI units.
     units : mapping of str to str
         Units of the design variables that are not the paper's.
-    records : array of `hpcclear.base.outcome.OUTCOME`, shape (n,)
-        In any order, each sample once.
+    records : structured array, shape (n,)
+        Of a `hpcclear.base.outcome.record_type`, in any order, each sample once.
     attributes : mapping, optional
         Further global attributes.
     objective : Objective
@@ -210,7 +232,7 @@ def samples_dataset(
     words : mapping of str to str, optional
         Long names of the design variables.
     joints : sequence of str
-        Labels of the scene's joints with clearance: as many places of the records are kept.
+        Labels of the joints of the records.
     labels : sequence of str, length n
         Names of the designs, where they have some.
 
@@ -238,13 +260,15 @@ def samples_dataset(
     if len(data) != len(names):
         raise ValueError(f"two of the names {list(names)} are the same in a file")
     data = {name: values[:, i] for i, name in enumerate(names)}
-    asked = {n for n in (*ON_REQUEST, *STEADY, *MAPPED) if np.isfinite(records[n]).any()}
+    fields = records.dtype.names or ()
+    optional = {*ON_REQUEST, *STEADY, *MAPPED} & {*fields}
+    asked = {name for name in optional if np.isfinite(records[name]).any()}
     if records["regime"].any():  # no period anywhere is an answer as well
         asked |= {*STEADY, "regime"}
     left_out = {"sample", "band", *({*ON_REQUEST, *JUDGED} - asked)}
-    kept = [name for name in OUTCOME.names or () if name not in left_out]
+    kept = [name for name in fields if name not in left_out]
     bands = _bands_of(records)
-    data |= {name: _there(name, records[name], joints, len(bands)) for name in kept}
+    data |= {name: records[name] for name in kept}
     if len(labels):
         data["label"] = np.array(labels, dtype=str)[order]
     coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
@@ -264,55 +288,36 @@ def _checked(data: Mapping[str, ArrayLike]) -> dict[str, str]:
     return {"objective_half_width": NOT_CHECKED}
 
 
-def at_joints(values: np.ndarray, joints: Sized) -> np.ndarray:
-    """Values of records at the joints there are, shape (n, joints); of a quantity without joints as they are."""
-    of_joints = values.ndim > 1 and values.shape[1] == MAX_JOINTS
-    return values[:, : len(joints)] if of_joints else values
-
-
 def _bands_of(records: np.ndarray) -> np.ndarray:
     """Middles of the bands that records have levels of, Hz, shape (bands,)."""
+    if "band" not in (records.dtype.names or ()):
+        return np.zeros(0)
     known = records["band"][np.isfinite(records["band"]).any(axis=1)]
     return known[0][np.isfinite(known[0])] if len(known) else np.zeros(0)
 
 
-def _there(name: str, values: np.ndarray, joints: Sized, bands: int) -> np.ndarray:
-    """A field of records at the joints and bands there are, a view."""
-    per = FIELDS[name].per.split()
-    values = values[:, : len(joints)] if "joint" in per else values
-    return values[..., :bands] if "band" in per else values
-
-
-def records(samples: xr.Dataset) -> np.ndarray:
-    """The outcome records in a dataset of kind ``samples``, shape (n,) of `OUTCOME`."""
-    found = np.zeros(samples.sizes["sample"], OUTCOME)
-    for name in OUTCOME.names or ():
-        absent = name in (*ON_REQUEST, *JUDGED) and name not in samples
-        nothing = np.nan if OUTCOME[name].base.kind == "f" else 0
-        if absent:
-            found[name] = nothing
-        else:
-            values = samples[name].to_numpy()
-            if values.ndim == 2:  # places that no joint has are as in a fresh record
-                failed = np.isnan(values).all(axis=1) if values.dtype.kind == "f" else False
-                found[name] = np.where(failed, nothing, 0)[..., None]
-            if "band" in FIELDS[name].per:
-                found[name] = nothing
-            bands = samples.sizes.get("band", 0)
-            _there(name, found[name], samples["joint"].to_numpy(), bands)[...] = values
-    heard = np.isfinite(found["contact_force_level"]).any(axis=(1, 2))
-    found["band"][~heard] = np.nan  # of failed samples
+def records(samples: Results) -> np.ndarray:
+    """The outcome records in results of kind ``samples``, shape (n,), with the fields that it has."""
+    asked = {FIELDS[str(name)].when for name in samples.variables if name in FIELDS}
+    kind = record_type(samples.sizes["joint"], samples.sizes.get("band", 0), asked)
+    found = unknown(samples.sizes["sample"], kind)
+    for name in kind.names or ():
+        if name in samples:
+            found[name] = samples[name].to_numpy()
+    if "band" in samples:
+        heard = np.isfinite(found["contact_force_level"]).any(axis=(1, 2))
+        found["band"][~heard] = np.nan  # of failed samples
     return found
 
 
-def response_dataset(
+def response_content(
     time: ArrayLike,
     data: Mapping[str, ArrayLike],
     attributes: Mapping[str, object] | None = None,
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
     linkage: Mapping[str, Sequence[str] | np.ndarray] | None = None,
-) -> xr.Dataset:
+) -> Content:
     """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
 
     `linkage`: labels or numbers along further dimensions, of what has these.
@@ -323,7 +328,7 @@ def response_dataset(
         for name, words in (linkage or {}).items()
     }
     attrs = {**(attributes or {}), **_checked(data)}
-    return dataset("response", coords, data, attrs, objective=objective)
+    return filled("response", coords, data, attrs, objective=objective)
 
 
 def timing_dataset(
@@ -341,8 +346,8 @@ def timing_dataset(
 # Files
 
 
-def write(content: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset as NetCDF-4, whole or not at all; equal datasets give equal bytes.
+def write(content: Results, path: str | os.PathLike[str]) -> None:
+    """Write results as NetCDF-4, whole or not at all; equal content gives equal bytes.
 
     The file is written under a temporary name in the same directory, synced, and renamed.
 
@@ -378,9 +383,18 @@ def read(
         The file is missing, cut off, changed, foreign, of another kind or scene, or says what
         cannot be.
     """
+    return content_in(path, kind, scene_hash).to_xarray()
+
+
+def content_in(
+    path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
+) -> Content:
+    """Read a result file as `read` does, without xarray; raises InputError as it does."""
     place = _path(path)
     content = netcdf.load(place)
-    content = content.rename({o: n for n, o in FORMER.items() if o in content and n not in content})
+    now = {old: new for new, old in FORMER.items() if new not in content}
+    if now.keys() & content.variables.keys():
+        content = Content({now.get(k, k): v for k, v in content.variables.items()}, content.attrs)
     fault = fault_of(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")

@@ -1,14 +1,14 @@
-"""What is wrong with a dataset that was read: names, dimensions and types that its table has not, outcomes that cannot be."""
+"""What is wrong with a file that was read: names, dimensions and types that its table has not, outcomes that cannot be."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.outcome import JUDGED, NUMBERS, Status
+from hpcclear.results.content import Content
 from hpcclear.results.names import FURTHER_DIMS, KINDS, LIMIT, ROLE, Column, designs_in
 
 
-def fault_of(content: xr.Dataset, kind: str | None) -> str | None:
-    """What is wrong with a dataset that was read, or None."""
+def fault_of(content: Content, kind: str | None) -> str | None:
+    """What is wrong with what was read, or None."""
     found = content.attrs.get("hpcclear_kind")
     if not isinstance(found, str) or found not in KINDS:
         return "it does not say which kind of result it holds"
@@ -18,8 +18,7 @@ def fault_of(content: xr.Dataset, kind: str | None) -> str | None:
     missing = (table.required | (set(table.coords) - FURTHER_DIMS)) - set(content.variables)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
-    for key, variable in content.variables.items():
-        name = str(key)
+    for name, variable in content.variables.items():
         row = table.coords.get(name) or table.data.get(name)
         if row is None:
             roles = {ROLE: table.design_dims, LIMIT: table.limit_dims}
@@ -32,33 +31,35 @@ def fault_of(content: xr.Dataset, kind: str | None) -> str | None:
         if variable.dims != row.dims:
             return f"{name} has dimensions {variable.dims}, not {row.dims}"
         kinds = {"f8": "f", "i8": "i", "i1": "i", "text": "U"}
-        if variable.dtype.kind != kinds[row.dtype]:
-            return f"{name} has type {variable.dtype}, not {row.dtype}"
+        if variable.values.dtype.kind != kinds[row.dtype]:
+            return f"{name} has type {variable.values.dtype}, not {row.dtype}"
         if name in table.coords and row.dtype == "f8" and not np.isfinite(variable.values).all():
             return f"{name} is not finite everywhere"
     return _outcome_fault(content) if "status" in content else None
 
 
-def _outcome_fault(content: xr.Dataset) -> str | None:
+def _outcome_fault(content: Content) -> str | None:
     """Outcomes that cannot be, such as a number in a failed sample."""
-    status = content["status"]
+    status = content["status"].values
     if not np.isin(status, [int(code) for code in Status]).all():
         return "a status is unknown"
     finished = status == Status.OK
-    if bool((finished & ~np.isfinite(content["objective"])).any()):
+    if (finished & ~np.isfinite(content["objective"].values)).any():
         return "a finished simulation has no objective"
     for name in NUMBERS:
         judged = name not in JUDGED or "regime" in content  # 0 where nobody looked
-        if (
-            judged
-            and name in content.data_vars
-            and bool((~finished & content[name].notnull()).any())
-        ):
+        there = judged and name in content and name not in content.sizes
+        if there and _numbers(content[name].values[~finished]):
             return f"a failed simulation has a number in {name}"
-    if "sample" in content.coords:
-        samples = content["sample"].to_numpy()
+    if "sample" in content:
+        samples = content["sample"].values
         if (samples < 0).any() or (np.diff(samples) <= 0).any():
             return "sample numbers are not in order"
         if not all(np.isfinite(values).all() for values in designs_in(content).values()):
             return "a design is not finite"
     return None
+
+
+def _numbers(values: np.ndarray) -> bool:
+    """Whether something there is a number; integers always are."""
+    return bool(values.size) and not (values.dtype.kind == "f" and np.isnan(values).all())

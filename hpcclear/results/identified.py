@@ -1,10 +1,14 @@
 """The table of files of kind ``identify``: unknowns of a machine from measured signals."""
 
-from collections.abc import Sequence
+from __future__ import annotations
 
-import xarray as xr
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from hpcclear.results.rows import Columns, count, flag, number, text
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # fmt: off
 IDENTIFY: Columns = {

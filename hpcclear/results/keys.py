@@ -4,9 +4,8 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-import xarray as xr
-
 from hpcclear.base.errors import InputError
+from hpcclear.results.content import Results
 
 KEY = "run_key"
 """Global attribute with the key of a run, in part, stage and final files."""
@@ -19,12 +18,12 @@ def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
     return {KEY: json.dumps(dict(sorted(key.items())), ensure_ascii=False)}
 
 
-def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
+def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
     """Refuse results of another run.
 
     Parameters
     ----------
-    content : xarray.Dataset
+    content : Content or xarray.Dataset
         What was read from `place`.
     key : mapping of str to str
         What makes this run what it is: scene, version, seed, ...; flattened entries of a scene
@@ -52,7 +51,7 @@ def check_key(content: xr.Dataset, key: Mapping[str, str], place: Path) -> None:
         )
 
 
-def key_of(content: xr.Dataset) -> dict[str, object]:
+def key_of(content: Results) -> dict[str, object]:
     """The key of the run that made a dataset; empty where it carries none, as a single response."""
     try:
         found = json.loads(str(content.attrs.get(KEY, "{}")))

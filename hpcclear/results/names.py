@@ -4,10 +4,10 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST, Flag, Regime, Status
 from hpcclear.results import columns
+from hpcclear.results.content import Results
 from hpcclear.results.identified import IDENTIFY
 from hpcclear.results.rows import Column, Columns
 
@@ -162,10 +162,10 @@ ROLE = "design_variable"  # value of the attribute `role` of design variables
 LIMIT = "design_limit"  # the same for their limits, NAME_lower and NAME_upper
 
 
-def designs_in(samples: xr.Dataset) -> dict[str, np.ndarray]:
-    """The design variables in a dataset, each of the shape of its dimensions, by their names or scene paths."""
+def designs_in(samples: Results) -> dict[str, np.ndarray]:
+    """The design variables in results, each of the shape of its dimensions, by their names or scene paths."""
     return {
         str(variable.attrs["scene_path"]): variable.to_numpy()
-        for variable in samples.data_vars.values()
+        for variable in samples.variables.values()
         if variable.attrs.get("role") == ROLE
     }

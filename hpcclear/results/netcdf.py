@@ -13,16 +13,16 @@ import hashlib
 import io
 import os
 import stat
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import h5py
 import numpy as np
-import xarray as xr
 
 from hpcclear.base import host
 from hpcclear.base.errors import InputError
+from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.files import Buffer, write_bytes
 
 SEAL = b"\nhpcclear seal sha256:"
@@ -91,21 +91,21 @@ def seal(content: Buffer) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
-def save(dataset: xr.Dataset, path: Path, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> None:
-    """Write a dataset as a sealed NetCDF-4 file (see `write_bytes`, `encode`).
+def save(content: Results, path: Path, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> None:
+    """Write content as a sealed NetCDF-4 file (see `write_bytes`, `encode`).
 
     `elsewhere`: variables whose values are in other files; what is missing of them there reads as NaN or -1.
     """
-    image = _image(dataset, elsewhere)
-    with image.getbuffer() as content:
-        ending = seal(content)
+    image = _image(Content.of(content), elsewhere)
+    with image.getbuffer() as written:
+        ending = seal(written)
     image.seek(0, io.SEEK_END)
     image.write(ending)  # behind it, in place: of a large file no second copy is made
-    with image.getbuffer() as content:
-        write_bytes(path, content, SEAL)
+    with image.getbuffer() as written:
+        write_bytes(path, written, SEAL)
 
 
-def load(path: Path) -> xr.Dataset:
+def load(path: Path) -> Content:
     """Read a file of `save` into memory; `InputError` for anything else (see `read_bytes`)."""
     content = read_bytes(path)
     try:
@@ -117,8 +117,8 @@ def load(path: Path) -> xr.Dataset:
         raise InputError("file", str(path), reason, "Name a file that hpcclear wrote") from None
 
 
-def encode(dataset: xr.Dataset) -> bytes:
-    """A dataset as the bytes of a NetCDF-4 file; equal datasets give equal bytes.
+def encode(content: Results) -> bytes:
+    """Content as the bytes of a NetCDF-4 file; equal content gives equal bytes.
 
     Variables are numbers or text; coordinates are one-dimensional and named as their dimension.
     Floating-point data variables carry ``_FillValue = NaN``, coordinates and integers carry none.
@@ -128,64 +128,62 @@ def encode(dataset: xr.Dataset) -> bytes:
     ValueError
         A type or a coordinate that the file cannot hold.
     """
-    return _image(dataset).getvalue()
+    return _image(Content.of(content)).getvalue()
 
 
-def _image(dataset: xr.Dataset, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
+def _image(content: Content, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
     """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
-    apart = [name for name in dataset.data_vars if name in elsewhere]
+    data = {name: one for name, one in content.variables.items() if name not in content.sizes}
+    apart = [name for name in data if name in elsewhere]
     with h5py.File(buffer, "w", track_order=True) as file:
-        for number, name in enumerate(dataset.sizes):
-            _encode_dimension(file, str(name), number, dataset, elsewhere)
-        for name in dataset.data_vars:
-            if name in dataset.sizes:
-                raise ValueError(f"{name!r} names a dimension and a data variable")
+        for number, name in enumerate(content.sizes):
+            _encode_dimension(file, name, number, content, elsewhere)
+        for name, variable in data.items():
             if name not in elsewhere:
-                _encode_data(file, str(name), dataset[name], elsewhere)
-        _encode_attributes(file, dataset.attrs)
+                _encode_data(file, name, variable, elsewhere)
+        _encode_attributes(file, content.attrs)
     # One at a time: HDF5 keeps what it knows of a variable until the file is closed, 4 kB of each piece.
     for name in apart:
         with h5py.File(buffer, "r+", track_order=True) as file:
-            _encode_data(file, str(name), dataset[name], elsewhere)
+            _encode_data(file, name, data[name], elsewhere)
     return buffer
 
 
 def _encode_data(
-    file: h5py.File, name: str, variable: xr.DataArray, elsewhere: Mapping[str, Elsewhere]
+    file: h5py.File, name: str, variable: Variable, elsewhere: Mapping[str, Elsewhere]
 ) -> None:
     target = _encode_variable(file, name, variable, elsewhere, filled=True)
     for axis, dimension in enumerate(variable.dims):
-        target.dims[axis].attach_scale(file[str(dimension)])
+        target.dims[axis].attach_scale(file[dimension])
 
 
 def _encode_dimension(
     file: h5py.File,
     name: str,
     number: int,
-    dataset: xr.Dataset,
+    content: Content,
     elsewhere: Mapping[str, Elsewhere],
 ) -> None:
-    if name in dataset.coords:
-        scale = _encode_variable(file, name, dataset[name], elsewhere, filled=False)
+    if name in content:
+        scale = _encode_variable(file, name, content[name], elsewhere, filled=False)
         scale.make_scale(name)
     else:
-        scale = file.create_dataset(
-            name, shape=(dataset.sizes[name],), dtype=">f4", track_order=True
-        )
-        scale.make_scale(_NO_VARIABLE % dataset.sizes[name])
+        size = content.sizes[name]
+        scale = file.create_dataset(name, shape=(size,), dtype=">f4", track_order=True)
+        scale.make_scale(_NO_VARIABLE % size)
     scale.attrs["_Netcdf4Dimid"] = np.int32(number)
 
 
 def _encode_variable(
     file: h5py.File,
     name: str,
-    variable: xr.DataArray,
+    variable: Variable,
     elsewhere: Mapping[str, Elsewhere],
     *,
     filled: bool,
 ) -> h5py.Dataset:
-    values = variable.to_numpy()
+    values = variable.values
     dtype = values.dtype.newbyteorder("<")
     fill = None
     if dtype.kind == "U":
@@ -221,9 +219,7 @@ def _virtual(file: h5py.File, name: str, dtype: np.dtype, where: Elsewhere) -> h
     return h5py.Dataset(h5py.h5d.create(file.id, name.encode(), kind, space, made))
 
 
-def _encode_attributes(
-    target: h5py.Dataset | h5py.File, attributes: Mapping[Hashable, Any]
-) -> None:
+def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str, object]) -> None:
     for name, value in attributes.items():
         if isinstance(value, str):
             data = value.encode()
@@ -233,11 +229,11 @@ def _encode_attributes(
             else:
                 target.attrs[str(name)] = value
         else:
-            target.attrs[str(name)] = np.atleast_1d(value)
+            target.attrs[str(name)] = np.atleast_1d(np.asarray(value))
 
 
-def decode(content: bytes) -> xr.Dataset:
-    """The dataset in the bytes of `encode`; nothing outside these bytes is touched or evaluated.
+def decode(content: bytes) -> Content:
+    """What the bytes of `encode` hold; nothing outside these bytes is touched or evaluated.
 
     Raises
     ------
@@ -255,13 +251,12 @@ def decode(content: bytes) -> xr.Dataset:
                 raise ValueError(f"{name!r} is a group")
             if _bare_dimension(source):
                 continue
+            values, attributes = _decode_values(source), _decode_attributes(source)
             if source.is_scale:
-                coordinates[name] = ((name,), _decode_values(source), _decode_attributes(source))
+                coordinates[name] = Variable((name,), values, attributes)
             else:
-                values = _decode_values(source)
-                data[name] = (_decode_dims(source), values, _decode_attributes(source))
-        attributes = _decode_attributes(file)
-    return xr.Dataset(data, coordinates, attributes)
+                data[name] = Variable(_decode_dims(source), values, attributes)
+        return Content({**data, **coordinates}, _decode_attributes(file))
 
 
 def _bare_dimension(source: h5py.Dataset) -> bool:
@@ -294,7 +289,7 @@ def _decode_values(source: h5py.Dataset) -> np.ndarray:
     return np.asarray(source[...])
 
 
-def _decode_attributes(source: h5py.Dataset | h5py.File) -> dict[str, Any]:
+def _decode_attributes(source: h5py.Dataset | h5py.File) -> dict[str, object]:
     found: dict[str, object] = {}
     for name in source.attrs:
         if name in _HIDDEN:

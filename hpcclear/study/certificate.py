@@ -7,7 +7,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Records
 from hpcclear.ensemble.effects import effects_dataset
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.report.figures.effects import statements
 from hpcclear.results.names import SECONDS_PER_SAMPLE
@@ -61,13 +61,13 @@ _KEPT = ("objective", "peak_contact_force", "rhs_evaluations", "steady_revolutio
 
 def _simulated(run: StudyRun, scene: Scene, points: Points) -> Result:
     records = sample_points(scene, points, run.ranks, stage="effects: simulations")
-    return {name: records[name] for name in _KEPT}
+    return {name: records[name] for name in _KEPT if name in (records.dtype.names or ())}
 
 
 def _records(kept: Result) -> Records:
     """What was kept of records, as records."""
-    types = [(name, kept[name].dtype, kept[name].shape[1:]) for name in _KEPT]
+    types = [(name, kept[name].dtype, kept[name].shape[1:]) for name in kept]
     found = np.zeros(len(kept["objective"]), types)
-    for name in _KEPT:
+    for name in kept:
         found[name] = kept[name]
     return found

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.objectives import asked
-from hpcclear.base.outcome import OUTCOME, Status, failed
+from hpcclear.base.outcome import Status, failed
 from hpcclear.ensemble import compiling, simulate, single
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
+from hpcclear.scene.record import record_of
 from hpcclear.study import responses, run_study
 from hpcclear.study.run import StudyRun
 
@@ -120,7 +121,7 @@ class FormulaWorker:
 
     def __init__(self, payload: dict[str, Any]) -> None:
         self._scene = load_scene(payload["scene"], trust=True)  # as the evaluators of the package
-        self._objective = self._scene.objective
+        self._objective, self._record = self._scene.objective, record_of(self._scene)
         self._paths = payload["paths"]
         self._index, self._points = np.empty(0, int), np.empty((0, len(self._paths)))
 
@@ -136,11 +137,11 @@ class FormulaWorker:
         taken, values = self._index[-CHUNK:], self._points[-CHUNK:]
         self._index, self._points = self._index[:-CHUNK], self._points[:-CHUNK]
         if not len(taken):
-            return np.zeros(0, OUTCOME)
+            return np.zeros(0, self._record)
         column = {path: np.full(len(taken), x) for path, x in numbers(self._scene).items()}
         for k, paths in enumerate(self._paths):
             column |= dict.fromkeys(paths, values[:, k])
-        records = np.repeat(failed(0, Status.STEP_CAP), len(taken))
+        records = np.repeat(failed(0, Status.STEP_CAP, record=self._record), len(taken))
         records["sample"] = taken
         fine = column["mechanism.slider.mass"] <= FAILS_ABOVE
         for name in ("objective", "objective_spread"):
@@ -148,7 +149,7 @@ class FormulaWorker:
         for name in ("mean_gap", "peak_contact_force"):
             records[name][fine] = 1.0
         if FIELD:
-            like = (-1, *(1 for _ in OUTCOME[FIELD].shape))
+            like = (-1, *(1 for _ in self._record[FIELD].shape))
             records[FIELD][fine] = objective(column)[fine].reshape(like)
         bias = BIAS * np.where(column["mechanism.rod.mass"] > 0.42, BEYOND, 1.0)
         records["objective"] *= 1.0 + bias * self._scene.numerics.rtol
@@ -183,7 +184,8 @@ def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     data = {**series, "crank_angle": angle, "contact_force": pair}
     data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
     scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
-    return dataset.response_dataset(angle / 523.0, {**data, **scalars}, objective=scene.objective)
+    content = dataset.response_content(angle / 523.0, data | scalars, objective=scene.objective)
+    return content.to_xarray()
 
 
 def respond_together(scenes: Sequence[Scene], copies: Sequence[int]):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcclear.base.outcome import ON_REQUEST, OUTCOME, Flag, Status
+from hpcclear.base.outcome import OUTCOME, Flag, Status
 from hpcclear.ensemble import parts, statistics
 from hpcclear.ensemble.raw import RawFiles
 from hpcclear.ensemble.session import Options
@@ -53,7 +53,7 @@ class MadeUp:
         broken = points[:, 0] > 0.4
         records["status"][broken] = Status.NOT_FINITE
         records["objective_uncertainty"] = np.nan
-        for name in ("objective", "mean_gap", "peak_contact_force", *ON_REQUEST):
+        for name in ("objective", "mean_gap", "peak_contact_force"):
             records[name][broken] = np.nan
         records["flags"][points[:, 1] > 0.2] = Flag.LATCHED
         self._queue.append(records)

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Records
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.evaluation.recorded.sounding import SoundingEvaluator
 from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 
 
 def evaluator_of(
@@ -35,5 +35,5 @@ def evaluate_records(
     done = []
     while evaluator.pending:
         done.append(evaluator.advance(0.2))
-    records = np.concatenate(done) if done else np.zeros(0, OUTCOME)
+    records = np.concatenate(done) if done else np.zeros(0, record_of(scene))
     return records[np.argsort(records["sample"], kind="stable")]

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,20 +10,21 @@ from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
-from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
-from hpcclear.base.outcome import IMPACTS, OUTCOME, RESPONSES, Flag, Status, unknown
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective, asked
+from hpcclear.base.outcome import IMPACTS, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.joint_laws import has_pressure, widest_contact
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.planar import energy
-from hpcclear.dynamics.setup.parameters import Numbers, parameters
+from hpcclear.dynamics.setup.parameters import parameters, widest_contact
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
+from hpcclear.scene.record import has_pressure, record_of
 
 VECTORS = 4
 """Vectors that the lanes of an ensemble fill at most: enough for the processor to work on one while another waits for a root or
@@ -145,7 +147,8 @@ class Evaluator:
                 Lanes(problem, lanes) if problem.coordinates else PrescribedSamples(problem)
             )
         self._problem = problem
-        self._pressed = has_pressure(scene)
+        self._record, self._pressed = record_of(scene), has_pressure(scene)
+        self._asked = self._record, responses_reported(problem), scene.objective
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._values: dict[int, Array] = {}  # of what runs, for its pressures
         self._partial: dict[int, Records] = {}
@@ -177,14 +180,10 @@ class Evaluator:
         self._lanes.queue(par, start, labels)
 
     def advance(self, seconds: float) -> Records:
-        """Work for about `seconds`; return the records (`status.OUTCOME`) of what finished meanwhile."""
+        """Work for about `seconds`; return the records of what finished meanwhile."""
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
-        effects = self._problem.effects
-        responses = responses_reported(self._problem)
-        records = outcome_records(
-            labels, outcome, par, responses, bool(effects.wear), self.scene.objective
-        )
+        records = outcome_records(labels, outcome, par, *self._asked)
         if self._pressed:
             nothing = np.zeros(len(self._columns.names))
             values = [self._values.pop(label, nothing) for label in labels.tolist()]
@@ -201,12 +200,30 @@ class Evaluator:
         done = []
         for record in records:
             sample, copy = divmod(int(record["sample"]), self._copies)
-            group = self._partial.setdefault(sample, np.zeros(self._copies, OUTCOME))
+            group = self._partial.setdefault(sample, np.zeros(self._copies, self._record))
             group[copy] = record
             group["flags"][copy] |= _ARRIVED
             if (group["flags"] & _ARRIVED).all():
                 done.append(joined(sample, self._partial.pop(sample), self._objective))
-        return np.array(done, OUTCOME) if done else np.zeros(0, OUTCOME)
+        return np.array(done, self._record)
+
+
+class Judge:
+    """A rank's worker: an evaluator whose records contain the requested objective; see `hpcclear.ranks.schedule.Worker`."""
+
+    def __init__(self, evaluator: Worker, objective: Objective) -> None:
+        self._evaluator, self._objective = evaluator, objective
+        self.lanes = evaluator.lanes
+        self.submit = evaluator.submit
+
+    @property
+    def pending(self) -> int:
+        """Samples submitted and not finished."""
+        return self._evaluator.pending
+
+    def advance(self, seconds: float) -> Records:
+        """Work for about `seconds`; records of what finished meanwhile."""
+        return asked(self._evaluator.advance(seconds), self._objective)
 
 
 def with_pressures(
@@ -281,16 +298,15 @@ NO_RATE = -1e299
 
 
 def outcome_records(
-    labels: Integers, outcome: Outcome, par: Array, responses: Sequence[str] = (), worn: bool = False,
+    labels: Integers, outcome: Outcome, par: Array, record: np.dtype, responses: Sequence[str] = (),
     objective: Objective = MEAN_GAP,
 ) -> Records:  # fmt: skip
-    """Outcomes (m) and parameters (m, PARAMETERS) as records.
+    """Outcomes (m) and parameters (m, PARAMETERS) as records of the type `record`, with what is made of the `objective`'s rate.
 
-    Numbers of failed samples are NaN, and so are those that were not requested: the further responses unless
-    `responses` (as of `responses_reported`), sliding work unless `worn`,
-    what is made of the `objective`'s rate, uncertainty and energy error until their makers fill them in.
+    Numbers of failed samples are NaN, and so are further responses unless they are among
+    `responses` (as of `responses_reported`), and uncertainty and energy error until their makers fill them in.
     """
-    records = unknown(len(labels))
+    records = unknown(len(labels), record)
     records["sample"] = labels
     records["status"] = outcome.status
     records["rhs_evaluations"] = outcome.evaluations
@@ -301,7 +317,7 @@ def outcome_records(
     }  # fmt: skip
     made = {**_responses(outcome), **measures(outcome)}
     known |= {name: one for name, one in made.items() if name in responses}
-    if worn:
+    if "sliding_work" in (record.names or ()):
         known |= {
             "sliding_work": sliding_work(outcome),
             "sliding_waves": outcome.profile * _revolution(outcome),
@@ -310,9 +326,10 @@ def outcome_records(
         largest = np.where(outcome.largest_rate > NO_RATE, outcome.largest_rate, 0.0)
         known[RATE] = objective.made_of(outcome.mean_rate, largest, _revolution(outcome))
     for name, values in known.items():
-        records[name][valid] = values[valid]
+        there: Any = (valid, *map(slice, record[name].shape))
+        records[name][valid] = values[there]
     latched = outcome.latched == 1.0
-    records["latched"] = latched & valid[:, None]
+    records["latched"] = (latched & valid[:, None])[:, : records["latched"].shape[1]]
     flags = int(Flag.LATCHED) * latched.any(axis=1)
     flags += int(Flag.BEYOND_HERTZ) * beyond_hertz(outcome, par)
     flags += int(Flag.STIFF) * (outcome.stiff_steps > 0.0)

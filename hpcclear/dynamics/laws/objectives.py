@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.objectives import MADE, OF_ALL, OF_JOINTS, RECORDED, Objective, arguments
-from hpcclear.base.outcome import OUTCOME
+from hpcclear.base.outcome import FIELDS
 from hpcclear.dynamics.laws.checks import TYPICAL, WORDS, registry
 from hpcclear.dynamics.laws.lanes import HEAD, InLanes
 from hpcclear.dynamics.laws.numbers import evaluate, with_words
@@ -101,7 +101,7 @@ def check_objective(objective: Objective) -> None:
                     f"{title} uses {name!r}, which is not known",
                     f"There are {', '.join(sorted(known))}",
                 )
-    numbers = {name: np.array([1.0, 2.0]) if OUTCOME[name].shape else 1.5 for name in RECORDED}
+    numbers = {name: np.array([1.0, 2.0]) if FIELDS[name].per else 1.5 for name in RECORDED}
     if objective.rate is not None:
         rate_in_lanes(objective)
         numbers["rate"] = 1.5 if objective.whole else np.array([1.0, 2.0])

@@ -128,6 +128,11 @@ def refusal(assembly: Assembly, passage: Passage) -> InputError:
     )  # fmt: skip
 
 
+def angle_of(pose: Assembly) -> float:
+    """The angle of the body that defines the period, deg."""
+    return math.degrees(placed(pose, f"{pose.loops.mechanism.period.body}.{CENTER}")[2]) % 360.0
+
+
 def why(assembly: Assembly, passage: Passage) -> str:
     """Where a walk ended, by the angle of the drive's body, and which bodies and joints hold one another there."""
     assert passage.ended is not None
@@ -154,8 +159,7 @@ def why(assembly: Assembly, passage: Passage) -> str:
     points = np.array([[(z := placed(pose, j.places[0])[0]).real, z.imag] for j in between])
     spread = np.linalg.svd(points - points.mean(axis=0))[1] if len(points) else np.ones(2)
     straight = len(spread) > 1 and spread[1] < 0.02 * spread[0]
-    body = mechanism.period.body
-    where = f"{math.degrees(placed(pose, f'{body}.{CENTER}')[2]) % 360.0:.1f} deg of the {body}"
+    where = f"{angle_of(pose):.1f} deg of the {mechanism.period.body}"
     names = " and ".join([", ".join(bodies[:-1]), bodies[-1]] if len(bodies) > 1 else bodies)
     state = (
         f"{names} {'in line' if straight and len(bodies) > 1 else 'jammed'}" if bodies else "jammed"

@@ -19,7 +19,7 @@ from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive,
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar import bristles, swings
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
-from hpcclear.dynamics.planar.turning import refused
+from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
@@ -183,9 +183,20 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
 
 
 def sample_of(scene: Scene, points: Points | None) -> Mechanism:
-    """The mechanisms of samples with the scene's structure; of the scene itself without points."""
-    points = Points((), np.empty((1, 0)), ()) if points is None else points
-    return with_columns(scene, linkage_of(scene).mechanism, points)
+    """The mechanisms of samples with the scene's structure; of the scene itself without points.
+
+    Those of the last points are kept, since parameters, starts and contacts of samples are made from the same object.
+    """
+    if points is None:
+        return with_columns(scene, linkage_of(scene).mechanism, Points((), np.empty((1, 0)), ()))
+    for known, its, made in _LAST:
+        if known is scene and its is points:
+            return made
+    _LAST[:] = [(scene, points, with_columns(scene, linkage_of(scene).mechanism, points))]
+    return _LAST[0][2]
+
+
+_LAST: list[tuple[Scene, Points, Mechanism]] = []
 
 
 def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
@@ -239,6 +250,24 @@ def refused_of(scene: Scene) -> tuple[Status, InputError] | None:
         If it cannot be put together.
     """
     return refused(mechanism_of(scene.linkage), scene.effects.gravity, rounds_of(scene))
+
+
+@lru_cache(maxsize=64)
+def cautions_of(scene: Scene) -> tuple[str, ...]:
+    """What a user should know of the motion of a linkage that turns, a sentence each."""
+    if refused_of(scene) is not None:
+        return ()
+    mechanism = mechanism_of(scene.linkage)
+    at_angles = [
+        f"{angle:.0f}" for angle in changes(mechanism, scene.effects.gravity, rounds_of(scene))
+    ]
+    if not at_angles:
+        return ()
+    return (
+        f"without clearance the linkage passes a change point at {' and '.join(at_angles)} deg of the {mechanism.period.body}. "
+        "With clearance the contact decides which way it moves on: forces near there change with the smallest change of "
+        "the design",
+    )
 
 
 def rounds_of(scene: Scene) -> int:

@@ -24,7 +24,7 @@ from hpcclear.dynamics.linkage.parts import (
     TorqueDrive,
 )
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Node, Passage, clear
-from hpcclear.dynamics.linkage.prescribed import cartesian, passage_of, refusal
+from hpcclear.dynamics.linkage.prescribed import angle_of, cartesian, passage_of, refusal
 from hpcclear.dynamics.linkage.trees import Forest
 
 DEPENDENT = 1e-3
@@ -159,6 +159,22 @@ def refused(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Status, 
     error = refusal(*found)
     key = f"mechanism.{error.key}"
     return found[1].ended.status, InputError(key, error.value, error.reason, error.remedy)
+
+
+def changes(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[float, ...]:
+    """Angles, deg, of the body that defines the period where clearance decides which way a linkage goes on: change points of
+    its twin. Empty for a linkage without clearance, whose change points are passed or refused."""
+    found = passage(mechanism, gravity, rounds) if mechanism.clearances else None
+    if found is None or found[1].ended is not None:
+        return ()
+    assembly, walk = found
+    angles = []
+    for node in walk.changes:
+        ((q, v),) = cartesian(
+            assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time])
+        )
+        angles.append(angle_of(replace(assembly, q=q, v=v)))
+    return tuple(sorted(angles))
 
 
 def loops_of(structure: Mechanism) -> Loops | None:

@@ -1,14 +1,19 @@
 """Words for axes: what is drawn, its symbol and a unit of a readable size."""
 
+from __future__ import annotations
+
 import re
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
+from hpcclear.results.content import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -147,7 +152,7 @@ def words(variable: xr.DataArray) -> str:
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
 
 
-def objective(content: xr.Dataset) -> str:
+def objective(content: Results) -> str:
     """What f is in a file of results, in words."""
     return str(content.attrs.get("objective", MEAN_GAP.words))
 

@@ -1,13 +1,19 @@
 """What the figures of a response need beyond its variables: turns, steady part, clearances, f of each turn."""
 
+from __future__ import annotations
+
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures.style import JOINT_NAMES
+from hpcclear.results.content import Results
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 TURN = 2.0 * np.pi
 
@@ -18,7 +24,7 @@ def check_some(responses: Collection[object], remedy: str) -> None:
         raise InputError("responses", 0, "there is no response to draw", remedy)
 
 
-def phase(response: xr.Dataset) -> Array:
+def phase(response: Results) -> Array:
     """Progress of the drive since the start, rad, 2 pi a turn or swing, shape (time,); a slider-crank's crank angle, whichever
     way it turns."""
     if "drive_phase" in response:
@@ -27,7 +33,7 @@ def phase(response: xr.Dataset) -> Array:
     return -angle if angle[-1] < angle[0] else angle
 
 
-def turns(response: xr.Dataset) -> Array:
+def turns(response: Results) -> Array:
     """The same in revolutions, shape (time,)."""
     return phase(response) / TURN
 

@@ -21,6 +21,7 @@ from hpcclear.statistics.streams.summary import (
     empty,
     histogram_edges,
     merge,
+    rows_of,
     summarise,
     tree_length,
 )
@@ -33,6 +34,8 @@ class Accumulator:
     ----------
     total : int
         Samples of the design, at least 1.
+    record : dtype
+        Type of their records.
     block, bins : int
         Samples a block (a leaf times a power of two), bins of each histogram.
     edges : ndarray, optional
@@ -47,6 +50,7 @@ class Accumulator:
     def __init__(
         self,
         total: int,
+        record: np.dtype = OUTCOME,
         *,
         block: int = BLOCK,
         bins: int = BINS,
@@ -60,7 +64,8 @@ class Accumulator:
             )
         self.total, self.block, self.bins, self.edges = total, block, bins, edges
         self.whole = {(0, max(tree_length(total), block))} if whole is None else whole
-        self._on_block = on_block
+        self._record, self._on_block = record, on_block
+        self._rows = len(rows_of(record["mean_gap"].shape[0]))
         self._open: dict[int, np.ndarray] = {}  # records by block; sample -1: not here yet
         self._missing: dict[int, int] = {}
         # of the tree over the design, apart from each other, none beside its sibling: by their first samples
@@ -102,7 +107,7 @@ class Accumulator:
             raise ValueError(f"a sample of {first} to {first + length - 1} was taken before")
 
     def add(self, records: np.ndarray) -> None:
-        """Take finished samples, records of `OUTCOME` (m,).
+        """Take finished samples, records (m,).
 
         Raises
         ------
@@ -135,7 +140,7 @@ class Accumulator:
         while (first, length) not in self.whole:
             sibling = first ^ length
             if sibling >= self.total:
-                other = empty(self.bins)
+                other = empty(self._rows, self.bins)
             elif self._length_at(sibling) == length:
                 other = self._nodes.pop(sibling)[1]
                 del self._firsts[bisect_left(self._firsts, sibling)]
@@ -183,7 +188,7 @@ class Accumulator:
     def _put(self, number: int, records: np.ndarray) -> None:
         if number not in self._open:
             self._refuse_taken(number * self.block, self.block)
-            self._open[number] = np.zeros(self._length(number), OUTCOME)
+            self._open[number] = np.zeros(self._length(number), self._record)
             self._open[number]["sample"] = -1
             self._missing[number] = self._length(number)
         slots = records["sample"] - number * self.block
@@ -218,9 +223,9 @@ class Accumulator:
         return self._nodes[0][1]
 
     def loose(self) -> np.ndarray:
-        """Samples taken of blocks that are incomplete, by growing number: records of `OUTCOME` (m,)."""
+        """Samples taken of blocks that are incomplete, by growing number: records (m,)."""
         held = [block[block["sample"] >= 0] for _, block in sorted(self._open.items())]
-        return np.concatenate(held) if held else np.empty(0, OUTCOME)
+        return np.concatenate(held) if held else np.empty(0, self._record)
 
     def remaining(self) -> "Remaining":
         """The samples that were not taken yet."""
@@ -246,10 +251,10 @@ class Accumulator:
         data["parts"] = np.array([row[:2] for row in parts], np.int64).reshape(-1, 2)
         if self.edges is not None:
             data["edges"] = self.edges
-        rows = [empty(self.bins), *(summary for _, _, summary in parts)]
+        rows = [empty(self._rows, self.bins), *(summary for _, _, summary in parts)]
         for field in fields(Summary):
             data[f"summary_{field.name}"] = np.stack([getattr(row, field.name) for row in rows])[1:]
-        return {**data, **{f"record_{name}": records[name] for name in OUTCOME.names or ()}}
+        return {**data, **{f"record_{name}": records[name] for name in self._record.names or ()}}
 
     def restore(self, data: Mapping[str, ArrayLike]) -> None:
         """Go on from a `state` of an accumulator of the same layout; this one is new.
@@ -266,8 +271,8 @@ class Accumulator:
         for k, (first, length) in enumerate(arrays["parts"].tolist()):
             row = (arrays[f"summary_{field.name}"][k] for field in fields(Summary))
             self.add_part(first, length, Summary(*row))
-        records = np.empty(len(arrays["record_sample"]), OUTCOME)
-        for name in OUTCOME.names or ():
+        records = np.empty(len(arrays["record_sample"]), self._record)
+        for name in self._record.names or ():
             records[name] = arrays[f"record_{name}"]
         self.add(records)
 

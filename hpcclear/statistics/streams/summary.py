@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.base.outcome import FIELDS, Flag, Status
 
 BLOCK = 4096
 """Samples in a block. Part of what makes results reproducible: another length merges in another order."""
@@ -24,10 +24,12 @@ BINS = 200
 """Bins of a histogram, besides one below and one above."""
 
 QUANTITIES = ("objective", "objective_spread", "mean_gap", "peak_contact_force", "rhs_evaluations")
-"""Fields of `hpcclear.base.outcome.OUTCOME` that are summarised; those with two joints fill two rows."""
+"""Fields of a record that are summarised."""
 
-ROWS = tuple((name, k) for name in QUANTITIES for k in range(max(1, *OUTCOME[name].shape, 1)))
-"""Every summarised number: field, joint (0 for scalars)."""
+
+def rows_of(joints: int) -> list[tuple[str, int]]:
+    """Every summarised number of records with so many joints: field, joint (0 for scalars)."""
+    return [(n, k) for n in QUANTITIES for k in range(joints if FIELDS[n].per == "joint" else 1)]
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Summary:
     """Statistics of some samples; of none, when made by `empty`."""
 
     count: Integers
-    """Shape (rows,): finite numbers, for each of `ROWS`."""
+    """Shape (rows,): finite numbers, for each of `rows_of`."""
     mean: Array
     squares: Array
     minimum: Array
@@ -56,7 +58,7 @@ class Summary:
 
     def quantile(self, probability: float, edges: Array) -> Array:
         """Quantiles read off the histogram, linear within a bin; NaN in the outer bins, shape (rows,)."""
-        found = np.full(len(ROWS), np.nan)
+        found = np.full(len(self.histogram), np.nan)
         for row, counts in enumerate(self.histogram):
             below = np.concatenate([[0], np.cumsum(counts)])
             wanted = probability * below[-1]
@@ -76,9 +78,8 @@ class Moments(NamedTuple):
     squares: NDArray[Any]
 
 
-def empty(bins: int = BINS) -> Summary:
-    """The summary of no samples."""
-    rows = len(ROWS)
+def empty(rows: int, bins: int = BINS) -> Summary:
+    """The summary of no samples, with so many numbers each."""
     return Summary(
         np.zeros(rows, np.int64),
         np.zeros(rows),
@@ -92,7 +93,7 @@ def empty(bins: int = BINS) -> Summary:
 
 
 def columns(records: np.ndarray) -> Array:
-    """The summarised numbers of records (m,) of `OUTCOME`, shape (rows, m); NaN where a sample failed."""
+    """The summarised numbers of records (m,), shape (rows, m); NaN where a sample failed."""
     pieces = [np.atleast_2d(records[name].T).astype(float) for name in QUANTITIES]
     values = np.concatenate(pieces)
     values[:, records["status"] != Status.OK] = np.nan
@@ -101,8 +102,9 @@ def columns(records: np.ndarray) -> Array:
 
 def histogram_edges(records: np.ndarray, bins: int = BINS) -> Array:
     """Edges that suit some first samples, shape (rows, bins + 1): their range and half as much on both sides."""
-    edges = np.empty((len(ROWS), bins + 1))
-    for row, values in enumerate(columns(records)):
+    numbers = columns(records)
+    edges = np.empty((len(numbers), bins + 1))
+    for row, values in enumerate(numbers):
         known = values[np.isfinite(values)]
         low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
         margin = max(0.5 * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-300)
@@ -153,7 +155,7 @@ def _moments(values: Array, length: int) -> Moments:
 
 
 def summarise(records: np.ndarray, edges: Array, length: int | None = None) -> Summary:
-    """Summary of records of `OUTCOME`, shape (m,), in their order.
+    """Summary of records, shape (m,), in their order.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def summarise(records: np.ndarray, edges: Array, length: int | None = None) -> S
     length : int, optional
         Samples under this node of the tree, `tree_length` of what there is by default.
     """
-    result = empty(edges.shape[1] - 1)
+    result = empty(len(edges), edges.shape[1] - 1)
     values = columns(records)
     moments = _moments(values, tree_length(records.size) if length is None else length)
     result.count[:], result.mean[:], result.squares[:] = moments

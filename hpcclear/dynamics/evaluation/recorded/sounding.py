@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import LEVELS, OUTCOME, Status
+from hpcclear.base.outcome import LEVELS, Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
@@ -19,6 +19,7 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 from hpcclear.statistics import spectra
 
 FEWEST_INSTANTS = 64
@@ -77,7 +78,7 @@ class SoundingEvaluator:
                 done.append(records)
             if time.perf_counter() >= end:
                 break
-        return np.concatenate(done) if done else np.zeros(0, OUTCOME)
+        return np.concatenate(done) if done else np.zeros(0, record_of(self.scene))
 
     def _batch(self) -> Iterator[Records | None]:
         """As many samples as there are lanes, piece by piece; their records at last."""

@@ -16,7 +16,6 @@ from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import failed
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator, with_pressures
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
-from hpcclear.dynamics.joint_laws import has_pressure
 from hpcclear.dynamics.layout.views import Rates, Start
 from hpcclear.dynamics.planar.problem import refused_of
 from hpcclear.dynamics.setup.parameters import parameters
@@ -27,6 +26,7 @@ from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import has_pressure, record_of
 
 ITSELF = Points((), np.empty((1, 0)), ())
 """A scene as its only design."""
@@ -139,6 +139,7 @@ class Recording:
         start += [
             start_states(one, own, walk=False) for one, own in zip(beside, par[1:], strict=True)
         ]
+        self._record = record_of(scene)
         self._beside, self._values = beside, design.values
         self._refused = refused_of(scene) if alone else None
         for k, (one, copy) in enumerate(zip((scene, *beside), copies, strict=False)):
@@ -185,7 +186,7 @@ class Recording:
     def record(self) -> Records:
         """The outcomes (samples,), with a half-width if replicas run beside, once all chunks were taken."""
         if self._refused is not None:
-            return failed(0, self._refused[0])
+            return failed(0, self._refused[0], record=self._record)
         done = np.concatenate(self._done)
         done = done[np.argsort(done["sample"], kind="stable")]
         for k, scene in enumerate(self._beside, 1):  # pressures by numbers of their own

@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
-from hpcclear.base.outcome import OUTCOME, Flag, Status, failed
+from hpcclear.base.outcome import RESPONSES, Flag, Status, failed
 from hpcclear.dynamics.evaluation.evaluator import (
     DEFAULT_LANES,
     outcome_records,
@@ -27,6 +27,7 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.scene.record import record_of
 
 TURN_SECONDS = 0.02
 """How long one set of lanes works before the next one does."""
@@ -122,7 +123,8 @@ class SteadyEvaluator:
         self._latched = contact is not None and contact.latched
         problem = self._lanes_of(1e-4, 1).problem  # refuses what cannot be simulated
         self._free = problem.effects.torque is not None
-        self._responses, self._worn = responses_reported(problem), bool(problem.effects.wear)
+        self._responses = responses_reported(problem)
+        self._record = record_of(scene, mapped=procedure is not None)
 
     def _lanes_of(self, rtol: float, revolutions: int) -> Lanes:
         """The lanes for segments of this kind."""
@@ -180,7 +182,7 @@ class SteadyEvaluator:
                 done += self._collect(lanes)
             if time.perf_counter() >= end:
                 break
-        return np.concatenate(done) if done else np.zeros(0, OUTCOME)
+        return np.concatenate(done) if done else np.zeros(0, self._record)
 
     def _collect(self, lanes: Lanes) -> Iterator[Records]:
         """Take in what finished; procedures that have all they waited for go on or end."""
@@ -192,8 +194,8 @@ class SteadyEvaluator:
             mean = ask.take(copy, row)
             if mean is not None:
                 del self._asks[sample]
-                record = record_of(
-                    sample, ask.par, mean, self._responses, self._worn, self.scene.objective
+                record = summed_up(
+                    sample, ask.par, mean, self._record, self._responses, self.scene.objective
                 )
                 yield with_pressures(self.scene, self._columns, [ask.values], record)
             elif ask.asks_anew:
@@ -208,8 +210,12 @@ def _labels(ask: _Ask) -> Integers:
     return ask.sample * _MOST_COPIES + np.arange(len(ask.segment.start))
 
 
-def record_of(
-    sample: int, par: Array, mean: Mean, responses: Sequence[str] = (), worn: bool = False,
+_PEAKS = {"peak_contact_force", "peak_crank_moment", "peak_point_acceleration"}
+_AVERAGED = {*RESPONSES, *_PEAKS, "sliding_work", "sliding_waves"}
+
+
+def summed_up(
+    sample: int, par: Array, mean: Mean, kind: np.dtype, responses: Sequence[str] = (),
     judged: Objective = MEAN_GAP,
 ) -> Records:  # fmt: skip
     """What was found as a record (1,): means over segments and copies, of the peaks too unless the motion is regular.
@@ -217,54 +223,46 @@ def record_of(
     Parameters
     ----------
     par : ndarray, shape (1, PARAMETERS)
+    kind : dtype
+        Type of the record (`hpcclear.scene.record.record_of`).
     responses : sequence of str
         Further responses, as of `responses_reported`.
-    worn : bool
-        Whether a joint wears.
     judged : Objective
         By what.
     """
     rows = mean.outcomes.rows.reshape(-1, Outcome.size)
     if mean.status != Status.OK:
-        return failed(sample, mean.status, int(mean.evaluations))
+        return failed(sample, mean.status, int(mean.evaluations), kind)
     each = outcome_records(
         np.zeros(len(rows), np.int64),
         Outcome(rows),
         np.repeat(par, len(rows), axis=0),
+        kind,
         responses,
-        worn,
         judged,
     )
     record = each[:1].copy()
-    for name in (
-        "mean_contact_force",
-        "peak_contact_force",
-        "peak_crank_moment",
-        "slider_acceleration_deviation",
-        "point_acceleration_deviation",
-        "peak_point_acceleration",
-        "sliding_work",
-        "sliding_waves",
-    ):
+    for name in _AVERAGED & {*(kind.names or ())}:
         record[name] = each[name].mean(axis=0)
-    power = 2.0 if judged.made == "rms" else 1.0
-    record[RATE] = (each[RATE] ** power).mean(axis=0) ** (1.0 / power)
-    if judged.made == "peak":
-        record[RATE] = each[RATE].max(axis=0)
+    if judged.rate is not None:
+        power = 2.0 if judged.made == "rms" else 1.0
+        record[RATE] = (each[RATE] ** power).mean(axis=0) ** (1.0 / power)
+        if judged.made == "peak":
+            record[RATE] = each[RATE].max(axis=0)
     if mean.segment == 1:
-        record["peak_contact_force"] = each["peak_contact_force"].max(axis=0)
-        for name in ("peak_crank_moment", "peak_point_acceleration"):
-            record[name] = each[name].max()
+        for name in _PEAKS & {*(kind.names or ())}:
+            record[name] = each[name].max(axis=0)
     record["sample"] = sample
-    record["mean_gap"] = mean.gaps
+    record["mean_gap"] = mean.gaps[: kind["mean_gap"].shape[0]]
     record["objective"] = objective(mean.gaps)
     record["objective_spread"] = np.std(objective(mean.outcomes.mean_gap), ddof=1)
     record["objective_limit"] = record["objective_uncertainty"] = mean.limit
     record["regime"] = mean.regime
     record["period"] = np.nan if mean.period is None else mean.period
     record["lyapunov_exponent"] = mean.growth
-    record["lyapunov_exponent_limit"] = mean.growth_limit
-    record["attractors"] = np.nan if mean.attractors is None else mean.attractors
+    if "attractors" in (kind.names or ()):
+        record["lyapunov_exponent_limit"] = mean.growth_limit
+        record["attractors"] = np.nan if mean.attractors is None else mean.attractors
     record["steady_rtol"] = mean.tightest
     record["steady_revolutions"] = mean.revolutions
     record["latched"] = (

@@ -59,7 +59,7 @@ def reached(records: Records) -> tuple[str, list[str]]:
 
     Parameters
     ----------
-    records : structured ndarray of `hpcclear.base.outcome.OUTCOME`, shape (n,)
+    records : structured ndarray of `hpcclear.base.outcome.record_type`, shape (n,)
         Of a scene with a target error.
     """
     short, good = missed(records), records["status"] == Status.OK
