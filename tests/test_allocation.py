@@ -17,7 +17,8 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.study import run_study
+from hpcclear.study import refinement, run_study
+from hpcclear.study.optimisation import Choice
 from hpcclear.study.surrogates import domain
 
 JOBS = pathlib.Path(__file__).parent.parent / "jobs"
@@ -184,15 +185,12 @@ def test_every_design_exists_and_samples_too(results):
     assert samples["duty"].attrs["options"] == "idle; full"
 
 
-def test_of_few_designs_no_finalist_is_verified_twice(results):
-    found = dataset.read(results / "verification.nc")
-    names = [n for n in found["design"].to_numpy() if "averaged" not in n and "best" not in n]
-    rows = found.sel(design=names)
-    designs = [
-        tuple(float(one[v]) for v in ("m2", "m3", "fit", "rod"))
-        for _, one in rows.groupby("design")
-    ]
-    assert len(set(designs)) == len(designs) > 2
+def test_of_equal_designs_of_a_case_the_first_is_kept():
+    first, twin, other = (
+        Choice(name, case, {"fit": 1.0})
+        for name, case in (("end", "one"), ("", "one"), ("", "another"))
+    )
+    assert refinement._distinct([first, twin, other]) == [first, other]
 
 
 def test_the_cheapest_design_is_that_of_enumeration(results):
