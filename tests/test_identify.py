@@ -385,7 +385,7 @@ def measured(tmp_path_factory, scene):
     folder = tmp_path_factory.mktemp("measured")
     for clearance in (42, 60):
         real = scene.with_({"joints.crank_rod.clearance": 1e-6 * clearance})
-        write_made(prepared_scene(real), folder / f"{clearance}.csv", ["crank_moment"], noise=0.1, revolutions=12)  # fmt: skip
+        write_made(real, folder / f"{clearance}.csv", ["crank_moment"], noise=0.1, revolutions=12)
     return [folder / "42.csv", folder / "60.csv"]
 
 

@@ -1,7 +1,9 @@
 """Functions written out as one text: it does what their calls do, holds what is on, and is kept for the next process."""
 
 import ast
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numba import njit
+from patience import crowded
 from running import scene_with
 from some_laws import effects_with
 
+from hpcclear.base import code_folder
 from hpcclear.base.jit import lane_function, scalar_function, written_kind
 from hpcclear.base.one_text import one_text, text_of
 from hpcclear.base.text.alike import written_once
@@ -208,3 +212,32 @@ def test_what_does_nothing_is_not_called():
     assert text == (
         "def scalar_one(c):\n    return c\n\ndef asked(e):\n    pass\n    return scalar_one(e) + scalar_one(e)"
     )
+
+
+def test_a_source_that_was_written_is_noticed_whatever_its_size_and_time(tmp_path):
+    path = tmp_path / "law.py"
+    path.write_text("k = 1.0\n")
+    about, before = path.stat(), code_folder._listing(tmp_path)
+    assert code_folder._listing(tmp_path) == before
+    path.write_text("k = 2.0\n")
+    os.utime(path, ns=(about.st_atime_ns, about.st_mtime_ns))
+    assert code_folder._listing(tmp_path) != before
+
+
+def test_the_key_of_the_sources_is_the_same_read_or_computed(tmp_path):
+    tmp_path.chmod(0o700)
+    code = "from hpcclear.base import code_folder as c; print(c.source_key(), c._place()[0])"
+    found, kept = [], None
+    for line in (None, "another key\n", "damaged", None):
+        if line is not None and kept is not None:
+            kept.write_text(line)
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "HPCCLEAR_CACHE": str(tmp_path)},
+            capture_output=True, text=True, check=True, timeout=crowded(120),
+        )  # fmt: skip
+        key, folder = done.stdout.split()
+        kept = Path(folder) / "sources"
+        assert kept.read_text().split()[1] == key
+        found.append(key)
+    assert set(found) == {code_folder.source_key()}

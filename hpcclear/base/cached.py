@@ -3,8 +3,8 @@
 The folder is this package's alone: of the host process, what Numba keeps where and compiles for what stays as it is.
 
 Before Numba loads machine code it imports its own library for compiled programs: arrays, strings, random numbers, linear
-algebra. That took a third of the start of a command, and code that is compiled already calls nothing of it. Numba imports it
-itself where it compiles.
+algebra; and with code in which a function of that library is written out, the module of that function. That took a third of the
+start of a command, and code that is compiled already calls nothing of it. Numba imports it itself where it compiles.
 """
 
 from collections.abc import Iterator
@@ -13,6 +13,7 @@ from types import MethodType
 from typing import Any
 
 from numba import config, njit
+from numba.core import environment
 from numba.core.caching import Cache
 from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
@@ -25,14 +26,14 @@ from hpcclear.base.width import asked_width, features
 
 
 @contextmanager
-def _set(name: str, value: object) -> Iterator[None]:
+def _set(name: str, value: object, owner: object = config) -> Iterator[None]:
     """Have a setting of Numba inside the block, and the host's own behind it."""
-    before = getattr(config, name)
-    setattr(config, name, value)
+    before = getattr(owner, name)
+    setattr(owner, name, value)
     try:
         yield
     finally:
-        setattr(config, name, before)
+        setattr(owner, name, before)
 
 
 def _prepare() -> None:
@@ -53,16 +54,33 @@ def features_in_use() -> str:
     return str(cpu_target.target_context.codegen()._tm_features)
 
 
+def _environment(module: str, constants: list[object], name: str) -> environment.Environment:
+    """Make what machine code finds its module and its Python objects by. In place of `environment._rebuild_env`.
+
+    Of Numba's own functions without such objects only the name of the module is used.
+    """
+    if constants or not module.startswith("numba.") or environment.lookup_environment(name):
+        return _usual_environment(module, constants, name)
+    made = environment.Environment({"__name__": module})
+    made.env_name = name
+    environment.Environment._memo[name] = made  # as Numba does: one for each name
+    return made
+
+
+_usual_environment: Any = getattr(environment, "_rebuild_env", None)
+
+
 def _load_overload(cache: Any, signature: Any, context: Any) -> Any:
     """Load the machine code of a signature; None where it is not on disk. In place of `Cache.load_overload`."""
     rtsys.initialize(context)  # counts of references, which compiled code links to
-    with cache._guard_against_spurious_io_errors():
+    with cache._guard_against_spurious_io_errors(), _set("_rebuild_env", _environment, environment):
         return cache._load_overload(signature, context)
 
 
 def _lightly(compiled: Any) -> Any:
     """Give one function this way of loading; Numba's own stays where a version of it has other names."""
-    if isinstance(compiled._cache, Cache) and hasattr(Cache, "_load_overload"):
+    known = hasattr(Cache, "_load_overload") and _usual_environment is not None
+    if known and isinstance(compiled._cache, Cache):
         compiled._cache.load_overload = MethodType(_load_overload, compiled._cache)
     return compiled
 

@@ -5,6 +5,7 @@ the folder's name holds a hash of all sources and of the versions that shape the
 so the folder must belong to the user and be closed to others.
 """
 
+import contextlib
 import hashlib
 import os
 import platform
@@ -42,40 +43,69 @@ def _compiles(source: bytes) -> bool:
 
 @cache
 def source_key() -> str:
-    """Hash of the sources that are compiled and of the versions that shape compiled code (16 hex digits)."""
+    """Hash of the sources that are compiled and of the versions that shape compiled code (16 hex digits).
+
+    Read again where a source was written since; reading all of them takes a fortieth of a start.
+    """
     root = Path(__file__).parent.parent
+    versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
+    seen = hashlib.sha256(repr((str(root), versions, _listing(root))).encode()).hexdigest()
+    kept = _place()[0] / "sources"
+    with contextlib.suppress(OSError, ValueError):
+        before, key = kept.read_text().split()
+        if before == seen:
+            return key
     digest = hashlib.sha256()
     for path in _compiled_sources(root):
         digest.update(str(path.relative_to(root)).encode())
         digest.update(path.read_bytes())
-    versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
     for version in versions:
         digest.update(version.encode())
     digest.update(str(root).encode())
-    return digest.hexdigest()[:16]
+    key = digest.hexdigest()[:16]
+    with contextlib.suppress(OSError):  # another process reads the old file or the new one
+        part = kept.with_name(f"sources.{os.getpid()}.part")
+        part.write_text(f"{seen} {key}\n")
+        os.replace(part, kept)
+    return key
 
 
-def cache_folder() -> Path:
-    """Return this user's private folder for compiled code of these sources, made if need be.
+def _listing(root: Path) -> list[tuple[str, int, int, int, int]]:
+    """Path, size, number, and times of the last write and change of every source, in order: no write leaves all as they are."""
+    found, folders = [], [str(root)]
+    while folders:
+        with os.scandir(folders.pop()) as entries:
+            for one in entries:
+                if one.name.endswith(".py"):
+                    s = one.stat()
+                    found.append((one.path, s.st_size, s.st_ino, s.st_mtime_ns, s.st_ctime_ns))
+                elif one.name != "__pycache__" and one.is_dir():
+                    folders.append(one.path)
+    return sorted(found)
+
+
+@cache
+def _place() -> tuple[Path, bool]:
+    """The user's ``NUMBA_CACHE_DIR`` and True, or where that cannot be written to this package's own folder.
 
     Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
     """
-    folder = private_folder("HPCCLEAR_CACHE") / source_key()
-    folder.mkdir(mode=0o700, exist_ok=True)
-    return folder
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    why = unwritable(Path(named)) if named else ""
+    if named and not why:
+        return Path(named), True
+    folder = private_folder("HPCCLEAR_CACHE")
+    if named:
+        remark(
+            f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}"
+        )
+    return folder, False
 
 
 @cache
 def chosen_folder() -> str:
-    """Return the user's ``NUMBA_CACHE_DIR`` if it can be written to, else this package's own folder."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    if not named:
-        return str(cache_folder())
-    why = unwritable(Path(named))
-    if not why:
-        return named
-    folder = str(cache_folder())
-    remark(
-        f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}"
-    )
-    return folder
+    """Return the folder of compiled code, made if need be: the user's, or one of these sources in this package's own."""
+    place, named = _place()
+    folder = place if named else place / source_key()
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return str(folder)

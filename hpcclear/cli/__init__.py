@@ -6,6 +6,7 @@ known to the target error.
 
 import contextlib
 import io
+import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -111,6 +112,8 @@ def main(arguments: list[str] | None = None) -> None:
     listen(say)
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     pin_threads()  # before numpy is imported: ranks fill the cores, not threads
+    # no plug-ins for pydantic, for which it looks through all that is installed
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "true")
     with StopSwitch(ends_process=True) as stop, _numbers_in_silence():
         try:
             check_address_space()

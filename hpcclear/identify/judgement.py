@@ -33,7 +33,6 @@ class Prepared:
 
     ensemble: Ensemble
     layouts: tuple[Layout, ...]
-    sensor: Sensor
     summaries: tuple[Regression, ...]
     expected: Expected
     """Features, in units of their noise, that members with the same summaries have."""
@@ -42,8 +41,6 @@ class Prepared:
     """Mean of the features over the ensemble, and their noise, shape (p,) each."""
     model: Model
     calibration: Calibration
-    columns: tuple[int, ...]
-    """Inputs that the models have, columns of the places."""
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -129,21 +126,19 @@ def _prepared(
     clean, own = members_of(ensemble, layouts, sensor, frequency)
     size, unknowns = ensemble.inputs.size, len(ensemble.inputs.unknowns)
     further = [size + k for k, error in enumerate((sensor.gain_error, sensor.angle_error)) if error]
-    columns = (*range(size), *further)
-    places = ensemble.places[:, list(columns)]
+    places = ensemble.places[:, [*range(size), *further]]
     rng = np.random.default_rng([seed, 0x6964])
     features = as_measured(clean, own, variance, rng)
     orders = np.concatenate([one.highest for one in layouts])
     summaries = informative(regressions(features, variance, orders, places), places)
     centre = features.mean(axis=0)
-    unit = np.sqrt(variance + FLOOR**2 * features.var(axis=0)) + 1e-300
+    unit = np.sqrt(variance + FLOOR**2 * features.var(axis=0))
+    unit = np.maximum(unit, 1e-9 * unit.max() + 1e-300)  # of features that are always the same
     left_out = np.column_stack([one.left_out for one in summaries])
     expected = Expected.of(left_out, (features - centre) / unit, rng)
     model = Model.of(places, left_out, expected.left, unknowns, rng)
     calibration = Calibration.of(model, unknowns, members, PARTICLES_OF_A_MEMBER, (seed, 0x63616C))
-    return Prepared(
-        ensemble, tuple(layouts), sensor, summaries, expected, centre, unit, model, calibration, columns
-    )  # fmt: skip
+    return Prepared(ensemble, tuple(layouts), summaries, expected, centre, unit, model, calibration)
 
 
 def as_measured(features: Array, own: Array, variance: Array, rng: np.random.Generator) -> Array:
@@ -160,7 +155,7 @@ def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTIC
         rest = (values - mean) / prepared.unit
         found = prepared.model.posterior(summaries, particles, rng)
         doubt = prepared.calibration.doubt(prepared.model.fit(rest))
-        deviation = prepared.unit * np.sqrt((prepared.model.rest**2).mean(axis=0))
+        deviation = prepared.unit * np.sqrt((prepared.model.rest**2).mean(axis=0) + 1e-12)
     inputs, unknowns = prepared.ensemble.inputs, len(prepared.ensemble.inputs.unknowns)
     middle = np.median(found[:, :unknowns], axis=0)
     wide = found.copy()

@@ -133,14 +133,11 @@ class Calibration:
         Share of members whose truth lies in the 95 % interval before widening.
     fits : ndarray, shape (members,)
         As of `Model.fit`.
-    half_width : ndarray, shape (members, unknowns)
-        Of the widened intervals, as shares of the bounds' range.
     """
 
     widening: Array
     coverage: Array
     fits: Array
-    half_width: Array
 
     @classmethod
     def of(
@@ -149,7 +146,7 @@ class Calibration:
         """Treat the first members as machines."""
         count = min(members, len(model.places))
         groups = _groups(len(model.places))
-        out, half, fits = [], [], []
+        out, fits = [], []
         for k in range(count):
             rng = np.random.default_rng([*seeds, 1, k])
             found = model.posterior(model.summaries[k], particles, rng, int(groups[k]))
@@ -157,12 +154,11 @@ class Calibration:
             truth = model.places[k, :unknowns]
             side = np.where(truth < middle, middle - low, high - middle)
             out.append(np.abs(truth - middle) / np.maximum(side, 1e-9))
-            half.append(0.5 * (high - low))
             fits.append(model.fit(model.rest[k], int(groups[k])))
         score = np.sort(np.array(out), axis=0)
         rank = min(int(np.ceil(0.95 * (count + 1))), count) - 1
         widening = np.maximum(score[rank], 1.0)
-        return cls(widening, (score <= 1.0).mean(axis=0), np.array(fits), np.array(half) * widening)
+        return cls(widening, (score <= 1.0).mean(axis=0), np.array(fits))
 
     def doubt(self, fit: float) -> float:
         """Logarithmic standard score of a fit among those of the members."""

@@ -244,7 +244,9 @@ class Kept:
         self.add(earlier)
 
     def add(self, records: np.ndarray) -> None:
-        """Take finished records."""
+        """Take finished records; raises TypeError for those of another type, whose fields NumPy would assign by their order."""
+        if records.dtype != self._records.dtype:
+            raise TypeError(f"records are of type {records.dtype}, not {self._records.dtype}")
         self._records[records["sample"]] = records
         self._there[records["sample"]] = True
 

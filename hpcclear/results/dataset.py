@@ -297,7 +297,7 @@ def _bands_of(records: np.ndarray) -> np.ndarray:
 
 
 def records(samples: Results) -> np.ndarray:
-    """The outcome records in a dataset of kind ``samples``, shape (n,), with the fields that it has."""
+    """The outcome records in results of kind ``samples``, shape (n,), with the fields that it has."""
     asked = {FIELDS[str(name)].when for name in samples.variables if name in FIELDS}
     kind = record_type(samples.sizes["joint"], samples.sizes.get("band", 0), asked)
     found = unknown(samples.sizes["sample"], kind)
@@ -389,7 +389,7 @@ def read(
 def content_in(
     path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
 ) -> Content:
-    """Read a result file as `read` does, without xarray."""
+    """Read a result file as `read` does, without xarray; raises InputError as it does."""
     place = _path(path)
     content = netcdf.load(place)
     now = {old: new for new, old in FORMER.items() if new not in content}

@@ -2,6 +2,7 @@
 
 import functools
 import platform
+import re
 from importlib import metadata
 
 from hpcclear.base import host
@@ -34,13 +35,20 @@ def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, s
 
 @functools.cache
 def _version() -> str:
-    return metadata.version("hpcclear")
+    return _version_of("hpcclear")
 
 
 @functools.cache
 def _versions() -> str:
     found = [f"python {platform.python_version()}"]
-    return ", ".join(found + [f"{name} {metadata.version(name)}" for name in _PACKAGES])
+    return ", ".join(found + [f"{name} {_version_of(name)}" for name in _PACKAGES])
+
+
+def _version_of(package: str) -> str:
+    """The version of an installed package, without a parser of all that is said about it."""
+    said = metadata.distribution(package).read_text("METADATA") or ""
+    found = re.search(r"^Version: (\S+)", said, re.M)
+    return found[1] if found else metadata.version(package)
 
 
 @functools.cache

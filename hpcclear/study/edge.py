@@ -100,6 +100,11 @@ def simulations(study: Study) -> int:
     return found
 
 
+def designs(study: Study) -> int:
+    """Designs at the edge of all cases that are verified, at most."""
+    return sum(len(AIMS) if of_failures(case) else ROUNDS for case in cases_of(study))
+
+
 def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> Result:
     """Designs at the edge of each case, from what the search knows of it.
 

@@ -148,6 +148,7 @@ class Evaluator:
             )
         self._problem = problem
         self._record, self._pressed = record_of(scene), has_pressure(scene)
+        self._asked = self._record, responses_reported(problem), scene.objective
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._values: dict[int, Array] = {}  # of what runs, for its pressures
         self._partial: dict[int, Records] = {}
@@ -182,10 +183,7 @@ class Evaluator:
         """Work for about `seconds`; return the records of what finished meanwhile."""
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
-        responses = responses_reported(self._problem)
-        records = outcome_records(
-            labels, outcome, par, self._record, responses, self.scene.objective
-        )
+        records = outcome_records(labels, outcome, par, *self._asked)
         if self._pressed:
             nothing = np.zeros(len(self._columns.names))
             values = [self._values.pop(label, nothing) for label in labels.tolist()]
