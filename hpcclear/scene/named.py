@@ -143,12 +143,12 @@ class NamedInput(Table):
         return cls._in_si(row, paths)
 
     @classmethod
-    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, Any]:
+    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, object]:
         """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
         return data
 
     @classmethod
-    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
+    def _in_si(cls, row: dict[str, object], paths: tuple[str, ...]) -> dict[str, object]:
         """The row with the entries whose unit follows from its paths in SI."""
         raise NotImplementedError
 
