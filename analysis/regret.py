@@ -3,9 +3,10 @@
     python analysis/regret.py OUT                      # ten studies, an hour on one core; writes analysis/results/regret.csv
     python analysis/regret.py OUT press my_study.toml  # some of them, or a scene with one case of one's own
 
-Each study is carried out with models of f (`study.surrogate.of = "f"`) and of the statistics over designs. The reference
+Each study is carried out with models of f (`study.surrogate.of = "f"`) and of the statistics over designs; `by_default` is 1
+for the one that is taken if a study does not say, by R2 of the surrogate of f. The reference
 goes on from both: a search by expected improvement with `WIDE` more designs and `ROUNDS` times `BATCH` further ones, each of
-`POINTS` simulations. These are five times the simulations of the search of a study; a hundred times would take a day.
+`POINTS` simulations: three times as many simulations as either search has. A hundred times as many would take some hours.
 What counts is what a study recommends by: the first objective, or mean + 2 standard deviations where both are minimised.
 
 The best designs of the reference are compared by `CHOSEN` simulations each. The best of them and the recommended ones
@@ -311,9 +312,13 @@ def main() -> None:
             table = csv.DictWriter(file, FIELDS)
             table.writeheader()
             table.writerows(rows)
-    for of in ("f", "statistics"):
-        regret = np.array([row["regret"] for row in rows if row["searched_by"] == of])
-        print(f"{of}: regret {np.median(regret):.2%} in the median, {regret.max():.2%} at most")
+    for of in ("f", "statistics", "default"):
+        some = [
+            row["regret"]
+            for row in rows
+            if of == row["searched_by"] or (of == "default" and row["by_default"])
+        ]
+        print(f"{of}: regret {np.median(some):.2%} in the median, {max(some):.2%} at most")
 
 
 def measured(
@@ -350,10 +355,12 @@ def measured(
         scale = abs(values[least])
         regret = (values[row] - values[least]) / scale
         error = float(spread((shifts[row] - shifts[least])[None])[0]) / scale
+        r2 = float(models.r2[-1])
         told = (
             label,
             of,
-            round(float(models.r2[-1]), 3),
+            int((of == "statistics") == (r2 < refinement.ROUGH)),
+            round(r2, 3),
             count,
             said,
             f"{values[least]:.6g}",

@@ -184,6 +184,17 @@ def test_every_design_exists_and_samples_too(results):
     assert samples["duty"].attrs["options"] == "idle; full"
 
 
+def test_of_few_designs_no_finalist_is_verified_twice(results):
+    found = dataset.read(results / "verification.nc")
+    names = [n for n in found["design"].to_numpy() if "averaged" not in n and "best" not in n]
+    rows = found.sel(design=names)
+    designs = [
+        tuple(float(one[v]) for v in ("m2", "m3", "fit", "rod"))
+        for _, one in rows.groupby("design")
+    ]
+    assert len(set(designs)) == len(designs) > 2
+
+
 def test_the_cheapest_design_is_that_of_enumeration(results):
     """Of all fits, rods and masses the least cost for which some mass of the rod keeps both constraints."""
     scene, found = all_kinds(), dataset.read(results / "verification.nc")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ENDS
+from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike
 from hpcclear.report.answer import bounds, unit_of
 from hpcclear.report.figures import labels
@@ -15,7 +15,6 @@ from hpcclear.report.merit import (
     VERDICTS,
     counts,
     goals_of,
-    is_plain,
     recommended,
     standing,
 )
@@ -97,10 +96,11 @@ def _role(end: str, own: xr.Dataset) -> str:
     """What an end of a front is called, with its name in the files."""
     if end == "original":
         return "baseline"
-    words = ("lowest mean", "lowest std. dev.")
-    if is_plain(own) and end in ENDS[:2]:
-        return f"{words[ENDS.index(end)]} ({end})"
-    return f"lowest objective {ENDS.index(end) + 1} ({end})"
+    place = ENDS.index(end)
+    name = f"{ORDINALS[place]}_goal"
+    goal = labels.statistic(str(own[name].item()) if name in own else USUAL[place])
+    words = goal.removesuffix(" of f").replace("standard deviation", "std. dev.")
+    return f"lowest {words} ({end})"
 
 
 def masses(verified: xr.Dataset) -> list[xr.DataArray]:

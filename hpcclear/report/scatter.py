@@ -45,12 +45,15 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     if together.any():
         joined = "+".join(map(str, names[together])) + " (correlated)"
         parts.append((joined, *(one[together][0] for one in shares)))
-    rest = float(own["unexplained"])
-    yield Line(
-        "contributions",
-        f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}. "
-        f"The cubic fit does not explain {rest:.0%}: finer structure of f, interactions of three inputs, chaotic motion",
+    text = (
+        f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}"
     )
+    if (rest := float(own["unexplained"])) >= 0.005:
+        text += (
+            f". The cubic fit does not explain {rest:.0%}: finer structure of f, interactions of three inputs, chaotic "
+            "motion"
+        )
+    yield Line("contributions", text)
     each = [(str(names[k]), *(one[k] for one in falls)) for k in range(len(rows))]
     yield Line(
         "tolerances",

@@ -156,7 +156,8 @@ def search(
         last = {name: its[-1] for name, its in met.items()}
         known = {name: (one.coordinates, one.values, one.excess) for name, one in last.items()}
         finalists += edge.choices_of(run, run.stage("edge", edge.approach, known))
-    return finalists, remarks
+    named = _distinct(named)  # where designs are few, several finalists are one
+    return _distinct([*named, *finalists])[len(named) :], remarks
 
 
 def _end_at_edges(run: StudyRun, met: Mapping[str, list[Tried]]) -> None:
@@ -230,10 +231,11 @@ def _begin_wide(run: StudyRun, start: Sequence[Choice]) -> Result:
 
 
 def _distinct(choices: Sequence[Choice]) -> list[Choice]:
-    """Of equal designs the first."""
-    return list({tuple(choice.design.values()): choice for choice in reversed(choices)}.values())[
-        ::-1
-    ]
+    """Of equal designs of a case the first."""
+    found: dict[object, Choice] = {}
+    for choice in choices:
+        found.setdefault((choice.case, *choice.design.values()), choice)
+    return list(found.values())
 
 
 def _go_on(

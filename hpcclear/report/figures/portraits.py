@@ -241,6 +241,7 @@ def _equal(axes: "Axes", unit: labels.Scale, reach: float | None = None) -> None
     """Equal scales, the bearing centre in the middle."""
     if reach is None:
         reach = 1.05 * float(np.abs(axes.dataLim.get_points()).max())
+    reach = reach or 1.0  # a joint without clearance stays in the middle
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_xlabel(unit.label("eccentricity x"))
     axes.set_ylabel(unit.label("eccentricity y"))
