@@ -414,7 +414,7 @@ def identified(measured, tmp_path_factory):
         done = CliRunner().invoke(cli, words, standalone_mode=False)
     assert done.exception is None, done.output
     assert len(calls) == 3  # the finished half was not simulated again
-    return place, done.output, done.return_value, words
+    return place, done.output, done.exit_code, words
 
 
 def test_the_command_prints_intervals_growth_and_advice(identified):
@@ -468,7 +468,7 @@ def test_the_same_command_finds_it_finished_and_another_is_refused(identified):
     assert again.exception is None
     assert place.read_bytes() == before
     other = CliRunner().invoke(cli, [*words, "--noise", "0.1"], standalone_mode=False)
-    assert other.return_value == 2
+    assert other.exit_code == 2
     assert "another run" in " ".join(other.output.split())
 
 
