@@ -503,7 +503,7 @@ def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, 
 
 
 def test_the_table_of_the_page_is_that_of_the_machines():
-    """`python analysis/identify_machines.py results/machines --rows analysis/identify_machines.json`."""
+    """`python analysis/identify_machines.py results/machines --rows analysis/identify_machines.json --page ...`."""
     rows = json.loads((ROOT / "analysis" / "identify_machines.json").read_text(encoding="utf-8"))
     page = (ROOT / "docs" / "how-to" / "identify.md").read_text(encoding="utf-8")
     assert [row["machine"] for row in rows] == list(range(200))
