@@ -76,7 +76,7 @@ FEATURES = {
         "study/launched.py base/host.py",
     "statistics of millions of samples, parts of arrays":
         "statistics/streams/* ensemble/statistics.py ensemble/raw.py ensemble/split.py ensemble/parts.py "
-        "ensemble/bundles.py",
+        "ensemble/bundles.py scene/pages.py ranks/nodes.py",
     "killed runs, lost ranks, damaged files":
         "ranks/watch.py ranks/mailbox.py results/lock.py results/faults.py results/checkpoint.py base/private.py "
         "results/places.py",

@@ -414,7 +414,7 @@ def identified(measured, tmp_path_factory):
         done = CliRunner().invoke(cli, words, standalone_mode=False)
     assert done.exception is None, done.output
     assert len(calls) == 3  # the finished half was not simulated again
-    return place, done.output, done.return_value, words
+    return place, done.output, done.exit_code, words
 
 
 def test_the_command_prints_intervals_growth_and_advice(identified):
@@ -468,7 +468,7 @@ def test_the_same_command_finds_it_finished_and_another_is_refused(identified):
     assert again.exception is None
     assert place.read_bytes() == before
     other = CliRunner().invoke(cli, [*words, "--noise", "0.1"], standalone_mode=False)
-    assert other.return_value == 2
+    assert other.exit_code == 2
     assert "another run" in " ".join(other.output.split())
 
 
@@ -503,7 +503,7 @@ def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, 
 
 
 def test_the_table_of_the_page_is_that_of_the_machines():
-    """`python analysis/identify_machines.py results/machines --rows analysis/identify_machines.json`."""
+    """`python analysis/identify_machines.py results/machines --rows analysis/identify_machines.json --page ...`."""
     rows = json.loads((ROOT / "analysis" / "identify_machines.json").read_text(encoding="utf-8"))
     page = (ROOT / "docs" / "how-to" / "identify.md").read_text(encoding="utf-8")
     assert [row["machine"] for row in rows] == list(range(200))

@@ -3,8 +3,6 @@
 For integrators that are not the kernel's. A state is y = (q, v, integrals of the absolute gaps of the joints).
 """
 
-from typing import Any
-
 import numpy as np
 
 from hpcclear.base.arrays import Array
@@ -101,7 +99,10 @@ class Equations:
         self.contacts = start.contacts.copy()
         self._origin = start
         self.calls = 0
-        self._head: tuple[Any, ...] = (problem.motion(problem.effects, 1).address, problem.tables)
+        self._head: tuple[object, ...] = (
+            problem.motion(problem.effects, 1).address,
+            problem.tables,
+        )
         self._seen = new_seen(n, par, self.size)
 
     def anew(self) -> "Equations":

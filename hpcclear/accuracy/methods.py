@@ -260,7 +260,7 @@ def _largest_force(one: Equations, piece: object) -> float:
 
 def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
     """Every method that can integrate this scene, the kernel's first."""
-    wanted: list[tuple[str, int, dict[str, Any]]] = [
+    wanted: list[tuple[str, int, dict[str, object]]] = [
         ("tsitouras", 1, {"formulation": "minimal", "method": "tsitouras"}),
         (
             f"tsitouras, {DEFAULT_LANES} lanes",

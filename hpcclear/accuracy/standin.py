@@ -1,7 +1,5 @@
 """A study for scenes that have none, or none with random inputs: what surrogates and moments are measured on."""
 
-from typing import Any
-
 from hpcclear.accuracy.looked_at import mass_of
 from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES
@@ -44,7 +42,7 @@ def _by_quadrature(scene: Scene) -> Scene:
     return scene.with_({"study.swarm.statistics": "quadrature"})
 
 
-def _variables(scene: Scene) -> dict[str, Any]:
+def _variables(scene: Scene) -> dict[str, object]:
     """Rod mass, slider mass and the clearances, each about the scene's value; of a linkage, the mass of one body."""
     if scene.template is None:
         gaps = [path for path in scene.numeric_paths() if path.endswith(".clearance")]
@@ -60,6 +58,6 @@ def _variables(scene: Scene) -> dict[str, Any]:
     return {name: _about(scene, path) for name, path in first.items()}
 
 
-def _about(scene: Scene, path: str) -> dict[str, Any]:
+def _about(scene: Scene, path: str) -> dict[str, object]:
     value = scene.number(path)
     return {"range": [(1.0 - WIDTH) * value, (1.0 + WIDTH) * value]}

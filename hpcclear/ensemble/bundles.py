@@ -43,7 +43,7 @@ def bundle_length(
 
 
 class Bundles:
-    """A leader's bundles, shared out as samples; see `hpcclear.ranks.leading.Sharing`.
+    """A leader's bundles, shared out as samples; see `hpcclear.ranks.schedule.Sharing`.
 
     Parameters
     ----------

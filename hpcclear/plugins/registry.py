@@ -13,7 +13,7 @@ from hpcclear.plugins.sources import REFERENCE, digest, note_package, run_source
 class _Offered(NamedTuple):
     """What an installed package offers."""
 
-    value: Any
+    value: object
     package: str
     version: str
 
@@ -33,8 +33,8 @@ class Registry:
 
     def __init__(self, kind: str, group: str, needs: tuple[str, ...] = ()) -> None:
         self.kind, self.group, self.needs = kind, group, needs
-        self._ours: dict[str, Any] = {}
-        self._families: list[tuple[re.Pattern[str], Callable[[re.Match[str]], Any]]] = []
+        self._ours: dict[str, object] = {}
+        self._families: list[tuple[re.Pattern[str], Callable[[re.Match[str]], object]]] = []
         self._offered: dict[str, _Offered] = {}
 
     def add(self, name: str, target: object) -> None:
@@ -42,7 +42,7 @@ class Registry:
         assert name not in self._ours, f"two {self.kind}s are called {name}"
         self._ours[name] = target
 
-    def add_family(self, names: re.Pattern[str], maker: Callable[[re.Match[str]], Any]) -> None:
+    def add_family(self, names: re.Pattern[str], maker: Callable[[re.Match[str]], object]) -> None:
         """Offer ours that a number in their name makes: a pattern of their names, and what makes one of a match."""
         self._families.append((names, maker))
 
@@ -101,14 +101,14 @@ class Registry:
         text = (texts_in_use() if texts is None else texts)[module]
         return f"{module}.py, SHA-256 {digest(text)[:12]}"
 
-    def _of_ours(self, name: str) -> Any:
+    def _of_ours(self, name: str) -> object:
         target = self._ours[name]
         if isinstance(target, str):
             module, _, attribute = target.partition(":")
             self._ours[name] = target = getattr(importlib.import_module(module), attribute)
         return target
 
-    def _of_file(self, name: str, module: str, attribute: str, texts: Mapping[str, str]) -> Any:
+    def _of_file(self, name: str, module: str, attribute: str, texts: Mapping[str, str]) -> object:
         if module not in texts:
             remedy = f"Write {module}.py into the folder of the scene file. {self._known(name)}"
             raise InputError(
@@ -122,7 +122,7 @@ class Registry:
             )
         return getattr(made, attribute)
 
-    def _installed(self, name: str) -> Any:
+    def _installed(self, name: str) -> object:
         if name not in self._offered:
             points = list(entry_points(group=self.group, name=name))
             if not points:

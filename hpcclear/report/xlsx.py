@@ -90,7 +90,7 @@ def _add(archive: zipfile.ZipFile, name: str, text: str, stored: bool = False) -
     archive.writestr(about, text.encode())
 
 
-def _sheet(rows: Iterable[Sequence[Any]]) -> str:
+def _sheet(rows: Iterable[Sequence[object]]) -> str:
     lines = "".join(f"<row>{''.join(map(_cell, row))}</row>" for row in rows)
     return f'{_HEAD}<worksheet xmlns="{_MAIN}">{_PANE}<sheetData>{lines}</sheetData></worksheet>'
 

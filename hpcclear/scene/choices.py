@@ -5,7 +5,7 @@ designs are simulated (`expanded`).
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import model_validator
@@ -68,7 +68,7 @@ class Row(Table):
         return {**kept, "entries": entries}
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+def _flat(table: Mapping[str, object], prefix: str = "") -> list[tuple[str, object]]:
     """Dotted keys, whether the file has them quoted or as nested tables."""
     found = []
     for key, value in table.items():

@@ -90,7 +90,7 @@ def entry_replaced(content: Mapping[str, object], path: str, value: object) -> d
     return made
 
 
-def _at(content: object, path: str) -> Any:
+def _at(content: object, path: str) -> object:
     for key in path.split("."):
         content = content.get(key) if isinstance(content, Mapping) else None
     return content
@@ -98,7 +98,7 @@ def _at(content: object, path: str) -> Any:
 
 def _rows_of_fits(
     content: Mapping[str, object],
-) -> Iterator[tuple[str, Mapping[str, Any], list[Mapping[str, Any]]]]:
+) -> Iterator[tuple[str, Mapping[str, object], list[Mapping[str, object]]]]:
     """Random inputs of the distribution "fit": names, rows, and the open joints whose clearances they drive."""
     rows = _at(content, "study.random")
     for name, row in rows.items() if isinstance(rows, Mapping) else ():

@@ -130,7 +130,7 @@ def scene_of_text(text: str, name: str) -> Scene:
     return scene.with_(changes) if changes else scene
 
 
-def _change(line: str) -> tuple[str, Any]:
+def _change(line: str) -> tuple[str, object]:
     """Path and value of a note that `Scene.with_` left."""
     path, _, value = line.removeprefix(_CHANGE).partition(" = ")
     try:
@@ -185,7 +185,7 @@ def _read(
         ) from None
 
 
-def parse(text: str, name: str) -> dict[str, Any]:
+def parse(text: str, name: str) -> dict[str, object]:
     """The tables of a TOML text, whatever it holds; `name` says in errors where it stands.
 
     Raises
@@ -215,7 +215,7 @@ def parse(text: str, name: str) -> dict[str, Any]:
         raise InputError("scene file", name, f"is not valid TOML: {error}", remedy) from None
 
 
-def _override(text: str) -> tuple[str, Any]:
+def _override(text: str) -> tuple[str, object]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not dotted(key):
         raise InputError(

@@ -29,7 +29,9 @@ BY_TIME = {
 """Entries that are tables against the time."""
 
 
-def with_values(content: Mapping[str, object], folder: Path) -> tuple[Mapping[str, Any], list[str]]:
+def with_values(
+    content: Mapping[str, object], folder: Path
+) -> tuple[Mapping[str, object], list[str]]:
     """The content of a scene with what files hold in the place of their names, and a sentence for each.
 
     Parameters
@@ -63,7 +65,7 @@ def with_values(content: Mapping[str, object], folder: Path) -> tuple[Mapping[st
     return content, read_as
 
 
-def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, Any]]:
+def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, object]]:
     """Return the tables of a parsed scene that name a file, by their dotted keys."""
     return dict(_named(content, prefix))
 

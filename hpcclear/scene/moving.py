@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pydantic_core import PydanticCustomError
 
@@ -81,7 +81,7 @@ class Moving:
         return found
 
     @cached_property
-    def _made(self) -> dict[tuple[Any, ...], quantiles.Quantiles]:
+    def _made(self) -> dict[tuple[object, ...], quantiles.Quantiles]:
         """Distributions that were made: those of fits are tables."""
         return {}
 

@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import GetJsonSchemaHandler
 from pydantic_core import CoreSchema
@@ -59,7 +59,7 @@ class PluginName(Converted):
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         other = {"type": "string", "description": 'of a package, or "module:Name" of a file'}
         return {"anyOf": [{"enum": list(self.registry.ours())}, other]}
 
@@ -96,7 +96,9 @@ def modules_named(content: object) -> set[str]:
     return {module for one in inner for module in modules_named(one)}
 
 
-def with_texts(content: Mapping[str, object], read: Callable[[str], str | None]) -> dict[str, Any]:
+def with_texts(
+    content: Mapping[str, object], read: Callable[[str], str | None]
+) -> dict[str, object]:
     """The content with the texts of the modules that it names.
 
     `read` gives a module's text, None where there is no such file: whatever wants it says so.

@@ -6,7 +6,7 @@ them; names never decide a default, only what a variable drives does.
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -175,7 +175,7 @@ class MomentAccuracy(Table):
 MOMENTS = ("mean", "deviation")
 
 
-def of_both(entry: object) -> Any:
+def of_both(entry: object) -> object:
     """A number as the accuracy of mean and standard deviation; of a table with one of them, the other is the same.
 
     Raises

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.numbered import Rows
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 
@@ -20,25 +21,25 @@ class Effects(NamedTuple):
     """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
 
     joints: Any = None  # how many have clearance
-    first: Any = 0  # place of the first of them; the others follow
+    first: int = 0  # place of the first of them; the others follow
     contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
     friction: Any = None
-    torque: Any = None  # the body that gives the period is free, driven by a torque
-    baumgarte: Any = None  # Cartesian coordinates with multipliers instead of minimal ones
-    energies: Any = None  # energy balance
-    series: Any = None  # friction forces and crank moment, for time series
-    responses: Any = None  # mean contact forces, drive moment, followed acceleration of each sample
-    impacts: Any = None  # measures of impact and noise of each sample
-    sliding: Any = None  # kinks of the laws, for the implicit method
-    swinging: Any = None  # the drive that gives the period does not turn round
-    wear: Any = None  # sliding work of the joints with clearance
+    torque: int | None = None  # the body that gives the period is free, driven by a torque
+    baumgarte: int | None = None  # Cartesian coordinates with multipliers instead of minimal ones
+    energies: int | None = None  # energy balance
+    series: int | None = None  # friction forces and crank moment, for time series
+    responses: int | None = None  # mean forces, drive moment, followed acceleration of each sample
+    impacts: int | None = None  # measures of impact and noise of each sample
+    sliding: int | None = None  # kinks of the laws, for the implicit method
+    swinging: int | None = None  # the drive that gives the period does not turn round
+    wear: int | None = None  # sliding work of the joints with clearance
     waves: Any = (
         None  # surfaces that are out of round; how many waves around bearing and journal have:
     )
-    bearing_waves: Any = None
-    journal_waves: Any = None
+    bearing_waves: int | None = None
+    journal_waves: int | None = None
     threshold: Any = None  # of the pressure, below which nothing wears
-    profile: Any = None  # where around these the sliding work is done
+    profile: int | None = None  # where around these the sliding work is done
     films: Any = None  # names of laws of oil films, by places of joints
     objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
 
@@ -431,45 +432,45 @@ class Block(NamedTuple):
 
     `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
 
-    work: Any
-    stages: Any
-    par: Any
+    work: Array
+    stages: Array
+    par: Array
     book: Any
 
 
 class Queue(NamedTuple):
     """Samples to come and samples done: parameters, starts, outcomes, slots in the order they finished, counters."""
 
-    par: Any
-    start: Any
-    out: Any
-    finished: Any
-    counters: Any
+    par: Array
+    start: Array
+    out: Array
+    finished: Integers
+    counters: Integers
 
 
 class Method(NamedTuple):
     """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
     which a stepper calls what is compiled apart from it (`stepping.special`)."""
 
-    settings: Any
-    weights: Any
-    tables: Any  # (TABLES,)
-    measures: Any  # as `measures_of`
-    numbers: Any
+    settings: Array
+    weights: Array
+    tables: Array  # (TABLES,)
+    measures: Array  # as `measures_of`
+    numbers: Integers
 
 
 class Rules(NamedTuple):
     """What a stepper has to know of the effects, as numbers 0 and 1: they change no compiled code."""
 
-    latched: Any  # impacts are located, and their speed is kept
-    free: Any  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
-    turning: Any  # its angle is a coordinate, whoever drives it
-    responses: Any
-    impacts: Any  # contacts are counted
-    profile: Any  # where around joints sliding work is done is recorded
-    largest: Any  # the objective is made of the largest value of its rate
-    begin: Any  # places of open joints, from `begin` on
-    end: Any  # and before `end`
+    latched: int  # impacts are located, and their speed is kept
+    free: int  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
+    turning: int  # its angle is a coordinate, whoever drives it
+    responses: int
+    impacts: int  # contacts are counted
+    profile: int  # where around joints sliding work is done is recorded
+    largest: int  # the objective is made of the largest value of its rate
+    begin: int  # places of open joints, from `begin` on
+    end: int  # and before `end`
 
 
 def rules_of(effects: Effects) -> Rules:
@@ -486,4 +487,4 @@ class Stepped(NamedTuple):
     """What the functions of a stepper read: rules and measures."""
 
     rules: Rules
-    measures: Any
+    measures: Array

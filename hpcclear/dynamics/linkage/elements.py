@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -117,6 +116,6 @@ def table_until(table, first, cells, share):
     return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
 
 
-def functions() -> dict[str, Callable[..., Any]]:
+def functions() -> dict[str, Callable[..., object]]:
     """All of them by name, as ordinary Python."""
     return {name: one.py_func for name, one in globals().items() if hasattr(one, "py_func")}

@@ -6,7 +6,6 @@ A stepper knows nothing of a motion but this address, so that one compiled stepp
 import inspect
 from functools import cache
 from types import ModuleType
-from typing import Any
 
 from numba import types
 
@@ -25,7 +24,7 @@ _NUMBERS = types.CPointer(types.float64)
 SIGNATURE = types.void(_NUMBERS, _NUMBERS)
 
 
-def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Any:
+def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> object:
     """The compiled ``motion`` of a module for W lanes; its ``address`` is what steppers take.
 
     A motion is a C function ``void motion(double *lanes, double *tables)``, whatever mechanism it describes and wherever
@@ -55,7 +54,7 @@ def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
 
 
 @cache
-def compiled_text(name: str) -> Any:
+def compiled_text(name: str) -> object:
     """The compiled motion of a text by its name, which another process can import; its second word is the number of lanes."""
     text = getattr(text_named(name), name)
     lanes = int(name.split("_")[1])

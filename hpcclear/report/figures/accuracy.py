@@ -12,6 +12,7 @@ from hpcclear.report.figures import labels, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 MARGIN = 100.0
@@ -44,7 +45,7 @@ def _foot(figure: "Figure", found: xr.Dataset, *sentences: str) -> None:
     figure.supxlabel(labels.literal(text), x=0.02, ha="left", fontsize=style.SMALL)
 
 
-def _decades(axis: Any) -> None:
+def _decades(axis: "Axis") -> None:
     """Few decade ticks, so that labels do not meet in half a column."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -52,7 +53,7 @@ def _decades(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _plain(axis: Any) -> None:
+def _plain(axis: "Axes") -> None:
     """A logarithmic time axis above a panel, with plain numbers at its ticks."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 

@@ -7,7 +7,6 @@ import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -39,7 +38,7 @@ class Section:
     """name and title: its anchor, and its heading."""
     template: str
     """File in ``templates`` that shows its content."""
-    content: Any
+    content: object
     """For the template; None where there is nothing to show."""
     folded: bool = False
     """Whether it opens on request only."""

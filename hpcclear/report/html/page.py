@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from hpcclear.report.answer import answer
 from hpcclear.report.html import costs, designs, gallery, loads, origin, picture, sections
@@ -84,7 +83,7 @@ def _readable(name: str) -> str:
     return name.encode("utf-8", "replace").decode()
 
 
-def _picture(content: Content) -> dict[str, Any]:
+def _picture(content: Content) -> dict[str, object]:
     """What the script draws, if JSON can say it: it knows no NaN."""
     made = picture.picture(content)
     json.dumps(made, allow_nan=False)

@@ -58,7 +58,7 @@ class RegressionMethod:
         What it is called.
     """
 
-    source: Any
+    source: object
     label: str
 
     def fit(
@@ -126,7 +126,7 @@ class Regression:
     dropped: int = 0
     label: str = ""
     seed: int = 0
-    source: Any = None
+    source: object = None
     stored: Mapping[str, Array] = field(default_factory=dict)
 
     separable = False
@@ -139,10 +139,10 @@ class Regression:
         return mean, scale if scale > 10 * np.finfo(float).eps * abs(mean) else 1.0
 
     @cached_property
-    def _model(self) -> Any:
+    def _model(self) -> object:
         return self._fitted_to(np.ones(len(self.values), bool))
 
-    def _fitted_to(self, rows: Array) -> Any:
+    def _fitted_to(self, rows: Array) -> object:
         """A new regressor fitted to some of the training points."""
         if self.source is None:
             reason = "the file holds its training points, but no model that predicts"
@@ -264,7 +264,7 @@ def made(source: object, label: str, seed: int) -> Any:
     return model
 
 
-def _called(source: object, label: str, seed: int) -> Any:
+def _called(source: object, label: str, seed: int) -> object:
     """What a class or a function makes."""
     if not callable(source):
         reason = "is no class, no function and has no predict"
@@ -278,7 +278,7 @@ def _called(source: object, label: str, seed: int) -> Any:
         raise raised(KEY, label, "could not be made", error) from error
 
 
-def _ask(model: object, label: str, what: str, *arguments: Array) -> Any:
+def _ask(model: object, label: str, what: str, *arguments: Array) -> object:
     """What a method of the regressor returns, with one thread: more would change last bits."""
     from threadpoolctl import threadpool_limits
 
