@@ -10,8 +10,9 @@ goes on from both: a search by expected improvement with `WIDE` more designs and
 What counts is what a study recommends by: the first objective, or mean + 2 standard deviations where both are minimised.
 
 The best designs of the reference are compared by `CHOSEN` simulations each. The best of them and the recommended ones
-are then judged by `JUDGED` simulations of another scatter, which no search and no choice has seen, so that none has luck.
-Regret is how far a recommended design is above the least of these three, with the standard error of that difference.
+are then judged by `JUDGED` simulations of another scatter, which no search and no choice has seen.
+Regret is how far a recommended design is above the least of these three, with the standard error of that difference. It
+is never negative, so the least of three has some luck: a regret within its error is none.
 Results are kept in OUT, so that the command goes on where it was stopped.
 """
 
