@@ -84,8 +84,9 @@ def inside(task: str, count: int) -> int:
     """One rank: samples or statistics on all of them, then a line about itself."""
     from hpcclear.ensemble.simulate import payload_of
     from hpcclear.ranks.boundary import run_on_ranks
-    from hpcclear.ranks.schedule import COLUMNS
-    from hpcclear.ranks.team import Ranks, Task
+    from hpcclear.ranks.leading import run_points
+    from hpcclear.ranks.schedule import COLUMNS, Task
+    from hpcclear.ranks.team import Ranks
     from hpcclear.scene.record import record_of
 
     line = LINE
@@ -103,7 +104,7 @@ def inside(task: str, count: int) -> int:
                 spent = ranks.stage_seconds["statistics"]
         else:
             work = Task("samples", make_watched, payload_of(scene, points), record_of(scene))
-            records = ranks.run_points(work, points.values)
+            records = run_points(ranks, work, points.values)
             spent = ranks.stage_seconds["samples"]
             cost = records["rhs_evaluations"]
             line["spread"] = float(np.quantile(cost, 0.99) / np.quantile(cost, 0.01))

@@ -9,9 +9,8 @@ Three mechanisms, one and two unknown clearances, random masses, friction and re
 are made at another integration tolerance than the ensemble's; in a third of the machines there is an effect that the model
 lacks. Each mechanism, number of unknowns and noise has the same share of these. A machine follows from the seed and its number.
 
-One ensemble serves all machines of a mechanism and number of unknowns, and one calibration those that also share signal and
-noise: each machine costs one simulated signal and one posterior. Ensembles, signals and groups are kept in OUT as they finish:
-the same command continues. `--advise` compares signals for two unknowns. `--raw` fits the raw signal by least squares.
+One ensemble serves all machines of a mechanism and number of unknowns. Ensembles, signals and machines are kept in OUT as they
+finish: the same command continues. `--advise` compares signals for two unknowns. `--raw` fits the raw signal by least squares.
 """
 
 import argparse
@@ -30,7 +29,7 @@ from hpcclear.identify.features import Layout
 from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
-from hpcclear.identify.measured import read_measured
+from hpcclear.identify.measured import Measured, read_measured
 from hpcclear.identify.signals import Sensor
 from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
 from hpcclear.ranks.boundary import alone
@@ -169,7 +168,9 @@ def tables_of(folder: Path, seed: int, numbers: list[int]) -> list[Path]:
         own = missing[begin : begin + 8]
         made = [machine(seed, numbers[i]) for i in own]
         most = {"numerics.averaged_revolutions": max(one.revolutions for one in made) + 1}
-        for j, response in simulate_together([one.scene.with_(most) for one in made]):
+        for j, response in simulate_together(
+            [one.scene.with_(most) for one in made], [0] * len(made)
+        ):
             _, _, signal, noise = group_of(seed, numbers[own[j]])
             write_made(
                 made[j].scene, tables[own[j]], [signal], noise=noise, revolutions=made[j].revolutions,
@@ -179,35 +180,36 @@ def tables_of(folder: Path, seed: int, numbers: list[int]) -> list[Path]:
 
 
 def run_group(folder: Path, seed: int, numbers: list[int], members: int) -> None:
-    """Identify the machines of one group, by one preparation at the largest noise of theirs."""
-    name, count, signal, noise = group_of(seed, numbers[0])
-    place = folder / f"group-{seed}-{name}-{count}-{signal}-{noise:g}.json"
-    if place.exists():
+    """Identify the machines of one group."""
+    name, count, signal, _ = group_of(seed, numbers[0])
+    places = [folder / f"row-{seed}-{k:04d}-{members}.json" for k in numbers]
+    if all(place.exists() for place in places):
         return
     ensemble = ensemble_of(folder, name, count, members)
     plain = prepared_scene(model_of(name, count)[0])
     unit = units_of(plain, [signal])[0]
     frequency = float(frequency_of(plain))
-    read = [read_measured(one, signal, unit, frequency) for one in tables_of(folder, seed, numbers)]
-    layout = Layout.of(min(read, key=lambda one: one.highest), Sensor())
-    pairs = [features_of([one], [layout]) for one in read]
-    variance = np.max([own for _, own in pairs], axis=0)
-    prepared = prepare(ensemble, [layout], Sensor(), frequency, variance, 1)
-    rows = []
-    for k, (values, _) in zip(numbers, pairs, strict=True):
-        verdict, one = judged(prepared, values, 1), machine(seed, k)
-        rows.append(
-            {
-                "machine": k, "group": [name, count, signal, noise], "truth": one.truth,
-                "revolutions": one.revolutions, "lacks": one.lacks,
-                "interval": [[float(f"{v:.5g}") for v in ends] for ends in verdict.interval.T.tolist()],
-                "explained": verdict.explained, "doubt": [round(v, 3) for v in verdict.doubt.tolist()],
-                "worst": prepared.labels[verdict.worst],
-                "widening": [round(v, 3) for v in prepared.calibration.widening.tolist()],
-            }
-        )  # fmt: skip
-    place.write_text(json.dumps(rows))
-    print(f"{place.name}: {time.process_time():.0f} s of processor time so far", flush=True)
+    for k, table, place in zip(numbers, tables_of(folder, seed, numbers), places, strict=True):
+        if not place.exists():
+            read = read_measured(table, signal, unit, frequency)
+            place.write_text(json.dumps(row_of(seed, k, ensemble, read)))
+    print(f"{name}, {count}: {time.process_time():.0f} s of processor time so far", flush=True)
+
+
+def row_of(seed: int, k: int, ensemble: Ensemble, read: Measured) -> dict[str, Any]:
+    """Identify machine k from its signal."""
+    layout = Layout.of(read, Sensor())
+    values, variance = features_of([read], [layout])
+    prepared = prepare(ensemble, [layout], Sensor(), read.frequency, variance, 1)
+    verdict, one = judged(prepared, values, 1), machine(seed, k)
+    return {
+        "machine": k, "group": group_of(seed, k), "truth": one.truth,
+        "revolutions": one.revolutions, "lacks": one.lacks,
+        "interval": [[float(f"{v:.5g}") for v in ends] for ends in verdict.interval.T.tolist()],
+        "explained": verdict.explained, "doubt": round(verdict.doubt, 3),
+        "worst": prepared.labels[verdict.worst],
+        "widening": [round(v, 3) for v in prepared.calibration.widening.tolist()],
+    }  # fmt: skip
 
 
 def frequency_of(scene: Any) -> float:
@@ -358,11 +360,11 @@ def main() -> None:
         groups.setdefault(group_of(words.seed, k), []).append(k)
     for _, numbers in sorted(groups.items()):
         run_group(words.folder, words.seed, numbers, words.members)
-    files = sorted(words.folder.glob(f"group-{words.seed}-*.json"))
-    rows = sorted(
-        (row for one in files for row in json.loads(one.read_text())),
-        key=lambda row: row["machine"],
+    files = (
+        words.folder / f"row-{words.seed}-{k:04d}-{words.members}.json"
+        for k in range(words.machines)
     )
+    rows = [json.loads(one.read_text()) for one in files]
     if words.rows:
         words.rows.write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
     print(table_of(rows))

@@ -158,12 +158,13 @@ def best_allowed(scene: Scene, choice: Choice, share: float, simulations: int) -
     choices = [Choice("", case.name, dict(zip(names, row, strict=True))) for row in where]
     found = truth.sequences(run, choices, "search", "search", LENGTH, LENGTH * REPLICATES)
     values = found["goal"][:, : len(case.goals)]
-    model, objectives = edge._models(run, case, np.array(where), values, found["excess"], rng)
     bounds = edge._bounds(run, case)
+    model = edge._steering(np.array(where), found["excess"], bounds, rng)
+    objectives = edge._objectives(run, case, np.array(where), values, rng)
     shares, least = [share], [float(objectives[0](np.array(where[:1]))[0])]
     last = np.array(where[0])
     for number in range(ROUNDS):
-        short = of_share(goal.most) - of_share(shares[-1]) - float(model.predict(last[None])[0])
+        short = of_share(goal.most) - of_share(shares[-1]) - float(model(last[None])[0])
         last = edge._best(edge._judge(run, case, model, objectives, short), bounds, np.array(where), rng)  # fmt: skip
         trial = Choice("", case.name, dict(zip(names, last.tolist(), strict=True)))
         shares.append(np.mean([

@@ -32,12 +32,12 @@ SIGNAL, UNIT = "crank_moment", "N m"
 class Counted:
     """A log-likelihood that counts its points."""
 
-    def __init__(self, likelihood, scores) -> None:
-        self._likelihood, self._scores, self.points = likelihood, scores, 0
+    def __init__(self, likelihood, summaries) -> None:
+        self._likelihood, self._summaries, self.points = likelihood, summaries, 0
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         self.points += len(places)
-        found = self._likelihood(np.clip(places, 0.0, 1.0), self._scores)
+        found = self._likelihood(np.clip(places, 0.0, 1.0), self._summaries)
         return np.where(((places < 0.0) | (places > 1.0)).any(axis=1), -np.inf, found)
 
 
@@ -77,16 +77,16 @@ def report(folder: Path, mechanism: str, count: int, machines: int, members: int
     read = [read_measured(one, SIGNAL, UNIT, frequency) for one in tables_of(folder, 1, numbers)]
     layout = Layout.of(read[0], Sensor())
     pairs = [features_of([one], [layout]) for one in read]
-    model = prepare(
+    made = prepare(
         ensemble, [layout], Sensor(), frequency, np.max([v for _, v in pairs], axis=0), 1, 8
     )
-    size = model.model.places.shape[1]
+    size = made.model.places.shape[1]
     errors, costs, memory = {"sequential": [], "emcee": []}, {"sequential": [], "emcee": []}, []
     for values, _ in pairs:
-        scores = model.choice.scores(values)
+        summaries = made.summarised(values)
         ends = {}
         for name, particles in (("reference", REFERENCE), ("sequential", PARTICLES), ("emcee", 0)):
-            likelihood = Counted(model.model.likelihoods[0], scores)
+            likelihood = Counted(made.model.likelihoods[0], summaries)
             began = time.process_time()
             if particles:
                 rng = np.random.default_rng(particles)

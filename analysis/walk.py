@@ -1,34 +1,50 @@
 """The files that a number really passes on its way through `hpcclear sample`, from the scene file to the result file.
 
-    python analysis/walk.py                  # half a minute, most of it compilation
+    python analysis/walk.py                  # some seconds, or a minute where the kernel is not compiled yet
 
-Watched are the calls that read the clearance, check it, write it into the kernel's parameters, step it, make a record of what
-came of it and write the file: every file of the package that is on the stack of one of them is one that a reader opens.
-docs/architecture.md names them in its walk.
+Watched are the calls that read the clearance, check it, draw it, write it into the kernel's parameters, step it, make a record
+of what came of it and write the file: every file of the package that is on the stack of one of them is one that a reader opens.
+docs/architecture.md has them in its walk, besides those of the kernel, whose calls Python does not see.
 """
 
+import contextlib
+import importlib
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType
 
 ROOT = Path(__file__).parent.parent / "hpcclear"
-STATIONS = {
-    "scene/units.py": "to_si",
-    "scene/mechanism.py": "check_journal",
-    "scene/points.py": "check_points",
-    "dynamics/joint_laws.py": "fill",
-    "dynamics/stepping/lanes.py": "step",
-    "dynamics/evaluation/evaluator.py": "outcome_records",
-    "results/netcdf.py": "save",
-}
+STATIONS = (
+    "scene/units.py:to_si",
+    "scene/mechanism.py:check_journal",
+    "scene/sampling.py:latin_hypercube",
+    "scene/sampling.py:check_points",
+    "dynamics/setup/parameters.py:fill",
+    "dynamics/stepping/lanes.py:Lanes.step",
+    "dynamics/evaluation/evaluator.py:outcome_records",
+    "results/checkpoint.py:Checkpoint.add",
+    "results/dataset.py:samples_dataset",
+    "results/netcdf.py:save",
+)
 """Calls by their files: a clearance becomes a gap, a gap a record, a record a row of a file."""
 
 ELSEWHERE = {
-    "scene/units.py": "scene/random_inputs.py",  # bounds of the distribution, not the clearance
-    "dynamics/joint_laws.py": "dynamics/setup/problem.py",  # the scene's own design, by which a method is chosen
+    "scene/random_inputs.py": "bounds of a distribution, not of the clearance",
+    "dynamics/setup/problem.py": "the scene's own design, by which a method is chosen",
+    "ensemble/simulate.py": "every rank makes the same scene once more, and compiles without samples",
+    "ensemble/session.py": "times of the run, and the mark that it is done",
+    "report/spread.py": "reads the scene of the finished file for a line of the summary",
 }
-"""Calls that are about other numbers where this file is on the stack."""
+"""Files that make such calls about something else."""
+
+KERNEL = (
+    "dynamics/stepping/explicit/stepper.py",
+    "dynamics/contacts/pin_in_bearing.py",
+    "dynamics/stepping/sample.py",
+)
+"""Files of the way whose functions are compiled."""
 
 
 def files_on(frame: FrameType | None) -> list[str]:
@@ -42,37 +58,56 @@ def files_on(frame: FrameType | None) -> list[str]:
     return found[::-1]
 
 
+def code_of(station: str) -> CodeType:
+    """What Python runs at a station."""
+    file, _, name = station.partition(":")
+    found = importlib.import_module("hpcclear." + file.removesuffix(".py").replace("/", "."))
+    for part in name.split("."):
+        found = getattr(found, part)
+    code: CodeType = found.__code__  # type: ignore[attr-defined]
+    return code
+
+
+def passed(program: Callable[[], object]) -> dict[str, str]:
+    """Files on the stack of the stations while a program runs, in their order, with the first station of each."""
+    watched = {code_of(station): station for station in STATIONS}
+    found: dict[str, str] = {}
+    seen = set()
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event != "call" or frame.f_code not in watched:
+            return
+        files = files_on(frame)
+        if not any(one in files for one in ELSEWHERE):
+            seen.add(watched[frame.f_code])
+            for one in files:
+                found.setdefault(one, watched[frame.f_code])
+
+    sys.setprofile(note)
+    try:
+        program()
+    finally:
+        sys.setprofile(None)
+    missing = set(STATIONS) - seen
+    assert not missing, missing
+    return found
+
+
 def main() -> None:
-    passed: dict[str, str] = {}
-
-    def watch(frame: FrameType, event: str, argument: object) -> None:
-        if event != "call":
-            return
-        path = Path(frame.f_code.co_filename)
-        if not path.is_relative_to(ROOT):
-            return
-        name = str(path.relative_to(ROOT))
-        if STATIONS.get(name) == frame.f_code.co_name:
-            files = files_on(frame)
-            for one in files if ELSEWHERE.get(name) not in files else ():
-                passed.setdefault(one, name)
-
     from hpcclear.cli import main as command
 
-    with tempfile.TemporaryDirectory() as folder:
-        scene = ROOT.parent / "jobs" / "quickstart.toml"
-        words = ["sample", str(scene), "--set", "study.samples=8", "-o", f"{folder}/samples.nc"]
-        sys.setprofile(watch)
-        try:
-            command(words)
-        except SystemExit:
-            pass
-        finally:
-            sys.setprofile(None)
-    for k, (name, station) in enumerate(passed.items(), 1):
-        print(f"{k:3d} {name:40s} on the way to {station}")
-    missing = set(STATIONS) - set(passed)
-    assert not missing, missing
+    def program() -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            scene = ROOT.parent / "jobs" / "quickstart.toml"
+            words = ["sample", str(scene), "--set", "study.samples=8", "-o", f"{folder}/s.nc"]
+            with contextlib.suppress(SystemExit):
+                command(words)
+
+    found = passed(program)
+    for name in KERNEL:
+        found[name] = "compiled, of the kernel"
+    for k, (name, station) in enumerate(found.items(), 1):
+        print(f"{k:3d} {name:40s} {station}")
 
 
 if __name__ == "__main__":

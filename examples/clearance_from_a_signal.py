@@ -8,7 +8,6 @@ from pathlib import Path
 
 import hpcclear
 from hpcclear.identify.made import write_made
-from hpcclear.identify.training import prepared_scene
 
 JOBS = Path(__file__).resolve().parent.parent / "jobs"
 TRUTH = 42e-6  # m
@@ -26,7 +25,7 @@ def main() -> None:
     )
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "measured.csv"
-        write_made(prepared_scene(machine), table, ["crank_moment"], noise=0.1)
+        write_made(machine, table, ["crank_moment"], noise=0.1)
         found = hpcclear.identify(
             scene, "joints.crank_rod.clearance=10um:150um", table,
             members=64,  # four times as many by default

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.dynamics.planar.curves import curve_at
-from hpcclear.ensemble.session import samples_of
+from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.fields import CurveOf, MotionTable

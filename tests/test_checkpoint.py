@@ -21,14 +21,29 @@ import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError, StorageError
-from hpcclear.base.outcome import Status, failed, unknown
+from hpcclear.base.outcome import (
+    IMPACTS,
+    LEVELS,
+    MAPPED,
+    ON_REQUEST,
+    RESPONSES,
+    STEADY,
+    Status,
+    failed,
+    recast,
+    record_type,
+    unknown,
+)
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
 from hpcclear.results.keys import check_key, key_attribute
 from hpcclear.results.lock import Holder, Lock
 from hpcclear.results.places import fresh_sibling
 from hpcclear.results.provenance import provenance
+from hpcclear.scene import load_scene
+from hpcclear.scene.record import record_of
 
+JOBS = Path(__file__).parents[1] / "jobs"
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
 
 
@@ -627,3 +642,37 @@ def test_of_several_that_start_at_once_on_a_stale_lock_one_works(tmp_path, witho
     assert counts["broken"] == 0
     assert counts["held"] > 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_records_of_a_variant_that_requests_less_come_back_as_they_were(tmp_path):
+    """As effect screening has them: a variant with fewer contacts, a scene with levels and wear."""
+    whole = record_type(4, 2, ("level", "wear"))
+    made = recast(outcomes(0, 6), record_type(3))
+    made["mean_gap"][:, 2] = 5e-4
+    assert np.isnan(recast(made, whole)["sliding_work"]).all()
+    for _ in range(2):  # from memory, then from the file
+        with_levels = Checkpoint(tmp_path / "c", KEY, joints=tuple("abcd"), record=whole)
+        if not len(with_levels.completed()):
+            add(with_levels, made)
+            with_levels.flush()
+        kept = with_levels.completed()
+        assert kept.dtype == whole
+        assert recast(kept, made.dtype).tobytes() == made.tobytes()
+
+
+def test_a_record_has_what_the_scene_requests():
+    plain = load_scene(JOBS / "robust_slider_crank.toml")
+    assert not {*ON_REQUEST, *STEADY, *MAPPED} & {*record_of(plain).names}
+    for changes, fields in (
+        ({"numerics.levels": [1000.0]}, {*RESPONSES, *IMPACTS, *LEVELS}),
+        ({"numerics.energy": True}, {"energy_error"}),
+        ({"numerics.target_error": 0.01}, {*STEADY}),
+    ):
+        found = {*record_of(plain.with_(changes)).names}
+        assert found - {*record_of(plain).names} == fields
+    assert record_of(plain.with_({"numerics.levels": [1000.0]}))["contact_force_level"].shape == (
+        2,
+        1,
+    )
+    corners = record_of(load_scene(JOBS / "loose_slider.toml"))
+    assert corners["mean_gap"].shape == (4,)

@@ -9,7 +9,7 @@ from running import scene_with
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import as_points, evaluate
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
 
 ROOT = Path(__file__).parents[1]

@@ -18,9 +18,9 @@ from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ranks import boundary, launcher
-from hpcclear.ranks.schedule import COLUMNS
+from hpcclear.ranks.leading import run_points
+from hpcclear.ranks.schedule import COLUMNS, Task
 from hpcclear.ranks.stopping import STOP_SIGNALS, StopSwitch
-from hpcclear.ranks.team import Task
 
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -341,10 +341,10 @@ def test_a_process_that_has_left_mpi_may_run_again_by_itself(copies, code):
 
 def test_one_process_in_a_notebook_gets_plain_exceptions():
     ranks = boundary.alone()
-    result = ranks.run_points(Task("sleep", make_sleeping, {"cost": 1e-4}), design(20))
+    result = run_points(ranks, Task("sleep", make_sleeping, {"cost": 1e-4}), design(20))
     assert result.tobytes() == records_of(np.arange(20), design(20)).tobytes()
     with pytest.raises(ArithmeticError, match="on purpose"):
-        ranks.run_points(Task("sleep", make_sleeping, {"cost": 1e-4, "fails_at": 3}), design(20))
+        run_points(ranks, Task("sleep", make_sleeping, {"cost": 1e-4, "fails_at": 3}), design(20))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hpcclear.base.outcome import LEVELS, ON_REQUEST, RESPONSES, WIDEST
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.response import simulate
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.results.names import KINDS

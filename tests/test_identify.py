@@ -197,7 +197,8 @@ def made(scene):
     places = design(1, inputs, 128)
     spectra = spectra_of(places, np.random.default_rng(2))
     ensemble = Ensemble(inputs, places, ("crank_moment",), spectra, 20)
-    typical = Spectrum(ensemble.spectrum("crank_moment").mean[0], np.full(ORDERS + 1, 0.05), 20)
+    seen = ensemble.spectrum("crank_moment")
+    typical = Spectrum(seen.mean[0], seen.variance[0] + 0.05, 20)
     measured = Measured("crank_moment", typical, True, SPEED, ORDERS)
     layout = Layout.of(measured, Sensor())
     variance = features_of([measured], [layout])[1]
@@ -210,7 +211,8 @@ def machine(ensemble, layout, place, rng, change=0.0):
     noise = rng.standard_normal((2, ORDERS + 1)) * np.sqrt(0.5 * 0.05 / 20)
     mean = seen.mean + noise[0] + 1j * noise[1]
     mean[3] += change
-    measured = Measured("crank_moment", Spectrum(mean, np.full(ORDERS + 1, 0.05), 20), True, SPEED, ORDERS)  # fmt: skip
+    scatter = seen.variance + 0.05
+    measured = Measured("crank_moment", Spectrum(mean, scatter, 20), True, SPEED, ORDERS)
     return features_of([measured], [layout])[0]
 
 
@@ -383,7 +385,7 @@ def measured(tmp_path_factory, scene):
     folder = tmp_path_factory.mktemp("measured")
     for clearance in (42, 60):
         real = scene.with_({"joints.crank_rod.clearance": 1e-6 * clearance})
-        write_made(prepared_scene(real), folder / f"{clearance}.csv", ["crank_moment"], noise=0.1, revolutions=12)  # fmt: skip
+        write_made(real, folder / f"{clearance}.csv", ["crank_moment"], noise=0.1, revolutions=12)
     return [folder / "42.csv", folder / "60.csv"]
 
 

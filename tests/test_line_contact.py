@@ -193,7 +193,7 @@ def test_a_line_in_the_mechanism(tmp_path):
         one["length"] = 0.02
     path.write_text(tomli_w.dumps(made), encoding="utf-8")
     scene = load_scene(path)
-    from hpcclear.dynamics.joint_laws import joint_numbers
+    from hpcclear.dynamics.setup.parameters import joint_numbers
 
     def get(key):
         value = scene

@@ -20,7 +20,8 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 from hpcclear.scene.switches import Off, switches
 
 LUGRE = {

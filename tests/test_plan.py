@@ -14,8 +14,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli import cli
 from hpcclear.cli.plan import RESERVE, describe, preview, slurm
-from hpcclear.ensemble.samples import design
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 from hpcclear.study import chaos, extent, tolerance

@@ -13,7 +13,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene.points import Points
-from hpcclear.statistics.random import tail
+from hpcclear.statistics.random import indices, tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare
 from hpcclear.study import rare
 
@@ -157,6 +157,30 @@ def test_inputs_too_far_out_to_make_a_mechanism_count_as_failed():
         (first,), (second,) = rare.simulated(run, [(None, values), (None, -values[:1])], "stage")
     np.testing.assert_array_equal(first, [2.0, np.nan, 4.0, 6.0, np.nan])
     np.testing.assert_array_equal(second, [np.nan])
+
+
+# -- indices over designs ---------------------------------------------------------------------------
+
+
+def test_draws_of_many_designs_show_level_and_slopes_of_an_index(shift):
+    """f is a plane in u whose level rises with the design: at each the index is the limit less its level, exactly."""
+    rng = np.random.default_rng([7, shift])
+    places, u = rng.uniform(-0.1, 0.1, (8192, 2)), 3.0 + rng.standard_normal(8192)
+    level = places @ [8.0, -4.0]
+    weights = np.exp(4.5 - 3.0 * u)
+    model = indices.fitted(places, np.where(u + level > 3.0, weights, 0.0), 1e-3)
+    ends = np.array([[0.0, 0.0], [0.08, 0.0], [0.0, 0.08], [-0.08, -0.08]])
+    np.testing.assert_allclose(model(ends), 3.0 - ends @ [8.0, -4.0], atol=0.15)
+    nothing = indices.fitted(places, np.zeros(8192), 1e-3)
+    assert (nothing(ends) > 4.0).all()  # no draw fails: safer than what is asked
+
+
+def test_a_polynomial_follows_values_that_are_known():
+    bounds = np.array([[0.0, 2.0], [1.0, 5.0]])
+    at = np.random.default_rng(3).uniform(*bounds.T, (40, 2))
+    values = 1.0 + 2.0 * at[:, 0] - at[:, 0] * at[:, 1]
+    model = indices.quadratic(at, np.where(at[:, 0] < 0.2, np.nan, values), bounds)
+    np.testing.assert_allclose(model(at), values, atol=0.05)
 
 
 # -- a study ----------------------------------------------------------------------------------------

@@ -13,14 +13,9 @@ from scipy import stats
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates, to_physical
-from hpcclear.scene.sampling import (
-    Points,
-    check_points,
-    latin_hypercube,
-    monte_carlo,
-    read_points,
-    unit_lhs,
-)
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points, latin_hypercube, monte_carlo, unit_lhs
+from hpcclear.scene.table import read_points
 
 JOBS = Path(__file__).parent.parent / "jobs"
 ROBUST = load_scene(JOBS / "robust_slider_crank.toml")

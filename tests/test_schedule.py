@@ -6,7 +6,8 @@ from collections import deque
 import numpy as np
 import pytest
 
-from hpcclear.ranks.schedule import QUANTUM, HandOut, Need, WorkQueue, allot
+from hpcclear.ranks.leading import WorkQueue
+from hpcclear.ranks.schedule import QUANTUM, HandOut, Need, allot
 
 
 class SimulatedWorker:

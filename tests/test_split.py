@@ -11,9 +11,9 @@ from commands import CHEAP, SCENE, kill, overrides, run, sample, start
 from patience import crowded
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.samples import design, run_sample
+from hpcclear.ensemble.samples import design, run_merge, run_sample
 from hpcclear.ensemble.session import Options
-from hpcclear.ensemble.split import Part, run_merge
+from hpcclear.ensemble.split import Part
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene

@@ -19,7 +19,8 @@ from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import collection, dataset
-from hpcclear.scene.sampling import MonteCarloPoints, monte_carlo
+from hpcclear.scene.pages import MonteCarloPoints
+from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import Summary, columns, empty, merge, rows_of, summarise
 

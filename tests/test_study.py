@@ -17,9 +17,9 @@ from patience import crowded
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble import single
+from hpcclear.ranks import leading
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.stopping import Stopped
-from hpcclear.ranks.team import Ranks
 from hpcclear.report.answer import answer
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
@@ -291,7 +291,7 @@ def test_a_run_stopped_after_every_stage_ends_with_the_same_bytes(results, tmp_p
 def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overrides):
     """What `plan` counts: samples stage by stage, and single responses."""
     scene = scene_of(*overrides)
-    made, run_points, responded = Counter[str](), Ranks.run_points, Counter[str]()
+    made, run_points, responded = Counter[str](), leading.run_points, Counter[str]()
 
     def counted(self, task, points, **options):
         if task.make is not single.Responses:
@@ -302,7 +302,7 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
         responded["all"] += 1
         return formula.respond(one, *rest, **options)
 
-    monkeypatch.setattr(Ranks, "run_points", counted)
+    monkeypatch.setattr(leading, "run_points", counted)
     monkeypatch.setattr(responses, "simulate", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}

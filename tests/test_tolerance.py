@@ -10,7 +10,7 @@ import pytest
 from formula_study import contents, formula, on_two_ranks
 
 from hpcclear.base.errors import InputError
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene

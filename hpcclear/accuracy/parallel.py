@@ -11,13 +11,14 @@ from hpcclear.accuracy.surrogate import region_of
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.host import process_fields
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
-from hpcclear.ranks.schedule import COLUMNS
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks import leading
+from hpcclear.ranks.schedule import COLUMNS, Task
+from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
 from hpcclear.scene.record import record_of
-from hpcclear.scene.sampling import generator
+from hpcclear.scene.streams import generator
 
 LOSSES = ("start-up", "compilation", "imbalance", "writing")
 
@@ -74,7 +75,7 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     payload = payload_of(scene, points)
     task = Task(stage, make_evaluator, payload, record_of(scene), workers=number)
     started = time.perf_counter()
-    ranks.run_points(task, points.values, keep=False)
+    leading.run_points(ranks, task, points.values, keep=False)
     wall = time.perf_counter() - started
     return float(wall - ranks.stage_seconds[stage][0, COLUMNS.index("compile")])
 

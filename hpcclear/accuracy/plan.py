@@ -16,8 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator
 from hpcclear.dynamics.evaluation.steady import wording
-from hpcclear.ensemble.samples import design
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.progress import Progress, Style, duration
 from hpcclear.ranks.schedule import COLUMNS

@@ -13,7 +13,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
-from hpcclear.scene.sampling import generator, monte_carlo
+from hpcclear.scene.sampling import monte_carlo
+from hpcclear.scene.streams import generator
 from hpcclear.statistics.random.moments import sample_moments
 from hpcclear.statistics.surrogate.leaf import Leaf
 from hpcclear.study.problem import problem_of

@@ -124,8 +124,7 @@ def merge(written: Written, output: Path, points: Path | None) -> int:
     Example: hpcclear merge jobs/quickstart.toml -o results/samples.nc
     """
     from hpcclear.cli.printing import describe_samples
-    from hpcclear.ensemble.samples import design
-    from hpcclear.ensemble.split import run_merge
+    from hpcclear.ensemble.samples import design, run_merge
     from hpcclear.ranks.boundary import alone
     from hpcclear.scene import load_scene
 

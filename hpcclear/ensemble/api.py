@@ -11,11 +11,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.ensemble.session import samples_of
+from hpcclear.ensemble.samples import samples_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 
 
 def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:

@@ -13,8 +13,8 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.ensemble.parts import packed, part_length, partial_of, take_parts
 from hpcclear.ensemble.raw import raw_files
 from hpcclear.scene import load_scene
+from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.scene.record import record_of
-from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import BLOCK
 

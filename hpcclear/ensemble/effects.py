@@ -19,8 +19,8 @@ from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.setup.problem import coordinate_count
 from hpcclear.ensemble.certificate import Certificate, Changes, Plan, Seen, judged
 from hpcclear.ensemble.identity import run_key
+from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset

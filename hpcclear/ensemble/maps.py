@@ -10,14 +10,16 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
-from hpcclear.ensemble.simulate import first_compiled, sample_points, saving
+from hpcclear.ensemble.samples import sample_points, samples_of, saving
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.simulate import first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 from hpcclear.scene.units import UnitError, note, to_si
 
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]

@@ -222,8 +222,8 @@ def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     there if `payload["raw"]` says where (`hpcclear.ensemble.raw.raw_files`)."""
     from hpcclear.ensemble.raw import raw_files
     from hpcclear.scene import load_scene
+    from hpcclear.scene.pages import MonteCarloPoints
     from hpcclear.scene.record import record_of
-    from hpcclear.scene.sampling import MonteCarloPoints
 
     worker = payload["make"](payload["samples"], ranks)
     scene = load_scene(payload["design"], trust=True)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcclear.ensemble.session import samples_of
+from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import collection, dataset
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.summary import BLOCK
 
 if TYPE_CHECKING:

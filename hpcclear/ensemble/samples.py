@@ -1,21 +1,35 @@
-"""The `sample` command: points -> ranks -> one dataset, checkpointed on the way."""
+"""Designs of a scene through the dynamics, on all ranks, checkpointed on the way; the `sample` command, which writes them."""
 
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
+from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.outcome import JOINTS, recast
 from hpcclear.dynamics.evaluation.steady.wording import recorded
+from hpcclear.ensemble import simulate
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session, samples_of
-from hpcclear.ensemble.simulate import sample_points, saving
-from hpcclear.ensemble.split import Part
+from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.split import Part, whole
+from hpcclear.ranks import leading
 from hpcclear.ranks.progress import Progress
+from hpcclear.ranks.schedule import Maker, Task
+from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
+from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import read_points, sampled
+from hpcclear.scene.points import Points, expanded
+from hpcclear.scene.record import record_of
+from hpcclear.scene.sampling import sampled
+from hpcclear.scene.table import read_points
 
 MEMORY = 2.3e-6
 """GB that root takes for a sample (`analysis/many_ranks.py`)."""
@@ -104,8 +118,173 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.
     progress = Progress("samples", session.options.style)
     records = sample_points(scene, points, session.ranks, checkpoint, progress, first=first)
     records["sample"] += first
-    attributes = session.attributes | recorded(scene, records)
     with saving(checkpoint.flush):  # what came since the last save, if the file cannot be written
-        return session.write(
-            samples_of(points, records, attributes, scene.objective, session.joints)
+        return _write(session, scene, points, records)
+
+
+def _write(session: Session, scene: Scene, points: Points, records: Records) -> xr.Dataset:
+    """Write the file of samples; returns what was written."""
+    attributes = session.attributes | recorded(scene, records)
+    content = samples_of(points, records, attributes, scene.objective, session.joints)
+    with session.writing():
+        dataset.write(content, session.place.output)
+    return content
+
+
+def samples_of(
+    points: Points,
+    records: Records,
+    attributes: Mapping[str, str],
+    objective: Objective = MEAN_GAP,
+    joints: Sequence[str] = JOINTS,
+) -> xr.Dataset:
+    """A dataset of kind ``samples`` of points and what became of them, a record each."""
+    drawn = {"sampling": points.sampling} if points.sampling else {}
+    return dataset.samples_dataset(
+        points.names,
+        points.values,
+        dict(zip(points.names, points.units, strict=True)),
+        records,
+        {**attributes, **drawn},
+        objective,
+        points.words,
+        joints,
+        points.labels,
+    )
+
+
+def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:
+    """Write the result of all parts of a design, as one run would have written it; the parts stay.
+
+    Parameters
+    ----------
+    points : Points
+        The whole design.
+    output : Path
+        The name that was given with each part.
+
+    Raises
+    ------
+    InputError
+        Parts are missing, damaged, or another run's.
+    StorageError
+        The disk refuses.
+    """
+    began = time.perf_counter()
+    place = Place.of_file(output, False)
+    with Session(place, sample_key(scene, points), ranks, DEFAULT_OPTIONS) as session:
+        samples = session.found("samples")
+        if samples is None:
+            records = np.concatenate(
+                [_records(part, scene, points, output) for part in whole(output)]
+            )
+            session.describe(scene)
+            samples = _write(session, scene, points, records)
+    return session.finished(samples, began)
+
+
+def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarray:
+    """The records of one part, all of them."""
+    path = part.place(output)
+    content = dataset.read(path, "samples")
+    check_key(content, part.key(scene, points), path)
+    records = dataset.records(content)
+    if not np.array_equal(records["sample"], part.rows(len(points))):
+        raise InputError(
+            "file",
+            str(path),
+            "it does not contain the samples of its part",
+            "Remove it, and run that part again",
+        )
+    return recast(records, record_of(scene))
+
+
+@contextmanager
+def saving(save: Callable[[], object]) -> Iterator[None]:
+    """Save what is finished when an exception ends the block, even if a save itself was what failed.
+
+    A fault may be gone a moment later. When the last save fails as well, its own error says so after
+    a stop, for which all was to be saved; after an error, that error is what the caller hears of.
+    """
+    try:
+        yield
+    except Stopped:
+        save()
+        raise
+    except BaseException as error:  # noqa: BLE001 - raised again
+        try:
+            save()
+        finally:
+            raise error from error.__cause__  # without the context: it is the failed save, if any
+
+
+def sample_points(
+    scene: Scene,
+    points: Points,
+    ranks: Ranks,
+    checkpoint: Checkpoint | None = None,
+    progress: Progress | None = None,
+    *,
+    stage: str = "samples",
+    first: int = 0,
+    maker: Maker | None = None,
+    record: np.dtype | None = None,
+) -> np.ndarray:
+    """Simulate a design on all ranks; call it on root.
+
+    Parameters
+    ----------
+    points : Points
+        Designs, SI.
+    checkpoint : Checkpoint, optional
+        Knows the samples finished earlier, and gets each new one; its names are those of `points`.
+        When this raises, everything finished is on disk, unless the disk refused it twice.
+    stage : str
+        Name for reports and timing.
+    first : int
+        Number of the first point in the checkpoint, for designs that come one after the other.
+    maker : function of a payload and the ranks, optional
+        Makes a rank's worker; by default `make_evaluator`.
+    record : dtype, optional
+        Type of the records; by default that of the scene (`hpcclear.scene.record.record_of`).
+
+    Returns
+    -------
+    structured ndarray of `record`, shape (n,)
+        In the points' order; samples numbered from 0.
+
+    Raises
+    ------
+    Stopped, RankFailed, InputError
+        As `hpcclear.ranks.leading.run_points`.
+    StorageError
+        The disk refuses.
+    """
+    sent = expanded(scene.study, points)  # rows of catalogues as the numbers they stand for
+    record = record_of(scene) if record is None else record
+    payload = simulate.payload_of(scene, sent)
+    task = Task(stage, maker or simulate.make_evaluator, payload, record)
+    if checkpoint is None:
+        return leading.run_points(ranks, task, sent.values, progress=progress)
+    completed = recast(checkpoint.completed(first, len(points)), record)
+    completed["sample"] -= first
+
+    def take(records: np.ndarray) -> None:
+        numbered = records.copy()
+        numbered["sample"] += first
+        checkpoint.add(numbered, points.values[records["sample"]])
+
+    def save() -> None:
+        with ranks.stage(stage), ranks.writing():
+            checkpoint.flush()
+
+    with saving(save):
+        return leading.run_points(
+            ranks,
+            task,
+            sent.values,
+            completed=completed,
+            on_records=take,
+            save=checkpoint.flush_when_due,
+            progress=progress,
         )

@@ -11,16 +11,15 @@ import re
 import shlex
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
@@ -38,7 +37,6 @@ from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
 from hpcclear.scene.record import record_of
 
 if TYPE_CHECKING:
@@ -286,7 +284,7 @@ class Session:
         self, names: Sequence[str] = (), units: Mapping[str, str] | None = None
     ) -> Checkpoint:
         """What an earlier run left unfinished; `names` and `units` are those of its design variables."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             self._checkpoint = Checkpoint(
                 self.place.parts,
                 self.key,
@@ -307,9 +305,15 @@ class Session:
             self.notify(problem)
         self._reported = len(problems)
 
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Count the time inside as output of files."""
+        with self.ranks.stage("files"), self.ranks.writing():
+            yield
+
     def write(self, content: xr.Dataset) -> xr.Dataset:
         """Write the result file; returns what was written."""
-        with self.ranks.stage("files"), self.ranks.writing():
+        with self.writing():
             dataset.write(content, self.place.output)
         return content
 
@@ -331,28 +335,6 @@ class Session:
         spent = sum(self.ranks.stage_seconds.values(), spent)
         seconds = time.perf_counter() - began
         return Finished(content, self.place.output, self.place.timing, seconds, spent)
-
-
-def samples_of(
-    points: Points,
-    records: Records,
-    attributes: Mapping[str, str],
-    objective: Objective = MEAN_GAP,
-    joints: Sequence[str] = JOINTS,
-) -> xr.Dataset:
-    """A dataset of kind ``samples`` of points and what became of them, a record each."""
-    drawn = {"sampling": points.sampling} if points.sampling else {}
-    return dataset.samples_dataset(
-        points.names,
-        points.values,
-        dict(zip(points.names, points.units, strict=True)),
-        records,
-        {**attributes, **drawn},
-        objective,
-        points.words,
-        joints,
-        points.labels,
-    )
 
 
 def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.Dataset:

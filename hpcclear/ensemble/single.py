@@ -9,7 +9,9 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.response import simulate_together
 from hpcclear.ensemble.simulate import content_of
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks import leading
+from hpcclear.ranks.schedule import Task
+from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 
 TOGETHER = 8
@@ -61,7 +63,7 @@ def responses_of(
         "together": together,
     }
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
-    records = ranks.run_points(Task(stage, Responses, payload, dtype), rows)
+    records = leading.run_points(ranks, Task(stage, Responses, payload, dtype), rows)
     return records["values"].reshape(len(variants), copies, *shape)
 
 

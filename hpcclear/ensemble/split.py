@@ -1,27 +1,17 @@
-"""A design in parts that know nothing of each other, one a job of an array, and the parts put together again.
+"""Parts of a design that know nothing of each other, one a job of an array.
 
 A part is an interval of the design's samples, with a file, a checkpoint and a lock of its own. What merging writes has the
 bytes that one run would have written."""
 
 import re
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-import numpy as np
-
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import recast
-from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.ensemble.identity import sample_key
-from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Place, Session, samples_of
-from hpcclear.ranks.team import Ranks
-from hpcclear.results import dataset
-from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
 
 MOST_PARTS = 100_000
 _FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
@@ -96,52 +86,3 @@ def whole(output: Path) -> list[Part]:
             "--part", shown, reason, "Run hpcclear sample with each of these, then merge again"
         )
     return every
-
-
-def run_merge(scene: Scene, points: Points, output: Path, ranks: Ranks) -> Finished:
-    """Write the result of all parts of a design, as one run would have written it; the parts stay.
-
-    Parameters
-    ----------
-    points : Points
-        The whole design.
-    output : Path
-        The name that was given with each part.
-
-    Raises
-    ------
-    InputError
-        Parts are missing, damaged, or another run's.
-    StorageError
-        The disk refuses.
-    """
-    began = time.perf_counter()
-    place = Place.of_file(output, False)
-    with Session(place, sample_key(scene, points), ranks, DEFAULT_OPTIONS) as session:
-        samples = session.found("samples")
-        if samples is None:
-            records = np.concatenate(
-                [_records(part, scene, points, output) for part in whole(output)]
-            )
-            session.describe(scene)
-            attributes = session.attributes | recorded(scene, records)
-            samples = session.write(
-                samples_of(points, records, attributes, scene.objective, session.joints)
-            )
-    return session.finished(samples, began)
-
-
-def _records(part: Part, scene: Scene, points: Points, output: Path) -> np.ndarray:
-    """The records of one part, all of them."""
-    path = part.place(output)
-    content = dataset.read(path, "samples")
-    check_key(content, part.key(scene, points), path)
-    records = dataset.records(content)
-    if not np.array_equal(records["sample"], part.rows(len(points))):
-        raise InputError(
-            "file",
-            str(path),
-            "it does not contain the samples of its part",
-            "Remove it, and run that part again",
-        )
-    return recast(records, record_of(scene))

@@ -25,14 +25,16 @@ from hpcclear.ensemble.parts import (
     take_parts,
 )
 from hpcclear.ensemble.raw import NAMES, RawFiles, raw_files
+from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import make_evaluator, payload_of, saving
+from hpcclear.ensemble.simulate import make_evaluator, payload_of
+from hpcclear.ranks import leading
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, Points
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks.schedule import COLUMNS, Points, Task
+from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import MonteCarloPoints
+from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
 from hpcclear.statistics.streams.summary import BLOCK, QUANTITIES, Summary, rows_of
 
@@ -255,8 +257,14 @@ class _Streaming:
     def _run(
         self, task: Task, points: Points, take: Callable[[np.ndarray], None], progress: Progress
     ) -> None:
-        self._session.ranks.run_points(
-            task, points, on_records=take, save=self._save_when_due, progress=progress, keep=False
+        leading.run_points(
+            self._session.ranks,
+            task,
+            points,
+            on_records=take,
+            save=self._save_when_due,
+            progress=progress,
+            keep=False,
         )
 
     def _run_samples(self, left: Remaining) -> float:

@@ -19,7 +19,8 @@ from hpcclear.ensemble.simulate import payload_of
 from hpcclear.results.names import ALL_ON
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import generator, monte_carlo
+from hpcclear.scene.sampling import monte_carlo
+from hpcclear.scene.streams import generator
 from hpcclear.scene.switches import Off, Switch, switches
 
 CONFIDENCE = 0.99

@@ -13,7 +13,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.setup.parameters import Numbers, wave_paths
+from hpcclear.dynamics.setup.further import wave_paths
 from hpcclear.dynamics.wear.curves import DEEPEST
 from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Asked, Asking, Plan, Seen, life
@@ -21,14 +21,14 @@ from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.lives import lives_dataset, relief_of
+from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import sample_points, saving
 from hpcclear.ranks.progress import LivesProgress, Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
 from hpcclear.scene.record import record_of
 from hpcclear.scene.sampling import monte_carlo
 

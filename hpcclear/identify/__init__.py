@@ -2,8 +2,8 @@
 
 - `signals`, `measured`: signals by name as harmonics of the crank, of a response and of a table; sensors
 - `inputs`, `training`: what is not known, and an ensemble of machines as they may be
-- `features`: harmonics, third octaves, scatter, and the informative combinations of them
-- `posterior`, `judgement`: models of the features, posterior by sequential Monte Carlo, calibration, model check
+- `features`, `summaries`: harmonics, third octaves, scatter; regressions of the inputs on them
+- `posterior`, `judgement`: models of the summaries, posterior by sequential Monte Carlo, calibration, model check
 - `history`, `advice`: growth over several dates; which signal to measure
 - `answer`, `api`: the command and the Python function
 """

@@ -1,21 +1,21 @@
 """What to measure: how well each candidate signal would identify the unknowns, before a sensor is bought.
 
-Members of the ensemble are measured with made noise, and the unknowns predicted from the combinations of features by quadratic
-ridge regression. The errors of members that the regression was not fitted to give the half-width to expect; the posterior
-itself is as a rule narrower.
+Members of the ensemble are measured with made noise, and the unknowns predicted by the regressions of `summaries`. The errors
+for members that a regression was not fitted to give the half-width to expect; the posterior itself is as a rule narrower.
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from hpcclear.base.arrays import Array
-from hpcclear.identify.features import Choice, Layout
-from hpcclear.identify.judgement import members_of, predictable
+from hpcclear.identify.features import Layout
+from hpcclear.identify.judgement import as_measured, members_of
 from hpcclear.identify.measured import Measured
-from hpcclear.identify.posterior import FOLDS
 from hpcclear.identify.signals import ORDERS, Sensor, Spectrum
+from hpcclear.identify.summaries import regressions
 from hpcclear.identify.training import Ensemble
 
 REVOLUTIONS = (5, 20, 100)
@@ -23,9 +23,6 @@ REVOLUTIONS = (5, 20, 100)
 
 NOISE = 0.1
 """Noise of a sample over the RMS of the signal, where none is given."""
-
-PENALTIES = (0.1, 1.0, 10.0, 100.0)
-"""Of the regression; that with the least error is taken."""
 
 SAMPLES = 512
 """Samples of a revolution."""
@@ -78,18 +75,14 @@ def _expected(
     typical = Spectrum(seen.mean.mean(axis=0), variance, count)
     measured = Measured(name, typical, True, frequency, ORDERS)
     layout = Layout.of(measured, sensor)
-    features, _ = members_of(ensemble, [layout], sensor, frequency)
+    features, own = members_of(ensemble, [layout], sensor, frequency)
     noise = layout.values(typical, measured=True)[1]
-    rng = np.random.default_rng([seed, 0x6164])
-    choice = Choice.of(features, noise)
-    seen_features = features + rng.standard_normal(features.shape) * np.sqrt(noise)
-    kept = predictable(ensemble.places, choice.scores(seen_features), rng)
-    choice = choice.only(kept)
-    scores = choice.scores(seen_features) / np.sqrt(np.maximum(choice.information, 1e-12))
+    seen_features = as_measured(features, own, noise, np.random.default_rng([seed, 0x6164]))
     unknowns = ensemble.inputs.unknowns
     truth = ensemble.places[:, : len(unknowns)]
-    errors = [truth - _cross_validated(scores, truth, penalty) for penalty in PENALTIES]
-    error = min(errors, key=lambda one: float((one**2).sum()))
+    with threadpool_limits(limits=1, user_api="blas"):  # more threads change the last bits
+        made = regressions(seen_features, noise, layout.highest, truth)
+    error = truth - np.clip(np.column_stack([one.left_out for one in made]), 0.0, 1.0)
     ranges = np.array([one.upper - one.lower for one in unknowns])
     return np.quantile(np.abs(error), 0.95, axis=0) * ranges, largest_correlation(error)
 
@@ -98,17 +91,3 @@ def largest_correlation(rows: Array) -> float:
     """Return the correlation of two of the columns (n, k) that is the largest in magnitude; NaN of one column."""
     related = np.atleast_2d(np.corrcoef(rows.T))[np.triu_indices(rows.shape[1], 1)]
     return float(related[np.argmax(np.abs(related))]) if related.size else np.nan
-
-
-def _cross_validated(scores: Array, truth: Array, penalty: float) -> Array:
-    """Unknowns (n, u) predicted by regressions that were fitted without each, bounded to the unit cube."""
-    upper = np.triu_indices(min(scores.shape[1], 8))
-    squares = (scores[:, upper[0]] * scores[:, upper[1]]).reshape(len(scores), -1)
-    terms = np.column_stack([np.ones(len(scores)), scores, squares])
-    found = np.empty_like(truth)
-    groups = np.arange(len(scores)) % FOLDS
-    for k in range(FOLDS):
-        own, others = terms[groups == k], terms[groups != k]
-        matrix = others.T @ others + penalty * np.eye(terms.shape[1])
-        found[groups == k] = own @ np.linalg.solve(matrix, others.T @ truth[groups != k])
-    return np.clip(found, 0.0, 1.0)

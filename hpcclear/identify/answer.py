@@ -207,7 +207,7 @@ def _of_verdicts(verdicts: Sequence[Verdict], particles: Array, unknowns: int) -
         "interval": np.stack([one.interval.T for one in verdicts]),
         "correlation": np.array([largest_correlation(one[:, :unknowns]) for one in particles]),
         "explained": np.array([one.explained for one in verdicts], np.int8),
-        "doubt": np.array([one.doubt.max() for one in verdicts]),
+        "doubt": np.array([one.doubt for one in verdicts]),
         "worst_feature": np.array([one.worst for one in verdicts]),
         "measured": np.stack([one.measured for one in verdicts]),
         "predicted": np.stack([one.predicted for one in verdicts]),

@@ -1,10 +1,7 @@
-"""Features of a signal: harmonics, third octaves, their scatter between revolutions, and the most informative combinations.
+"""Features of a signal: harmonics, third octaves, and their scatter between revolutions.
 
 A revolution of a chaotic motion does not repeat, so no instant of it is a feature. Means over revolutions are, and the variance
 between revolutions says how well they are known.
-
-The combinations are principal components of the features over an ensemble, each feature in units of its own noise. Their
-variance is signal to noise: for small changes of the inputs that is the Fisher information averaged over the prior.
 """
 
 from dataclasses import dataclass, replace
@@ -12,22 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.signals import ORDERS, Sensor, Spectrum
 
-SINGLE = 24
-"""Harmonics up to this order are features of their own; third octaves hold those beyond."""
-
-COMPONENTS = 14
-"""Combinations of features at most."""
-
-LEAST_INFORMATION = 2.0
-"""Variance over the ensemble, in units of the noise, of a combination that is kept."""
-
-FLOOR = 3e-3
-"""Least noise of a feature, in units of its standard deviation over the ensemble: a model is not better than that."""
+LOW = 24
+"""Third octaves beyond this order are features, besides the single harmonics: phases of high harmonics may be lost in chaos."""
 
 SUMS = ("acceleration", "frame_force")
 """Signals without a mean: it is zero over whole revolutions, and sensors do not pass it."""
@@ -44,7 +32,7 @@ class Layout:
     orders : tuple of int
         Harmonics of their own.
     bands : tuple of (int, int)
-        First and last order of each third octave beyond.
+        First and last order of each third octave above `LOW`.
     synchronised : bool
         Whether harmonics have phases.
     noise : float, optional
@@ -72,14 +60,21 @@ class Layout:
                 reason,
                 "Widen the band, or sample faster",
             )
-        orders = tuple(range(lowest, min(highest, SINGLE) + 1))
-        return cls(name, orders, _thirds(SINGLE + 1, highest), measured.synchronised, noise)
+        orders = tuple(range(lowest, highest + 1))
+        return cls(name, orders, _thirds(LOW + 1, highest), measured.synchronised, noise)
 
     @cached_property
     def scattered(self) -> tuple[tuple[int, int], ...]:
         """Bands whose scatter is a feature."""
         last = self.bands[-1][1] if self.bands else self.orders[-1]
         return () if self.noise is None else _thirds(1, last)
+
+    @cached_property
+    def highest(self) -> Integers:
+        """Highest order in each feature."""
+        parts = 2 if self.synchronised else 1
+        own = [k for k in self.orders for _ in range(parts if k else 1)]
+        return np.array([*own, *(b for _, b in (*self.bands, *self.scattered))])
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -156,55 +151,3 @@ def known_scatter(seen: Spectrum) -> Spectrum:
     few = (seen.revolutions - 1) / max(seen.revolutions - 3, 1)
     smooth = np.concatenate([own[:1], 0.5 * (own[1:] + near)])
     return replace(seen, variance=few * smooth)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The most informative combinations of features.
-
-    Attributes
-    ----------
-    centre, unit : ndarray, shape (p,)
-        Mean of the features over the ensemble, and their noise.
-    basis : ndarray, shape (p, q)
-        Combinations, orthonormal in units of the noise.
-    information : ndarray, shape (q,)
-        Variance of each over the ensemble, over that of the noise.
-    """
-
-    centre: Array
-    unit: Array
-    basis: Array
-    information: Array
-
-    @classmethod
-    def of(cls, features: Array, noise: Array) -> "Choice":
-        """Return those of an ensemble's features (n, p), and the variances (p,) of their noise."""
-        centre, spread = features.mean(axis=0), features.std(axis=0)
-        size = np.maximum(spread, 1e-12 * np.abs(centre).max(initial=1e-300))
-        unit = np.sqrt(noise + (FLOOR * size) ** 2)
-        _, singular, rows = np.linalg.svd((features - centre) / unit, full_matrices=False)
-        information = singular**2 / len(features)
-        count = max(1, min(COMPONENTS, int((information > LEAST_INFORMATION).sum())))
-        signs = np.sign(rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)])
-        return cls(centre, unit, (rows * signs[:, None])[:count].T, information[:count])
-
-    def only(self, kept: Array) -> "Choice":
-        """Return that with some of the combinations (q,)."""
-        return replace(self, basis=self.basis[:, kept], information=self.information[kept])
-
-    def scores(self, features: Array) -> Array:
-        """Return the combinations (..., q) of features (..., p)."""
-        found: Array = ((features - self.centre) / self.unit) @ self.basis
-        return found
-
-    def rest(self, features: Array) -> Array:
-        """Return what the combinations leave of features (..., p), in units of the noise."""
-        whole = (features - self.centre) / self.unit
-        left: Array = whole - (whole @ self.basis) @ self.basis.T
-        return left
-
-    def noise_of(self, variance: Array) -> Array:
-        """Return the covariance (q, q) of the combinations for noise with variances (p,)."""
-        found: Array = self.basis.T @ ((variance / self.unit**2)[:, None] * self.basis)
-        return found

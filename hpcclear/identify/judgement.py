@@ -7,10 +7,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from hpcclear.base.arrays import Array
-from hpcclear.identify.features import Choice, Layout, sensed
+from hpcclear.identify.features import Layout, sensed
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.posterior import LEVELS, Calibration, Model
 from hpcclear.identify.signals import Sensor
+from hpcclear.identify.summaries import FLOOR, Expected, Regression, informative, regressions
 from hpcclear.identify.training import Ensemble
 
 REFUSED = 3.5
@@ -24,8 +25,6 @@ CALIBRATED = 96
 """Members that are treated as machines."""
 
 PARTICLES_OF_A_MEMBER = 400
-PREDICTABLE = 0.1
-"""Share of a combination's variance over the ensemble that its Kriging model explains at least; others say nothing."""
 
 
 @dataclass(frozen=True)
@@ -34,19 +33,23 @@ class Prepared:
 
     ensemble: Ensemble
     layouts: tuple[Layout, ...]
-    sensor: Sensor
-    choice: Choice
+    summaries: tuple[Regression, ...]
+    expected: Expected
+    """Features, in units of their noise, that members with the same summaries have."""
+    centre: Array
+    unit: Array
+    """Mean of the features over the ensemble, and their noise, shape (p,) each."""
     model: Model
     calibration: Calibration
-    features: Array
-    """Of the members, shape (n, p)."""
-    columns: tuple[int, ...]
-    """Inputs that the models have, columns of the places."""
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Names of the features."""
         return tuple(label for one in self.layouts for label in one.labels)
+
+    def summarised(self, values: Array) -> Array:
+        """Return the summaries (q,) of features (p,)."""
+        return np.array([float(one(values[None])[0]) for one in self.summaries])
 
 
 @dataclass(frozen=True)
@@ -59,18 +62,18 @@ class Verdict:
         Of the posterior, SI, widened about the median as the intervals are.
     interval : ndarray, shape (3, unknowns)
         Lower end, median and upper end, SI.
-    doubt : ndarray, shape (2,)
-        Standard scores of the fit: of the informative combinations, and of all other features.
+    doubt : float
+        Standard score of the fit of all features.
     explained : bool
     worst : int
         Feature that fits least.
     measured, predicted, deviation : ndarray, shape (p,)
-        Features, their predictive mean and standard deviation.
+        Features; mean and standard deviation of those of machines with the same summaries.
     """
 
     particles: Array
     interval: Array
-    doubt: Array
+    doubt: float
     explained: bool
     worst: int
     measured: Array
@@ -120,39 +123,39 @@ def _prepared(
     ensemble: Ensemble, layouts: Sequence[Layout], sensor: Sensor, frequency: float, variance: Array,
     seed: int, members: int,
 ) -> Prepared:  # fmt: skip
-    features, own = members_of(ensemble, layouts, sensor, frequency)
+    clean, own = members_of(ensemble, layouts, sensor, frequency)
     size, unknowns = ensemble.inputs.size, len(ensemble.inputs.unknowns)
     further = [size + k for k, error in enumerate((sensor.gain_error, sensor.angle_error)) if error]
-    columns = (*range(size), *further)
-    places = ensemble.places[:, list(columns)]
-    choice = Choice.of(features, variance + own.mean(axis=0))
+    places = ensemble.places[:, [*range(size), *further]]
     rng = np.random.default_rng([seed, 0x6964])
-    choice = choice.only(predictable(places, choice.scores(features), rng))
-    projector = np.eye(len(variance)) - choice.basis @ choice.basis.T
-    relative = variance / choice.unit**2
-    model = Model.of(
-        places, choice.scores(features), choice.rest(features), choice.noise_of(variance),
-        projector @ (relative[:, None] * projector), unknowns, rng,
-    )  # fmt: skip
+    features = as_measured(clean, own, variance, rng)
+    orders = np.concatenate([one.highest for one in layouts])
+    summaries = informative(regressions(features, variance, orders, places), places)
+    centre = features.mean(axis=0)
+    unit = np.sqrt(variance + FLOOR**2 * features.var(axis=0))
+    unit = np.maximum(unit, 1e-9 * unit.max() + 1e-300)  # of features that are always the same
+    left_out = np.column_stack([one.left_out for one in summaries])
+    expected = Expected.of(left_out, (features - centre) / unit, rng)
+    model = Model.of(places, left_out, expected.left, unknowns, rng)
+    calibration = Calibration.of(model, unknowns, members, PARTICLES_OF_A_MEMBER, (seed, 0x63616C))
+    return Prepared(ensemble, tuple(layouts), summaries, expected, centre, unit, model, calibration)
 
-    def noisy(stream: np.random.Generator) -> tuple[Array, Array]:
-        drawn = stream.standard_normal(features.shape) * np.sqrt(relative)
-        return drawn @ choice.basis, drawn @ projector
 
-    calibration = Calibration.of(
-        model, noisy, unknowns, members, PARTICLES_OF_A_MEMBER, (seed, 0x63616C)
-    )
-    return Prepared(ensemble, tuple(layouts), sensor, choice, model, calibration, features, columns)
+def as_measured(features: Array, own: Array, variance: Array, rng: np.random.Generator) -> Array:
+    """Return members' features (n, p) with noise: what their `own` variances (n, p) lack of those measured (p,)."""
+    return features + rng.standard_normal(features.shape) * np.sqrt(np.maximum(variance - own, 0.0))
 
 
 def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTICLES) -> Verdict:
     """Return what the features (p,) of a measurement say."""
     with threadpool_limits(limits=1, user_api="blas"):
-        choice, rng = prepared.choice, np.random.default_rng([seed, 0x706F])
-        scores, rest = choice.scores(values), choice.rest(values)
-        found, fit = prepared.model.posterior(scores, rest, particles, rng)
-        mean, deviation = _predictive(prepared, found)
-    doubt = prepared.calibration.doubt(fit)
+        rng = np.random.default_rng([seed, 0x706F])
+        summaries = prepared.summarised(values)
+        mean = prepared.centre + prepared.unit * prepared.expected(summaries)
+        rest = (values - mean) / prepared.unit
+        found = prepared.model.posterior(summaries, particles, rng)
+        doubt = prepared.calibration.doubt(prepared.model.fit(rest))
+        deviation = prepared.unit * np.sqrt((prepared.model.rest**2).mean(axis=0) + 1e-12)
     inputs, unknowns = prepared.ensemble.inputs, len(prepared.ensemble.inputs.unknowns)
     middle = np.median(found[:, :unknowns], axis=0)
     wide = found.copy()
@@ -163,40 +166,10 @@ def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTIC
     interval = np.quantile(physical[:, :unknowns], LEVELS, axis=0)
     score = np.abs(values - mean) / deviation
     return Verdict(
-        physical, interval, doubt, bool(doubt.max() < REFUSED), int(np.argmax(score)), values, mean, deviation
+        physical, interval, doubt, doubt < REFUSED, int(np.argmax(score)), values, mean, deviation
     )  # fmt: skip
 
 
-def _poor(doubt: Array) -> float:
+def _poor(doubt: float) -> float:
     """By how much a poor fit widens intervals: the model is off by about as much more than its own scatter."""
-    return float(np.exp(0.5 * max(0.0, float(doubt.max()) - POOR)))
-
-
-def _predictive(prepared: Prepared, found: Array) -> tuple[Array, Array]:
-    """Mean and standard deviation (p,) of the features by the posterior: of the smooth part, its scatter, and noise."""
-    choice, model = prepared.choice, prepared.model
-    likelihood = model.likelihoods[0]
-    scores = np.column_stack([one.predict(found) for one in likelihood.models])
-    mean = choice.centre + choice.unit * (
-        choice.basis @ scores.mean(axis=0) + model.rest.mean(axis=0)
-    )
-    missed = np.column_stack([one.leave_one_out() for one in likelihood.models]) - model.scores
-    left = model.rest - model.rest.mean(axis=0) + missed @ choice.basis.T
-    spread = (scores @ choice.basis.T).var(axis=0) + (left**2).mean(axis=0)
-    return mean, choice.unit * np.sqrt(spread + 1.0)  # 1: the noise, in its own unit
-
-
-def predictable(places: Array, scores: Array, rng: np.random.Generator) -> Array:
-    """Return which combinations (q,) of members' features a model of the inputs explains; one at least.
-
-    By trigonometric features of the places and ridge regression, leave-one-out: a cheap relative of Kriging.
-    """
-    frequency = rng.standard_normal((places.shape[1], 60)) * 2.0
-    phase = rng.uniform(0.0, 2.0 * np.pi, 60)
-    terms = np.column_stack([np.ones(len(places)), places, np.cos(places @ frequency + phase)])
-    hat = terms @ np.linalg.solve(terms.T @ terms + 0.3 * np.eye(terms.shape[1]), terms.T)
-    left = (scores - hat @ scores) / (1.0 - np.diag(hat))[:, None]
-    explained = 1.0 - left.var(axis=0) / scores.var(axis=0)
-    kept = explained > PREDICTABLE
-    kept[int(np.argmax(explained))] = True
-    return np.asarray(kept)
+    return float(np.exp(0.5 * max(0.0, doubt - POOR)))

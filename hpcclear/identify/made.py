@@ -12,6 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulate
 from hpcclear.identify.signals import IMPACTS, revolutions_of, series_of, unit_of
+from hpcclear.identify.training import prepared_scene
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -25,7 +26,7 @@ def write_made(
     Parameters
     ----------
     scene : Scene
-        Of `hpcclear.identify.training.prepared_scene`, or any with many instants per revolution.
+        The machine.
     path : path
         CSV table to write.
     names : sequence of str
@@ -45,7 +46,7 @@ def write_made(
     """
     if response is None:
         longer = {"numerics.averaged_revolutions": revolutions + 1}
-        response = simulate(scene.with_(longer), checked=False)
+        response = simulate(prepared_scene(scene).with_(longer), checked=False)
     status = Status(int(response["status"]))
     if not status.valid:
         raise InputError("scene", status.name.lower(), status.message, status.remedy)

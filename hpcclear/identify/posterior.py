@@ -1,8 +1,8 @@
-"""Posterior distribution of what is not known, given features; its intervals are calibrated on the ensemble itself.
+"""Posterior distribution of what is not known, given summaries of features, with intervals calibrated on the ensemble itself.
 
-A Kriging model of each combination of features gives their mean over the inputs. What it misses at a point that was left out
-is the scatter of the model: chaos, effects of few revolutions and lack of fit. Its covariance and that of the measured noise
-make the likelihood, a Student t, as chaos has heavy tails.
+A Kriging model of each summary gives its mean over the inputs. The leave-one-out errors of these models are the scatter: chaos,
+effects of few revolutions, measured noise and lack of fit. Its covariance makes the likelihood, a Student t, as chaos has
+heavy tails.
 
 Members of the ensemble are then treated as machines whose truth is known, each by models fitted without it. How far their
 truths lie out, in half-widths, says by how much intervals have to be widened (conformal prediction), and how badly a signal
@@ -14,10 +14,10 @@ doi:10.1111/j.1467-9868.2006.00553.x; V. Vovk, A. Gammerman and G. Shafer, "Algo
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -45,99 +45,80 @@ LEVELS = (0.025, 0.5, 0.975)
 """Quantiles of an interval and its median."""
 
 
-class Fit(NamedTuple):
-    """How well the model explains features: distance of the combinations from the nearest prediction, and of all else."""
-
-    scores: float
-    rest: float
-
-
 @dataclass(frozen=True)
 class Likelihood:
-    """Log-likelihood of places in the unit cube, given combinations of features."""
+    """Log-likelihood of places in the unit cube, given summaries of features."""
 
     models: tuple[Kriging, ...]
     scatter: Callable[[Array], Array]
-    """Relative variance of the model's scatter (n,) at places (n, d)."""
-    axes: Array
-    """Combinations (q, q) in which both covariances are diagonal, those of the model ones."""
-    noise: Array
-    """Variances (q,) of the measured noise along them."""
+    """Relative variance of the scatter (n,) at places (n, d)."""
+    inverse: Array
+    """Inverse covariance (q, q) of the scatter where its relative variance is 1."""
 
-    def distance(self, places: Array, scores: Array) -> tuple[Array, Array]:
-        """Squared distance of the scores (q,) from predictions at places (n, d), and log of the determinant, (n,) each."""
-        mean = np.column_stack([one.predict(places) for one in self.models])
-        variance = self.scatter(places)[:, None] + self.noise
-        return (((scores - mean) @ self.axes) ** 2 / variance).sum(1), np.log(variance).sum(1)
-
-    def __call__(self, places: Array, scores: Array) -> Array:
-        """Log-likelihood (n,)."""
-        square, determinant = self.distance(places, scores)
-        power = 0.5 * (FREEDOM + len(self.noise))
-        return -power * np.log1p(square / FREEDOM) - 0.5 * determinant
+    def __call__(self, places: Array, summaries: Array) -> Array:
+        """Log-likelihood (n,) of places (n, d), given summaries (q,)."""
+        missed = summaries - np.column_stack([one.predict(places) for one in self.models])
+        variance = self.scatter(places)
+        square = ((missed @ self.inverse) * missed).sum(1) / variance
+        power = 0.5 * (FREEDOM + len(summaries))
+        return -power * np.log1p(square / FREEDOM) - 0.5 * len(summaries) * np.log(variance)
 
 
 @dataclass(frozen=True)
 class Model:
-    """Models of an ensemble's features: of all members, and of all but one group.
+    """Models of an ensemble's summaries: of all members, and of all but one group.
 
     Attributes
     ----------
     places : ndarray, shape (n, d)
-    scores, rest : ndarray, shapes (n, q) and (n, p)
-        Combinations of the members' features, and what these leave.
+    summaries, rest : ndarray, shapes (n, q) and (n, p)
+        Summaries of the members' features, each by regressions without the member, and what these leave of the features.
     likelihoods : tuple of Likelihood
         That of all members first, then one for each group left out.
     distances : tuple of ndarray, shape (p, p)
         Inverse covariances of the rests, in the same order.
-    noise, noise_rest : ndarray, shapes (q, q) and (p,)
-        Covariance of the measured noise in the combinations, and variances in the features, in units of the noise.
     """
 
     places: Array
-    scores: Array
+    summaries: Array
     rest: Array
     likelihoods: tuple[Likelihood, ...]
     distances: tuple[Array, ...]
-    noise: Array
 
     @classmethod
     def of(
-        cls, places: Array, scores: Array, rest: Array, noise: Array, noise_rest: Array,
-        unknowns: int, rng: np.random.Generator,
-    ) -> "Model":  # fmt: skip
-        """Fit the models; shapes as above, `noise_rest` (p, p), the first `unknowns` of the inputs are identified."""
+        cls, places: Array, summaries: Array, rest: Array, unknowns: int, rng: np.random.Generator
+    ) -> "Model":
+        """Fit the models; shapes as above, the first `unknowns` of the inputs are identified."""
         bounds = np.tile([0.0, 1.0], (places.shape[1], 1))
         models = tuple(
             fit_kriging(
                 places, column, bounds, rng=rng, restarts=0, lengths=LENGTHS, kernel="matern-5/2"
             )
-            for column in scores.T
+            for column in summaries.T
         )
-        missed = np.column_stack([one.leave_one_out() for one in models]) - scores
+        missed = np.column_stack([one.leave_one_out() for one in models]) - summaries
         missed[~np.isfinite(missed)] = 0.0
         scatter, covariance = _scatter(places[:, :unknowns], missed)
-        values, axes = eigh(noise, covariance)
-        groups = _groups(len(places))
+        inverse, groups = np.asarray(np.linalg.inv(covariance), float), _groups(len(places))
         kept = [np.ones(len(places), bool), *(groups != k for k in range(FOLDS))]
         likelihoods = tuple(
-            Likelihood(
-                tuple(_without(m, rows) for m in models), scatter, axes, np.maximum(values, 0.0)
-            )
-            for rows in kept
+            Likelihood(tuple(_without(m, rows) for m in models), scatter, inverse) for rows in kept
         )
-        distances = tuple(_inverse(rest[rows], noise_rest) for rows in kept)
-        return cls(places, scores, rest, likelihoods, distances, noise)
+        return cls(
+            places, summaries, rest, likelihoods, tuple(_inverse(rest[rows]) for rows in kept)
+        )
 
     def posterior(
-        self, scores: Array, rest: Array, particles: int, rng: np.random.Generator, group: int = -1
-    ) -> tuple[Array, Fit]:
-        """Return particles (n, d) of the posterior and the fit, by the models that leave a group out; -1: none."""
+        self, summaries: Array, particles: int, rng: np.random.Generator, group: int = -1
+    ) -> Array:
+        """Return particles (n, d) of the posterior, by the models that leave a group out; -1: none."""
         likelihood = self.likelihoods[group + 1]
-        found = sequential(lambda x: likelihood(x, scores), self.places.shape[1], particles, rng)
-        nearest = float(likelihood.distance(found, scores)[0].min()) / len(scores)
-        left = float(rest @ self.distances[group + 1] @ rest) / len(rest)
-        return found, Fit(nearest, left)
+        return sequential(lambda x: likelihood(x, summaries), self.places.shape[1], particles, rng)
+
+    def fit(self, rest: Array, group: int = -1) -> float:
+        """Return how far what the summaries leave of features (p,) lies from that of the members: 1 is usual."""
+        return float(rest @ self.distances[group + 1] @ rest) / len(rest)
 
 
 @dataclass(frozen=True)
@@ -150,49 +131,41 @@ class Calibration:
         By which half-widths are multiplied, at least 1.
     coverage : ndarray, shape (unknowns,)
         Share of members whose truth lies in the 95 % interval before widening.
-    fits : ndarray, shape (members, 2)
-        Columns as in `Fit`.
-    half_width : ndarray, shape (members, unknowns)
-        Of the widened intervals, as shares of the bounds' range.
+    fits : ndarray, shape (members,)
+        As of `Model.fit`.
     """
 
     widening: Array
     coverage: Array
     fits: Array
-    half_width: Array
 
     @classmethod
     def of(
-        cls, model: Model, noisy: Callable[[np.random.Generator], tuple[Array, Array]], unknowns: int,
-        members: int, particles: int, seeds: Sequence[int],
-    ) -> "Calibration":  # fmt: skip
-        """Treat the first members as machines; `noisy` draws the noise of combinations and rests for all of them."""
+        cls, model: Model, unknowns: int, members: int, particles: int, seeds: Sequence[int]
+    ) -> "Calibration":
+        """Treat the first members as machines."""
         count = min(members, len(model.places))
-        score_noise, rest_noise = noisy(np.random.default_rng([*seeds, 0]))
         groups = _groups(len(model.places))
-        out, half, fits = [], [], []
+        out, fits = [], []
         for k in range(count):
             rng = np.random.default_rng([*seeds, 1, k])
-            scores, rest = model.scores[k] + score_noise[k], model.rest[k] + rest_noise[k]
-            found, fit = model.posterior(scores, rest, particles, rng, int(groups[k]))
+            found = model.posterior(model.summaries[k], particles, rng, int(groups[k]))
             low, middle, high = np.quantile(found[:, :unknowns], LEVELS, axis=0)
             truth = model.places[k, :unknowns]
             side = np.where(truth < middle, middle - low, high - middle)
             out.append(np.abs(truth - middle) / np.maximum(side, 1e-9))
-            half.append(0.5 * (high - low))
-            fits.append(fit)
+            fits.append(model.fit(model.rest[k], int(groups[k])))
         score = np.sort(np.array(out), axis=0)
         rank = min(int(np.ceil(0.95 * (count + 1))), count) - 1
         widening = np.maximum(score[rank], 1.0)
-        return cls(widening, (score <= 1.0).mean(axis=0), np.array(fits), np.array(half) * widening)
+        return cls(widening, (score <= 1.0).mean(axis=0), np.array(fits))
 
-    def doubt(self, fit: Fit) -> Array:
-        """Return the logarithmic standard scores (2,) of a fit among those of the members."""
+    def doubt(self, fit: float) -> float:
+        """Logarithmic standard score of a fit among those of the members."""
         logs = np.log(np.maximum(self.fits, 1e-300))
-        middle = np.median(logs, axis=0)
-        upper = np.quantile(logs, 0.84, axis=0) - middle
-        found: Array = (np.log(np.maximum(fit, 1e-300)) - middle) / np.maximum(upper, 0.05)
-        return found
+        middle = float(np.median(logs))
+        upper = float(np.quantile(logs, 0.84)) - middle
+        return (float(np.log(max(fit, 1e-300))) - middle) / max(upper, 0.05)
 
 
 def sequential(
@@ -266,11 +239,22 @@ def _shrunk(covariance: Array) -> Array:
     return (1.0 - SHRINKAGE) * covariance + SHRINKAGE * np.diag(np.diag(covariance))
 
 
-def _inverse(rest: Array, noise: Array) -> Array:
-    """Inverse covariance (p, p) of what combinations leave, of members and of noise."""
-    covariance = _shrunk(np.cov(rest.T) + noise)
-    floor = 1e-3 * np.trace(covariance) / len(covariance)
-    return np.asarray(np.linalg.inv(covariance + floor * np.eye(len(covariance))))
+def _inverse(rest: Array) -> Array:
+    """Inverse covariance (p, p) of what summaries leave of members' features (n, p), shrunk towards its diagonal.
+
+    The share of the diagonal is that of Y. Chen et al., "Shrinkage algorithms for MMSE covariance estimation", IEEE Trans.
+    Signal Process. 58 (2010), doi:10.1109/TSP.2010.2053029, eq. 23, for features of unit variance.
+    """
+    count, size = rest.shape
+    deviation = np.maximum(rest.std(axis=0), 1e-12)
+    unit = (rest - rest.mean(axis=0)) / deviation
+    related = unit.T @ unit / count
+    square = float((related**2).sum())
+    above = (1.0 - 2.0 / size) * square + size**2
+    below = (count + 1.0 - 2.0 / size) * (square - size)
+    share = min(1.0, above / below) if below > 0.0 else 1.0
+    shrunk = (1.0 - share) * related + share * np.eye(size)
+    return np.asarray(np.linalg.inv(shrunk) / np.outer(deviation, deviation))
 
 
 def _scatter(unknowns: Array, missed: Array) -> tuple[Callable[[Array], Array], Array]:
@@ -280,12 +264,8 @@ def _scatter(unknowns: Array, missed: Array) -> tuple[Callable[[Array], Array], 
     common = float(squares.mean())
 
     def relative(places: Array) -> Array:
-        near = np.zeros((len(places), len(unknowns)))
-        for column, own in zip(
-            places.T, unknowns.T, strict=False
-        ):  # further columns are nuisance inputs
-            near += (column[:, None] - own) ** 2
-        weight = np.exp(-0.5 * near / NEAR**2)
+        near = cdist(places[:, : unknowns.shape[1]], unknowns, "sqeuclidean")
+        weight = np.exp(-0.5 / NEAR**2 * near)
         return np.asarray((weight @ squares + common) / (weight.sum(1) + 1.0))
 
     scale = relative(unknowns)

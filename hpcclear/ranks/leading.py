@@ -1,10 +1,10 @@
-"""Who hands samples out: root to all ranks; where these are many, root to a leader on each node, and that to its others.
+"""A design on its way through the ranks: root hands samples out and works along (`run_points`), each rank has a queue of them.
 
-A rank serves whoever announced the stage to it. Shared out twice, samples cost root a message for each bundle of them,
-and within a node all is as between root and a few ranks.
+A rank serves whoever announced the stage to it; where there are many, that is a leader on its node (`nodes`).
 """
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
@@ -12,16 +12,117 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
+from hpcclear.ranks.mailbox import Backoff, Mail, Message, Tag
 from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, HandOut, Kept, Need, Points, WorkQueue
+from hpcclear.ranks.schedule import (
+    COLUMNS,
+    GLANCE,
+    QUANTUM,
+    HandOut,
+    Kept,
+    Need,
+    Points,
+    Task,
+    Worker,
+)
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 EARLY = 1.0
 """Seconds from the beginning of a stage in which the first samples are waited for."""
 
 _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
-_NONE = np.empty(0, np.int64)
+
+
+class WorkQueue:
+    """One rank's side of it: feeds the worker, knows its stock, its speed and its busy time.
+
+    Parameters
+    ----------
+    worker : Worker
+        The simulations of this rank.
+    clock : callable
+        Seconds; replaced by tests.
+    recent : ndarray, shape (2,), optional
+        Finished samples and busy seconds, the older the less weight: of such a worker before, and kept up.
+    """
+
+    def __init__(
+        self,
+        worker: Worker,
+        clock: Callable[[], float] = time.perf_counter,
+        recent: np.ndarray | None = None,
+    ) -> None:
+        self._worker = worker
+        self._clock = clock
+        self._in_hand: set[int] = set()
+        self._recent = np.zeros(2) if recent is None else recent
+        self._ask_below = 1
+        self._inside = False
+        self.busy = 0.0
+        self.exhausted = False
+
+    @property
+    def need(self) -> Need:
+        """What to report to root."""
+        finished, seconds = self._recent
+        rate = float(finished / seconds) if seconds > 0.0 else 0.0
+        return Need(self._worker.lanes, self._worker.pending, rate)
+
+    @property
+    def hungry(self) -> bool:
+        """Whether it is time to request more."""
+        return not self.exhausted and self._worker.pending < self._ask_below
+
+    @property
+    def soon_hungry(self) -> bool:
+        """Whether it may be, within the next `QUANTUM`."""
+        need = self.need
+        return not self.exhausted and need.pending < self._ask_below + 2.0 * QUANTUM * need.rate
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing to work on."""
+        return self._worker.pending == 0
+
+    @property
+    def suspects(self) -> list[int]:
+        """Samples in hand, ascending, if the worker raised an exception; else none."""
+        if not self._inside:
+            return []
+        return getattr(self._worker, "samples_in_hand", None) or sorted(self._in_hand)
+
+    def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
+        """Queue a block: indices of shape (n,), points of shape (n, d); an empty one says that there is no more."""
+        self._ask_below = ask_below
+        if index.size == 0:
+            self.exhausted = True
+            return
+        self._in_hand.update(index.tolist())
+        self._inside = True
+        self._worker.submit(index, points)
+        self._inside = False
+
+    def work(self, seconds: float = QUANTUM) -> np.ndarray:
+        """Let the worker advance; return the records it finished.
+
+        Raises
+        ------
+        RuntimeError
+            If the worker returns a sample that it was not given, or had returned before.
+        """
+        started = self._clock()
+        self._inside = True
+        records = self._worker.advance(seconds)
+        self._inside = False
+        spent = self._clock() - started
+        self.busy += spent
+        self._recent *= math.exp(-spent / 2.0)  # costs change over a design: two seconds of memory
+        self._recent += records.size, spent
+        for sample in records["sample"].tolist():
+            if sample not in self._in_hand:
+                raise RuntimeError(f"the worker returned sample {sample}, which it does not have")
+            self._in_hand.remove(sample)
+        return records
 
 
 class Process(Protocol):
@@ -30,9 +131,16 @@ class Process(Protocol):
     mail: Mail
     stop_switch: StopSwitch
     rank: int
+    size: int
 
     def make_queue(self, task: Any, /) -> tuple[WorkQueue, float]:
         """A worker for a task, and the seconds it took to make it."""
+
+    def forget_queue(self) -> None:
+        """No sample is in hand any more."""
+
+    def timed(self, name: str, /) -> AbstractContextManager[np.ndarray]:
+        """Book the wall time inside; the table to fill, shape (ranks, 4), columns as in `COLUMNS`."""
 
     def raise_if_stopped(self) -> None:
         """Raise `Stopped` if requested to end early."""
@@ -47,24 +155,61 @@ class Process(Protocol):
         """Count the time inside as output."""
 
 
-class Sharing(Protocol):
-    """What a leader does with bundles of samples, besides handing these out."""
+def run_points(
+    ranks: Process,
+    task: Task,
+    points: Points,
+    *,
+    completed: np.ndarray | None = None,
+    on_records: Callable[[np.ndarray], object] | None = None,
+    save: Callable[[], object] | None = None,
+    progress: Progress | None = None,
+    keep: bool = True,
+) -> np.ndarray:
+    """Simulate a design on all ranks; call it on root, as often as needed.
 
-    @property
-    def points(self) -> Points:
-        """Points of the samples, by their numbers."""
+    Parameters
+    ----------
+    points : ndarray, shape (n, d), or Points
+        The design, or an object that makes the rows requested.
+    completed : structured ndarray, optional
+        Records of samples finished before; they are not simulated again.
+    on_records : callable, optional
+        Gets every batch of newly finished records, on root, as they arrive.
+    save : callable, optional
+        Called after each batch, to write what has gathered; not again once anything has failed,
+        while `on_records` still gets what the ranks had finished by then.
+    progress : Progress, optional
+        Shown meanwhile.
+    keep : bool, optional
+        Return the records; without, memory does not grow with them.
 
-    def open(self, index: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
-        """Numbers of the samples in each of the bundles that came from root: their numbers (m,) and rows (m, d)."""
+    Returns
+    -------
+    structured ndarray
+        One record a sample in ascending order, whoever made it; empty unless `keep`.
 
-    def take(self, records: np.ndarray) -> None:
-        """Take finished samples, records (m,)."""
-
-    def finished(self) -> np.ndarray:
-        """For root, once: a record for each bundle that is complete, shape (m,)."""
-
-    def unfinished(self) -> list[np.ndarray]:
-        """For root, at the end: records of whatever was taken of others, by type, shape (m,) each."""
+    Raises
+    ------
+    Stopped
+        If requested to end early; `on_records` got everything that was finished, `save` may be due.
+    RankFailed
+        If another rank failed; likewise.
+    """
+    earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
+    progress = Progress("", style="quiet") if progress is None else progress
+    shared = task.share is not None
+    members = ranks.mail.leaders if shared else list(range(1, ranks.size))
+    working = len(members) if shared else task.workers or ranks.size
+    lead = RootLead(ranks, HandOut(len(points), earlier["sample"], working), points, members)
+    lead.on_records, lead.save, lead.progress = on_records, save, progress
+    lead.kept = Kept(len(points), earlier) if keep else None
+    progress.start(len(points), earlier)
+    with contextlib.closing(progress), ranks.timed(task.name) as spent:
+        if not lead.book.done:
+            lead.work(task, spent)
+            ranks.forget_queue()
+    return earlier[:0] if lead.kept is None else lead.kept.records()
 
 
 class Lead:
@@ -229,116 +374,3 @@ class RootLead(Lead):
                 self.save()
         if not self._failed:
             self.progress.add(records)
-
-
-class NodeLead(Lead):
-    """A leader's part in a stage: it takes bundles from root, and shares out what they hold with the others on its node."""
-
-    def __init__(self, ranks: Process, sharing: Sharing, group: list[int]) -> None:
-        super().__init__(ranks, HandOut(0, _NONE, 1 + len(group)), sharing.points, group)
-        self._sharing, self._group = sharing, group
-        self._sizes: list[int] = []  # samples of each bundle
-        self._waiting: list[tuple[int, Need]] = []  # asked while nothing was there
-        self._ask_below = 1  # bundles
-        self._asked = self._exhausted = self._over = False
-        self._times: list[tuple[int, float, float]] = []
-
-    def work(self, task: object) -> None:
-        """Serve the node until root ends the stage."""
-        self._mail.notify(
-            self._group, Tag.STAGE, task
-        )  # before the worker is made: nodes meet there
-        queue, setup = self._ranks.make_queue(task)
-        try:
-            self._share_out(queue)
-            self._close()
-        except Exception:
-            self._report()  # what is finished; the error follows
-            raise
-        self._times.append((self._ranks.rank, queue.busy, setup))
-        self._report()
-        self._mail.send(0, Tag.DONE, (None, self._times))
-
-    def _share_out(self, queue: WorkQueue) -> None:
-        """Answer root and the others, and work along."""
-        backoff = Backoff()
-        while not self._over:
-            while (message := self._mail.poll()) is not None:
-                self._hear(message)
-                backoff.reset()
-            self._ranks.pass_on_stop()
-            self._speak()
-            self._work_along(queue, backoff)
-
-    def _hear(self, message: Message) -> None:
-        """Root's word, or an answer to one of the others."""
-        if message.source != 0:
-            self._answer(message)
-        elif message.tag == Tag.LEAVE:
-            raise Leave(message.body)
-        elif message.tag == Tag.END:
-            self._over = True
-        else:
-            index, rows, self._ask_below = message.body
-            self._asked, self._exhausted = False, index.size == 0
-            if index.size:
-                bundles = self._sharing.open(index, rows)
-                self.book.extend(np.concatenate(bundles))
-                self._sizes += map(len, bundles)
-            waiting, self._waiting = self._waiting, []
-            for source, need in waiting:
-                self._give(source, need)
-
-    def _speak(self) -> None:
-        """Hand root the bundles that are done, and request others in time."""
-        done = self._sharing.finished()
-        if not (self._asked or self._exhausted) and self._stock < self._ask_below:
-            self._mail.send(0, Tag.ASK, (done, Need(1, self._stock, 0.0)))
-            self._asked = True
-        elif done.size:
-            self._mail.send(0, Tag.RECORDS, done)
-
-    @property
-    def _stock(self) -> int:
-        """Bundles with samples that nobody has."""
-        left, found = self.book.remaining, 0
-        while left > 0:
-            found += 1
-            left -= self._sizes[-found]
-        return found
-
-    @property
-    def _can_answer(self) -> bool:
-        return self.book.remaining > 0 or self._exhausted
-
-    def _give(self, source: int, need: Need) -> None:
-        if self._can_answer:
-            super()._give(source, need)
-        else:
-            self._waiting.append((source, need))
-
-    def _close(self) -> None:
-        """Let the others end the stage, and take what they have."""
-        self._closing = True
-        self._mail.notify(self._group, Tag.END)
-        backoff = Backoff()
-        while self._present:
-            message = self._mail.poll()
-            if message is None:
-                backoff.wait()
-            else:
-                self._hear(message)
-
-    def _report(self) -> None:
-        """Send root all that was taken, of bundles that are done and of others."""
-        for records in (self._sharing.finished(), *self._sharing.unfinished()):
-            if records.size:
-                self._mail.send(0, Tag.RECORDS, records)
-
-    def _accept(self, records: np.ndarray | None) -> None:
-        if records is not None and records.size:
-            self.book.accept(records)
-            self._sharing.take(records)
-
-    def _book_times(self, times: list[tuple[int, float, float]]) -> None:
-        self._times += times

@@ -4,11 +4,13 @@ Free of MPI, so that a scaling model can run the same policy on ranks that do no
 """
 
 import math
-import time
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from hpcclear.base.outcome import OUTCOME
 
 QUANTUM = 0.03
 """Seconds of work between two looks into the mailbox; the longest a request waits at root."""
@@ -53,6 +55,49 @@ class Points(Protocol):
 
     def __getitem__(self, index: np.ndarray, /) -> np.ndarray:
         """Rows of the samples `index`, float64 (m, d)."""
+
+
+class Sharing(Protocol):
+    """What a leader does with bundles of samples, besides handing these out."""
+
+    @property
+    def points(self) -> Points:
+        """Points of the samples, by their numbers."""
+
+    def open(self, index: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
+        """Numbers of the samples in each of the bundles that came from root: their numbers (m,) and rows (m, d)."""
+
+    def take(self, records: np.ndarray) -> None:
+        """Take finished samples, records (m,)."""
+
+    def finished(self) -> np.ndarray:
+        """For root, once: a record for each bundle that is complete, shape (m,)."""
+
+    def unfinished(self) -> list[np.ndarray]:
+        """For root, at the end: records of whatever was taken of others, by type, shape (m,) each."""
+
+
+Maker = Callable[[Any, Any], Worker]
+"""Makes a rank's worker from the payload of a stage and its `hpcclear.ranks.team.Ranks`; called on every rank."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the ranks do in a stage that simulates; it travels to every rank."""
+
+    name: str
+    """Of the stage, for reports and timing."""
+    make: Maker
+    """A function of a module: pickle sends its name."""
+    payload: object
+    """What it makes a worker from, such as a scene's content."""
+    dtype: np.dtype = OUTCOME
+    """Of the records; has a field ``sample``."""
+    workers: int | None = None
+    """How many ranks get samples, root first; by default all. The others only make their worker."""
+    share: Callable[[Any], Sharing] | None = None
+    """Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles, and
+    root, which hands them out, simulates nothing."""
 
 
 class Need(NamedTuple):
@@ -199,102 +244,12 @@ class Kept:
         self.add(earlier)
 
     def add(self, records: np.ndarray) -> None:
-        """Take finished records."""
+        """Take finished records; raises TypeError for those of another type, whose fields NumPy would assign by their order."""
+        if records.dtype != self._records.dtype:
+            raise TypeError(f"records are of type {records.dtype}, not {self._records.dtype}")
         self._records[records["sample"]] = records
         self._there[records["sample"]] = True
 
     def records(self) -> np.ndarray:
         """What has been taken, by growing number, shape (taken,)."""
         return self._records if self._there.all() else self._records[self._there]
-
-
-class WorkQueue:
-    """One rank's side of it: feeds the worker, knows its stock, its speed and its busy time.
-
-    Parameters
-    ----------
-    worker : Worker
-        The simulations of this rank.
-    clock : callable
-        Seconds; replaced by tests.
-    recent : ndarray, shape (2,), optional
-        Finished samples and busy seconds, the older the less weight: of such a worker before, and kept up.
-    """
-
-    def __init__(
-        self,
-        worker: Worker,
-        clock: Callable[[], float] = time.perf_counter,
-        recent: np.ndarray | None = None,
-    ) -> None:
-        self._worker = worker
-        self._clock = clock
-        self._in_hand: set[int] = set()
-        self._recent = np.zeros(2) if recent is None else recent
-        self._ask_below = 1
-        self._inside = False
-        self.busy = 0.0
-        self.exhausted = False
-
-    @property
-    def need(self) -> Need:
-        """What to report to root."""
-        finished, seconds = self._recent
-        rate = float(finished / seconds) if seconds > 0.0 else 0.0
-        return Need(self._worker.lanes, self._worker.pending, rate)
-
-    @property
-    def hungry(self) -> bool:
-        """Whether it is time to request more."""
-        return not self.exhausted and self._worker.pending < self._ask_below
-
-    @property
-    def soon_hungry(self) -> bool:
-        """Whether it may be, within the next `QUANTUM`."""
-        need = self.need
-        return not self.exhausted and need.pending < self._ask_below + 2.0 * QUANTUM * need.rate
-
-    @property
-    def idle(self) -> bool:
-        """Whether there is nothing to work on."""
-        return self._worker.pending == 0
-
-    @property
-    def suspects(self) -> list[int]:
-        """Samples in hand, ascending, if the worker raised an exception; else none."""
-        if not self._inside:
-            return []
-        return getattr(self._worker, "samples_in_hand", None) or sorted(self._in_hand)
-
-    def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
-        """Queue a block: indices of shape (n,), points of shape (n, d); an empty one says that there is no more."""
-        self._ask_below = ask_below
-        if index.size == 0:
-            self.exhausted = True
-            return
-        self._in_hand.update(index.tolist())
-        self._inside = True
-        self._worker.submit(index, points)
-        self._inside = False
-
-    def work(self, seconds: float = QUANTUM) -> np.ndarray:
-        """Let the worker advance; return the records it finished.
-
-        Raises
-        ------
-        RuntimeError
-            If the worker returns a sample that it was not given, or had returned before.
-        """
-        started = self._clock()
-        self._inside = True
-        records = self._worker.advance(seconds)
-        self._inside = False
-        spent = self._clock() - started
-        self.busy += spent
-        self._recent *= math.exp(-spent / 2.0)  # costs change over a design: two seconds of memory
-        self._recent += records.size, spent
-        for sample in records["sample"].tolist():
-            if sample not in self._in_hand:
-                raise RuntimeError(f"the worker returned sample {sample}, which it does not have")
-            self._in_hand.remove(sample)
-        return records

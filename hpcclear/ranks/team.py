@@ -10,52 +10,19 @@ import importlib
 import pickle
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
 
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.base.stopwatch import Stopwatch
-from hpcclear.ranks.leading import NodeLead, RootLead, Sharing
+from hpcclear.ranks.leading import WorkQueue
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
-from hpcclear.ranks.progress import Progress
-from hpcclear.ranks.schedule import (
-    COLUMNS,
-    GLANCE,
-    QUANTUM,
-    HandOut,
-    Kept,
-    Points,
-    Worker,
-    WorkQueue,
-)
+from hpcclear.ranks.nodes import NodeLead
+from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Task
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
 FLUSH_INTERVAL = 1.0
 """Seconds that a finished record waits on a rank at most."""
-
-Maker = Callable[[Any, "Ranks"], Worker]
-"""Makes a rank's worker from the payload of a stage; called on every rank."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """What the ranks do in a stage that simulates; it travels to every rank."""
-
-    name: str
-    """Of the stage, for reports and timing."""
-    make: Maker
-    """A function of a module: pickle sends its name."""
-    payload: object
-    """What it makes a worker from, such as a scene's content."""
-    dtype: np.dtype = OUTCOME
-    """Of the records; has a field ``sample``."""
-    workers: int | None = None
-    """How many ranks get samples, root first; by default all. The others only make their worker."""
-    share: Callable[[Any], Sharing] | None = None
-    """Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles, and
-    root, which hands them out, simulates nothing."""
 
 
 class Ranks:
@@ -131,68 +98,12 @@ class Ranks:
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Name what root does inside, for error reports and `stage_seconds`."""
-        with self._timed(name, serial=True):
+        with self.timed(name, serial=True):
             yield
 
     def writing(self) -> contextlib.AbstractContextManager[None]:
         """Count root's time inside as output of the stage under way."""
         return self._writing.running()
-
-    def run_points(
-        self,
-        task: Task,
-        points: Points,
-        *,
-        completed: np.ndarray | None = None,
-        on_records: Callable[[np.ndarray], object] | None = None,
-        save: Callable[[], object] | None = None,
-        progress: Progress | None = None,
-        keep: bool = True,
-    ) -> np.ndarray:
-        """Simulate a design on all ranks; call it on root, as often as needed.
-
-        Parameters
-        ----------
-        points : ndarray, shape (n, d), or Points
-            The design, or an object that makes the rows requested.
-        completed : structured ndarray, optional
-            Records of samples finished before; they are not simulated again.
-        on_records : callable, optional
-            Gets every batch of newly finished records, on root, as they arrive.
-        save : callable, optional
-            Called after each batch, to write what has gathered; not again once anything has failed,
-            while `on_records` still gets what the ranks had finished by then.
-        progress : Progress, optional
-            Shown meanwhile.
-        keep : bool, optional
-            Return the records; without, memory does not grow with them.
-
-        Returns
-        -------
-        structured ndarray
-            One record a sample in ascending order, whoever made it; empty unless `keep`.
-
-        Raises
-        ------
-        Stopped
-            If requested to end early; `on_records` got everything that was finished, `save` may be due.
-        RankFailed
-            If another rank failed; likewise.
-        """
-        earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
-        progress = Progress("", style="quiet") if progress is None else progress
-        shared = task.share is not None
-        members = self.mail.leaders if shared else list(range(1, self.size))
-        working = len(members) if shared else task.workers or self.size
-        run = RootLead(self, HandOut(len(points), earlier["sample"], working), points, members)
-        run.on_records, run.save, run.progress = on_records, save, progress
-        run.kept = Kept(len(points), earlier) if keep else None
-        progress.start(len(points), earlier)
-        with contextlib.closing(progress), self._timed(task.name) as spent:
-            if not run.book.done:
-                run.work(task, spent)
-                self._queue = None
-        return earlier[:0] if run.kept is None else run.kept.records()
 
     def everywhere(
         self, name: str, function: Callable[[Any, "Ranks"], object], payload: object
@@ -215,7 +126,7 @@ class Ranks:
         RankFailed
             If another rank failed.
         """
-        with self._timed(name) as spent:
+        with self.timed(name) as spent:
             self.raise_if_stopped()
             self.mail.notify_others(Tag.CALL, (name, function, payload))
             spent[0, COLUMNS.index("compile")] = self._call(function, payload)
@@ -238,7 +149,7 @@ class Ranks:
         return time.perf_counter() - started
 
     @contextlib.contextmanager
-    def _timed(self, name: str, serial: bool = False) -> Iterator[np.ndarray]:
+    def timed(self, name: str, serial: bool = False) -> Iterator[np.ndarray]:
         """Book the wall time inside, less what is booked inside; yields the table to fill."""
         spent = np.zeros((self.size, len(COLUMNS)))
         outer, self._stage = self._stage, name
@@ -263,6 +174,10 @@ class Ranks:
             self.stop_switch.request(message.body)
         elif message.tag == Tag.ERROR:
             raise RankFailed(*message.body[:2])
+
+    def forget_queue(self) -> None:
+        """No sample is in hand any more."""
+        self._queue = None
 
     def make_queue(self, task: Task) -> tuple[WorkQueue, float]:
         """This rank's worker, and the seconds it took to make it."""

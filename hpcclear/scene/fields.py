@@ -99,32 +99,52 @@ class Quantity(Converted):
     why: str = ""
     nonzero: bool = False
 
-    def convert(self, value: object) -> float:
-        """The value in SI; raises PydanticCustomError."""
-        number = self.number(value)
+    def convert(self, value: object, key: str = "") -> float:
+        """The value in SI; raises PydanticCustomError, with the key of the value."""
+        number = self.number(value, key)
         if not self.holds(number):
-            raise invalid(
-                f"must be {self.bounds()}" + (f": {self.why}" if self.why else ""), self._remedy()
-            )
+            why = f": {self.why}" if self.why else ""
+            raise invalid(f"must be {self.bounds()}{why}", self._remedy(), key)
         return number
 
-    def number(self, value: object) -> float:
-        """The value in SI, finite, bounds not looked at."""
+    def range(self, value: object, key: str) -> tuple[float, float]:
+        """A pair in rising order; errors as `convert`."""
+        if not isinstance(value, (list, tuple)) or len(value) != 2:
+            raise invalid("two bounds are expected here", "Write [lower, upper]", key)
+        lower, upper = (self.convert(bound, key) for bound in value)
+        if not lower < upper:
+            reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
+            raise invalid(reason, "Write the smaller bound first; leave a constant out", key)
+        if self.nonzero and lower < 0.0 < upper:
+            raise invalid(
+                "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key
+            )
+        return lower, upper
+
+    def several(self, value: object, key: str, least: int, most: int) -> tuple[float, ...]:
+        """Numbers, at least and at most so many; errors as `convert`."""
+        if not isinstance(value, (list, tuple)) or not least <= len(value) <= most:
+            count = f"{least}" if least == most else f"from {least} to {most}"
+            raise invalid(f"{count} numbers are expected here", "Write [first, second]", key)
+        return tuple(self.convert(one, key) for one in value)
+
+    def number(self, value: object, key: str = "") -> float:
+        """The value in SI, finite, bounds not looked at; errors as `convert`."""
         if isinstance(value, str):
             try:
                 value = to_si(value, self.unit)
             except UnitError as error:
-                raise invalid(error.reason, error.remedy) from None
+                raise invalid(error.reason, error.remedy, key) from None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise invalid("a number is expected here", self._remedy())
+            raise invalid("a number is expected here", self._remedy(), key)
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise invalid("the number must be finite", self._remedy())
+            raise invalid("the number must be finite", self._remedy(), key)
         if abs(number) > LARGEST or 0 < abs(number) < SMALLEST:
-            raise invalid("the number is outside the physical range", self._remedy())
+            raise invalid("the number is outside the physical range", self._remedy(), key)
         return number
 
     def holds(self, value: Any) -> Any:

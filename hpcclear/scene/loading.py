@@ -15,9 +15,9 @@ from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.measured import files_named, with_values
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.plugged import check_trust, with_texts
-from hpcclear.scene.scene import Scene, scene_of
+from hpcclear.scene.scene import Scene
 from hpcclear.scene.tables import plain
-from hpcclear.scene.validation import DEEPEST, dotted
+from hpcclear.scene.validation import DEEPEST, dotted, scene_of
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
 # tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
@@ -73,7 +73,7 @@ def load_scene(
         check_trust(content, "mapping" if text is None else str(source))
     if text is not None and not own_plugins:
         content = with_texts(content, lambda module: _beside(folder, module))
-    scene = scene_of(content)
+    scene = scene_of(Scene, content)
     notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
     if (
         text is None or named or own_plugins

@@ -1,14 +1,11 @@
-"""What study variables and random inputs share: names, the paths that they drive, numbers in the unit of these."""
+"""What study variables and random inputs share: names, and the paths that they drive."""
 
 import re
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import model_validator
-from pydantic_core import PydanticCustomError
-
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
-from hpcclear.scene.fields import Quantity, Table, invalid, nearest
+from hpcclear.scene.fields import Table, invalid, nearest
 from hpcclear.scene.paths import quantities
 
 SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
@@ -91,40 +88,6 @@ def resolved_paths(data: Mapping[str, object]) -> tuple[str, ...]:
     return tuple(paths)
 
 
-def number_of(value: object, quantity: Quantity, key: str) -> float:
-    """`Quantity.convert` with the key in its error."""
-    try:
-        return quantity.convert(value)
-    except PydanticCustomError as error:
-        context = error.context or {}
-        raise invalid(context["reason"], context["remedy"], key=key) from None
-
-
-def range_of(value: object, quantity: Quantity, key: str) -> Range:
-    """A pair in rising order."""
-    if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise invalid("two bounds are expected here", "Write [lower, upper]", key=key)
-    lower, upper = (number_of(bound, quantity, key) for bound in value)
-    if not lower < upper:
-        reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
-        raise invalid(reason, "Write the smaller bound first; leave a constant out", key=key)
-    if quantity.nonzero and lower < 0.0 < upper:
-        raise invalid(
-            "0 is between the bounds", "Keep to one sign: there would be no motion at 0", key=key
-        )
-    return lower, upper
-
-
-def list_of(
-    value: object, quantity: Quantity, key: str, least: int, most: int
-) -> tuple[float, ...]:
-    """Numbers, at least and at most so many."""
-    if not isinstance(value, (list, tuple)) or not least <= len(value) <= most:
-        count = f"{least}" if least == most else f"from {least} to {most}"
-        raise invalid(f"{count} numbers are expected here", "Write [first, second]", key=key)
-    return tuple(number_of(one, quantity, key) for one in value)
-
-
 class NamedInput(Table):
     """A named row of the study and the scene entries that get its value."""
 
@@ -132,25 +95,11 @@ class NamedInput(Table):
     paths: tuple[str, ...]
     """Scene entries that are set to its value."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _resolve(cls, data: object) -> object:
-        if not isinstance(data, Mapping):
-            return data
-        data = cls._without_numbers(data)
-        paths = () if data.get("paths") == () else resolved_paths(data)
-        row = {key: value for key, value in data.items() if key != "path"} | {"paths": paths}
-        return cls._in_si(row, paths)
 
-    @classmethod
-    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, object]:
-        """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
-        return data
-
-    @classmethod
-    def _in_si(cls, row: dict[str, object], paths: tuple[str, ...]) -> dict[str, object]:
-        """The row with the entries whose unit follows from its paths in SI."""
-        raise NotImplementedError
+def with_paths(data: Mapping[str, object]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """A row of a file with its `paths` resolved, and these; () if it has none already."""
+    paths = () if data.get("paths") == () else resolved_paths(data)
+    return {key: value for key, value in data.items() if key != "path"} | {"paths": paths}, paths
 
 
 def paths_of(name: str, row: Mapping[str, object]) -> tuple[str, ...]:

@@ -1,18 +1,16 @@
 """Designs to simulate: an array with a name and scene entries for each column."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.scene.domain import entries
-from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.paths import described, quantities
-from hpcclear.scene.scene import Scene
 from hpcclear.scene.study import Study
+from hpcclear.scene.tables import SceneTables
 
 
 @dataclass(frozen=True)
@@ -68,86 +66,27 @@ class Points:
         return Points(self.names, self.values[chosen], self.paths, labels, self.sampling)
 
 
-def check_points(
-    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
-) -> None:
-    """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
+class Numbers:
+    """The scene's numbers, a column of the points where one drives the entry: ``numbers("drive.speed")``."""
 
-    Raises
-    ------
-    InputError
-        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
-        radius, friction at rest is less than sliding, or a rod is not longer than its crank.
-    """
-    points = expanded(scene.study, points)
-    for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
-        for path in paths:
-            bounds = quantities()[path].bounds()
-            reason = f"must be finite and {bounds}" if bounds else "must be finite"
-            _refuse(~quantities()[path].holds(column), column, name, reason, label)
-            if path.endswith("initial_speed"):
-                usual = path.replace("initial_speed", "expected_speed")
-                reason = f"starts from rest, and {usual} is not given"
-                if usual not in scene.numeric_paths():
-                    _refuse(column == 0.0, column, name, reason, label)
-    pairs = []
-    if isinstance(scene.mechanism, Mechanism):
-        reason = "the rod no longer than the crank"
-        pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
-    for joint in scene.pins():
-        key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
-        pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
-    sliders = [
-        one for one in scene.guides() if hasattr(scene.clearance_joint(one), "corner_radius")
-    ]
-    for joint in sliders:
-        key, reason = scene.joint_key(joint), "corners rounder than half of the slider"
-        pairs += [
-            (f"{key}.corner_radius", f"{key}.{size}", reason) for size in ("length", "height")
-        ]
-    for small, large, reason in pairs:
-        lower, upper = (
-            entries(scene, points.paths, points.values, path) for path in (small, large)
-        )
-        times, word = (2.0, "2 ") if small.endswith("corner_radius") else (1.0, "")
-        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
-        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
-    _check_laws(scene, points, label)
+    def __init__(self, scene: SceneTables, points: Points | None) -> None:
+        self.scene = scene
+        self.points = points
+        self.size = 1 if points is None else len(points)
+        self._columns = {}
+        if points is not None:
+            for k, paths in enumerate(points.paths):
+                self._columns.update(dict.fromkeys(paths, points.values[:, k]))
 
+    def __call__(self, path: str) -> Array:
+        """Values of an entry, shape (size,), SI."""
+        column = self._columns.get(path)
+        return np.full(self.size, self.scene.number(path)) if column is None else column
 
-def _check_laws(scene: Scene, points: Points, label: Callable[[int], str]) -> None:
-    """Refuse values that a law does not take together."""
-    for kind in ("contact", "friction"):
-        table = getattr(scene.effects, kind)
-        driven = {path for paths in points.paths for path in paths}
-        if table is None or table.declared.check is None:
-            continue
-        names = [name for name in table.values() if f"effects.{kind}.{name}" in driven]
-        if not names:
-            continue
-        columns = {
-            name: np.broadcast_to(
-                entries(scene, points.paths, points.values, f"effects.{kind}.{name}"), len(points)
-            )
-            for name in names
-        }
-        for row in range(len(points)):
-            own = {name: float(column[row]) for name, column in columns.items()}
-            wrong = table.declared.check({**table.values(), **own})
-            if wrong is not None:
-                reason, remedy, name = wrong
-                raise InputError(
-                    f"{label(row)}, {name}", own.get(name, table.value(name)), reason, remedy
-                )
-
-
-def _refuse(
-    bad: Booleans, values: Array, name: str, reason: str, label: Callable[[int], str]
-) -> None:
-    if bad.any():
-        row = int(np.argmax(bad))
-        key = f"{label(row)}, {name}"
-        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
+    def known(self, path: str) -> Array:
+        """The same, 0 of an entry that the scene has not."""
+        there = path in self._columns or path in self.scene.numeric_paths()
+        return self(path) if there else np.zeros(self.size)
 
 
 def snapped(

@@ -10,7 +10,7 @@ from hpcclear.base import quantiles
 from hpcclear.scene.distributions import OF_LIMITS, converted, form_of, is_ours
 from hpcclear.scene.fields import LONGEST_CURVE, Quantity, invalid
 from hpcclear.scene.fits import Tolerance
-from hpcclear.scene.named import NamedInput, Range, list_of, number_of, range_of
+from hpcclear.scene.named import NamedInput, Range, with_paths
 from hpcclear.scene.paths import quantities
 
 _COMMON = ("name", "paths", "distribution")
@@ -73,31 +73,33 @@ class RandomInput(NamedInput):
     """Whether the distribution is that of the difference from the design's value. Not for "uniform", "normal",
     "truncated-normal", "beta", "fit" and "wear"."""
 
+    @model_validator(mode="before")
     @classmethod
-    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
+    def _in_si(cls, data: object) -> object:
+        """The row with its paths, and numbers in the unit of these."""
+        if not isinstance(data, Mapping):
+            return data
+        row, paths = with_paths(data)
         quantity = quantities()[paths[0]]
         if not is_ours(row.get("distribution")):
             row = _gathered(row, quantity.unit)
         offset = quantity if row.get("about_design") is not True else Quantity(quantity.unit)
         if "range" in row:
-            row["range"] = range_of(row["range"], offset, "range")
+            row["range"] = offset.range(row["range"], "range")
         for key in ("mean", "location"):
             if key in row:
-                row[key] = number_of(
-                    row[key], Quantity(quantity.unit) if key == "location" else offset, key
-                )
+                own = Quantity(quantity.unit) if key == "location" else offset
+                row[key] = own.convert(row[key], key)
         for key in ("half_width", "deviation", "scale"):
             if key in row:
                 unit = "" if row.get("relative") and key != "scale" else quantity.unit
-                row[key] = number_of(row[key], Quantity(unit, above=0), key)
+                row[key] = Quantity(unit, above=0).convert(row[key], key)
         if "shape" in row:
-            row["shape"] = number_of(row["shape"], _SHAPE, "shape")
+            row["shape"] = _SHAPE.convert(row["shape"], "shape")
         if "shapes" in row:
-            row["shapes"] = list_of(row["shapes"], _SHAPE, "shapes", 2, 2)
+            row["shapes"] = _SHAPE.several(row["shapes"], "shapes", 2, 2)
         if "values" in row:
-            row["values"] = tuple(
-                sorted(list_of(row["values"], offset, "values", 2, LONGEST_CURVE))
-            )
+            row["values"] = tuple(sorted(offset.several(row["values"], "values", 2, LONGEST_CURVE)))
         return row
 
     @model_validator(mode="after")

@@ -1,39 +1,26 @@
-"""Points to simulate: Latin hypercubes, Monte Carlo samples, scrambled Sobol sequences, and a user's own table.
+"""Points to simulate: Latin hypercubes, Monte Carlo samples, scrambled Sobol sequences; what every design must satisfy.
 
 Every number follows from the study's seed, a purpose ("train", "test", ...) and, for Monte Carlo,
 the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
 """
 
-import hashlib
-from collections import OrderedDict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
-from hpcclear.scene.domain import box, slender_inertias, to_physical
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.domain import box, entries, slender_inertias, to_physical
+from hpcclear.scene.mechanism import Mechanism
+from hpcclear.scene.paths import quantities
+from hpcclear.scene.points import Points, expanded
 from hpcclear.scene.random_inputs import RandomInput
+from hpcclear.scene.streams import generator, sobol, uniform
 from hpcclear.scene.study import Study
-from hpcclear.scene.table import read_points
-
-__all__ = [
-    "Points",
-    "check_points",
-    "generator",
-    "latin_hypercube",
-    "monte_carlo",
-    "offsets",
-    "read_points",
-    "sampled",
-    "sobol",
-    "unit_lhs",
-]
 
 
 def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
@@ -54,6 +41,88 @@ def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
     from scipy.stats import qmc  # most of a second to import; a single response needs none of it
 
     return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
+
+
+def check_points(
+    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
+) -> None:
+    """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
+        radius, friction at rest is less than sliding, or a rod is not longer than its crank.
+    """
+    points = expanded(scene.study, points)
+    for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
+        for path in paths:
+            bounds = quantities()[path].bounds()
+            reason = f"must be finite and {bounds}" if bounds else "must be finite"
+            _refuse(~quantities()[path].holds(column), column, name, reason, label)
+            if path.endswith("initial_speed"):
+                usual = path.replace("initial_speed", "expected_speed")
+                reason = f"starts from rest, and {usual} is not given"
+                if usual not in scene.numeric_paths():
+                    _refuse(column == 0.0, column, name, reason, label)
+    pairs = []
+    if isinstance(scene.mechanism, Mechanism):
+        reason = "the rod no longer than the crank"
+        pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
+    for joint in scene.pins():
+        key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
+        pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
+    sliders = [
+        one for one in scene.guides() if hasattr(scene.clearance_joint(one), "corner_radius")
+    ]
+    for joint in sliders:
+        key, reason = scene.joint_key(joint), "corners rounder than half of the slider"
+        pairs += [
+            (f"{key}.corner_radius", f"{key}.{size}", reason) for size in ("length", "height")
+        ]
+    for small, large, reason in pairs:
+        lower, upper = (
+            entries(scene, points.paths, points.values, path) for path in (small, large)
+        )
+        times, word = (2.0, "2 ") if small.endswith("corner_radius") else (1.0, "")
+        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
+        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
+    _check_laws(scene, points, label)
+
+
+def _check_laws(scene: Scene, points: Points, label: Callable[[int], str]) -> None:
+    """Refuse values that a law does not take together."""
+    for kind in ("contact", "friction"):
+        table = getattr(scene.effects, kind)
+        driven = {path for paths in points.paths for path in paths}
+        if table is None or table.declared.check is None:
+            continue
+        names = [name for name in table.values() if f"effects.{kind}.{name}" in driven]
+        if not names:
+            continue
+        columns = {
+            name: np.broadcast_to(
+                entries(scene, points.paths, points.values, f"effects.{kind}.{name}"), len(points)
+            )
+            for name in names
+        }
+        for row in range(len(points)):
+            own = {name: float(column[row]) for name, column in columns.items()}
+            wrong = table.declared.check({**table.values(), **own})
+            if wrong is not None:
+                reason, remedy, name = wrong
+                raise InputError(
+                    f"{label(row)}, {name}", own.get(name, table.value(name)), reason, remedy
+                )
+
+
+def _refuse(
+    bad: Booleans, values: Array, name: str, reason: str, label: Callable[[int], str]
+) -> None:
+    if bad.any():
+        row = int(np.argmax(bad))
+        key = f"{label(row)}, {name}"
+        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
 
 
 def latin_hypercube(
@@ -132,7 +201,7 @@ def _chances(
         return list(np.maximum(unit_lhs(count, len(names), rng), 2.0**-54).T)
     if replicate is None:
         label = f"monte-carlo {purpose}"
-        return [_uniform(seed, label, name, first, count) for name in names]
+        return [uniform(seed, label, name, first, count) for name in names]
     return list(_scrambled(seed, purpose, replicate, len(names), first, count).T)
 
 
@@ -294,49 +363,6 @@ def _known(what: str, names: Iterable[str], known: Collection[str]) -> tuple[str
     return chosen
 
 
-def _words(text: str) -> tuple[int, ...]:
-    """A text as words of a spawn key."""
-    return tuple(int(word) for word in np.frombuffer(hashlib.sha256(text.encode()).digest(), "<u4"))
-
-
-def generator(seed: int, *labels: str) -> np.random.Generator:
-    """A stream of random numbers of its own for each purpose, from the study's seed."""
-    return np.random.default_rng(_seed(seed, *labels))
-
-
-def _seed(seed: int, *labels: str) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed, spawn_key=sum((_words(label) for label in labels), ()))
-
-
-def _uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Array:
-    """Numbers `first` to `first + count` of one stream, strictly between 0 and 1, shape
-    (count,)."""
-    # Philox is counter-based: it can start anywhere. One step of its counter gives four numbers.
-    bits = np.random.Philox(_seed(seed, purpose, name))
-    bits.advance(first // 4)
-    numbers = np.random.Generator(bits).random(first % 4 + count)[first % 4 :]
-    return (
-        numbers + 2.0**-54
-    )  # multiples of 2^-53 from 0 on, moved off 0, where quantiles are infinite
-
-
-SOBOL_BITS = 30
-"""Digits of a point of a Sobol sequence; a sequence has as many points as they can represent."""
-
-
-def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
-    """Points `first` to `first + count` of a scrambled Sobol sequence, strictly between 0 and 1,
-    shape (count, dimensions)."""
-    from scipy.stats import qmc  # as in `unit_lhs`
-
-    if dimensions == 0:
-        return np.empty((count, 0))
-    sequence = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, rng=rng)
-    if first:
-        sequence.fast_forward(first)
-    return sequence.random(count) + 0.5 * 2.0**-SOBOL_BITS  # as in `_uniform`, off 0
-
-
 def sampled(scene: Scene) -> Points:
     """What `sample` simulates: the study's points by its method; raises InputError as `latin_hypercube`."""
     method = scene.required_study.method
@@ -350,46 +376,3 @@ def sampled(scene: Scene) -> Points:
         case _:
             points = monte_carlo(scene)
     return replace(points, sampling=method)
-
-
-_PAGE = 4096  # points made at a time
-_PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
-
-
-class MonteCarloPoints:
-    """The study's Monte Carlo points by index, generated on request and not stored.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a study.
-    total : int
-        Number of points.
-    """
-
-    def __init__(self, scene: Scene, total: int) -> None:
-        self._scene, self._total = scene, total
-        self._pages: OrderedDict[int, Points] = OrderedDict()
-
-    def __len__(self) -> int:
-        return self._total
-
-    def page(self, number: int) -> Points:
-        """Points `number` * 4096 and on, at most 4096 of them."""
-        if number not in self._pages:
-            first = number * _PAGE
-            count = min(_PAGE, self._total - first)
-            self._pages[number] = monte_carlo(self._scene, count, first=first)
-            if len(self._pages) > _PAGES:
-                self._pages.popitem(last=False)
-        self._pages.move_to_end(number)
-        return self._pages[number]
-
-    def __getitem__(self, index: Integers) -> Array:
-        index = np.asarray(index, np.int64)
-        values = np.empty((index.size, len(self.page(0).names)))
-        numbers = index // _PAGE
-        for number in np.unique(numbers).tolist():
-            here = numbers == number
-            values[here] = self.page(number).values[index[here] - number * _PAGE]
-        return values

@@ -19,7 +19,7 @@ from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.tables import plain
-from hpcclear.scene.validation import validated
+from hpcclear.scene.validation import scene_of
 
 GENTLE_RAMP = 50.0
 """Friction coefficient over ramp speed, s/m, that a steeper ramp is widened to: half of what calls for implicit steps."""
@@ -252,7 +252,7 @@ class Off:
                 content = replace(content, path, value)
         if scene.study is not None:
             content["study"] = self._study(scene, content["study"])
-        made = validated(Scene, content)
+        made = scene_of(Scene, content)
         made._text = scene.text
         return made
 

@@ -10,7 +10,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene.fields import nearest
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.points import Points, check_points
+from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import check_points
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.sheets import Column, Sheet, read
 from hpcclear.scene.units import UnitError, factor, note_turns, noting, to_si

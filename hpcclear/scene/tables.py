@@ -12,6 +12,7 @@ from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.bending import Bending
+from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, nearest
 from hpcclear.scene.film import Film
@@ -62,6 +63,7 @@ class SceneTables(Table):
         for key in table.model_fields
     }
 
+    _readings: tuple[str, ...] = PrivateAttr(())
     _known_numbers: dict[str, float] | None = PrivateAttr(None)
     _known_hash: str | None = PrivateAttr(None)
     _linkage: Planar | None = PrivateAttr(None)
@@ -333,6 +335,37 @@ class SceneTables(Table):
             )
         return numbers[path]
 
+    def baseline(self, name: str) -> float:
+        """Where the scene itself is in the column of a study variable: its number, SI, or the row of its table.
+
+        Raises
+        ------
+        InputError
+            The scene's own numbers are not among its rows.
+        """
+        study = self.required_study
+        variable = study.variable(name)
+        if variable.paths:
+            return self.number(variable.paths[0])
+        values = {path: self.number(path) for path in study.own_entries(variable)}
+        for path in variable.input_paths:
+            of, entry = input_entry(path)
+            value: Any = study.random_input(of)
+            for part in entry.split("."):
+                value = None if value is None else getattr(value, part)
+            values[path] = value
+        if not variable.rows:
+            found = next(iter(values.values()))
+            return 1.0 if found is None else float(found)  # of a bore or pin without entries
+        for k, row in enumerate(variable.rows):
+            if all(_alike(row.entries[path], value) for path, value in values.items()):
+                return float(k)
+        listed = ", ".join(f"{path} = {value}" for path, value in values.items())
+        raise InputError(
+            f"study.variables.{name}", listed, "the value of the scene is not among its rows",
+            "Write the values of one row into the scene: that is the baseline design",
+        )  # fmt: skip
+
     def unit(self, path: str) -> str:
         """The SI unit of the physical number at a dotted path, "" for none; errors as `number`."""
         self.number(path)
@@ -349,6 +382,13 @@ class SceneTables(Table):
                 if path in known and isinstance(value, float)
             }
         return self._known_numbers
+
+
+def _alike(one: object, other: object) -> bool:
+    """Whether two entries are the same, numbers to their last digits."""
+    if isinstance(one, float) and isinstance(other, float):
+        return abs(one - other) <= 1e-9 * max(abs(one), abs(other))
+    return bool(one == other)
 
 
 def plain(value: object) -> Any:

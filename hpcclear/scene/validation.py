@@ -1,18 +1,27 @@
-"""SceneTables against a model, and what is wrong with it as an error that a user can mend."""
+"""Tables against a model, a study against its mechanism, and what is wrong as an error that a user can mend."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.fields import Table, nearest
-from hpcclear.scene.paths import quantities
+from hpcclear.plugins.sources import using
+from hpcclear.scene import domain
+from hpcclear.scene.fields import Table, invalid, nearest
+from hpcclear.scene.former import renewed
+from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.plugged import texts_of
+from hpcclear.scene.study import Study
+from hpcclear.scene.tables import SceneTables, plain
+from hpcclear.scene.units import noting
+from hpcclear.scene.variables import Variable
 from hpcclear.scene.wanted import hint
 
 Valid = TypeVar("Valid", bound=Table)
+Whole = TypeVar("Whole", bound=SceneTables)
 
 DEEPEST = 16  # levels of tables and arrays; a scene needs six
 _TAGGED = (("mechanism",), ("drive",), ("joints", "crank_rod"), ("joints", "rod_slider"))
@@ -41,7 +50,7 @@ def check_path(path: object) -> None:
 
 
 def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
-    """SceneTables as a model of its kind.
+    """Tables as a model of its kind.
 
     Raises
     ------
@@ -55,6 +64,139 @@ def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
         # The first error in file order is the one to mend first; the others often follow from it.
         details = error.errors(include_url=False)
         raise _translated(details[0], content, more=len(details) - 1) from None
+
+
+def scene_of(kind: type[Whole], content: Mapping[str, object]) -> Whole:
+    """The scene of a file's tables, with the readings of its units; errors as `validated`.
+
+    Source text that it carries is run: `hpcclear.scene.load_scene` sees to it that it may be.
+    """
+    content, former = renewed(content)
+    read: dict[str, str] = {}
+    with noting(read.__setitem__), using(texts_of(content)) as packages:
+        scene = validated(kind, content)
+        rows = {name: {"version": version} for name, version in sorted(packages.items())}
+        if rows != content.get("plugins", {}).get("packages", {}):
+            scene = validated(kind, replace(content, "plugins.packages", rows))
+        if scene.study is not None:
+            try:
+                _check_study(scene, scene.study)
+            except PydanticCustomError as error:
+                raise _told(error.context or {}, (), content) from None
+    scene._readings = (*former, *(_placed(content, read) if read else ()))
+    return scene
+
+
+def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[str]:
+    """A sentence for each text that was read as `read` says, with the first entry that has it."""
+    left = dict(read)
+    for key, entry in flatten(content):
+        level = [entry]
+        while level and isinstance(level[0], list):
+            level = [one for inner in level if isinstance(inner, list) for one in inner]
+        for text in level:
+            if isinstance(text, str) and text.strip() in left:
+                yield f"{key}: {text.strip()!r} is read as {left.pop(text.strip())}"
+
+
+def _check_study(scene: SceneTables, study: Study) -> None:
+    """Raise InputError, or an error for validators, unless the study fits the mechanism."""
+    _check_worn_inputs(scene, study)
+    numbers = set(scene.numeric_paths())
+    for table, rows in (("variables", study.variables), ("random", study.random)):
+        for row in rows:
+            of_rows = row.entry_paths if isinstance(row, Variable) else ()
+            for path in (*row.paths, *of_rows):
+                if path not in numbers:
+                    raise invalid(
+                        f"drives {path}, and this scene has no number there",
+                        "Give that entry a value first, or remove the variable",
+                        key=f"study.{table}.{row.name}",
+                    )
+    _check_corners(scene, study)
+    for variable in study.variables:
+        if variable.rows:
+            scene.baseline(variable.name)
+    domain.box(scene, widen=tuple(row.name for row in study.random))
+
+
+def _check_worn_inputs(scene: SceneTables, study: Study) -> None:
+    """Inputs that are clearances of worn joints need lives that are followed so far."""
+    clearances = [f"{scene.joint_key(name)}.clearance" for name in scene.worn_joints()]
+    for row in study.worn:
+        key = f"study.random.{row.name}"
+        if scene.wear is None:
+            raise invalid(
+                "the scene has no [wear] table",
+                "Add [wear], as in jobs/worn_study.toml", key, "wear",
+            )  # fmt: skip
+        for path in row.paths:
+            if path not in clearances:
+                raise invalid(
+                    f"{path} is no clearance of a joint that wears",
+                    nearest(path, clearances) if clearances else "Give joints a table wear",
+                    key, "wear",
+                )  # fmt: skip
+        assert row.cycles is not None  # by validation
+        if row.cycles > scene.wear.cycles:
+            raise invalid(
+                f"lives are followed for {scene.wear.cycles:g} revolutions only",
+                "Raise wear.cycles, or lower it", f"{key}.cycles", row.cycles,
+            )  # fmt: skip
+
+
+def _check_corners(scene: SceneTables, study: Study) -> None:
+    """Each bound of each variable, widened by what is random about it, must still make a
+    mechanism."""
+    names = (*PHYSICAL, "numerics", "plugins")
+    content = {name: plain(table) for name in names if (table := getattr(scene, name))}
+    reach = {row.name: study.reach(row) for row in study.random if not row.absolute}
+    spans = {
+        variable.name: ("variables", variable.paths, variable.bounds)
+        for variable in study.variables
+        if variable.paths and variable.ratio is None
+    }
+    for row in study.random:
+        if row.name not in study.names:
+            centre = 0.0 if row.absolute else scene.number(row.paths[0])
+            reach[row.name] = study.reach(row)
+            spans[row.name] = ("random", row.paths, (centre, centre))
+    for name, (table, paths, (lower, upper)) in spans.items():
+        corners = [(table, lower), (table, upper)] if table == "variables" else []
+        if name in reach:
+            low, high = reach[name]
+            corners += [("random", lower + low), ("random", upper + high)]
+        for key, value in corners:
+            entries = dict.fromkeys(paths, value)
+            _check_corner(
+                type(scene), content, entries, f"study.{key}.{name}", f"{name} = {value:g}"
+            )
+    for variable in study.variables:
+        for option in variable.rows:
+            entries = {path: float(option.entries[path]) for path in variable.entry_paths}
+            key = f"study.variables.{variable.name}"
+            _check_corner(type(scene), content, entries, key, f"{variable.name} = {option.name!r}")
+
+
+def _check_corner(
+    kind: type[SceneTables],
+    content: Mapping[str, object],
+    entries: Mapping[str, float],
+    key: str,
+    words: str,
+) -> None:
+    """An error for validators unless the scene is one with other entries."""
+    corner = content
+    for path, value in entries.items():
+        corner = replace(corner, path, value)
+    try:
+        kind.model_validate(corner)
+    except ValidationError as error:
+        context = error.errors(include_url=False)[0].get("ctx", {})
+        reason = context.get("reason", "it is not valid")
+        raise invalid(
+            f"reaches {words}, which makes no mechanism: {reason}", "Narrow it", key=key
+        ) from None
 
 
 def _check_depth(content: Mapping[str, object]) -> None:
@@ -78,21 +220,32 @@ def _check_depth(content: Mapping[str, object]) -> None:
 
 def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -> InputError:
     """A pydantic error as an InputError."""
-    context = error.get("ctx", {})
     location = _untagged(error["loc"], error["type"])
-    names, found = _follow(location, content)
     if error["type"] == "scene":
-        reason, remedy = context["reason"], context["remedy"]
-        if context["key"]:
-            parts = tuple(context["key"].split("."))
-            below, found = _follow(parts, found)
-            names += below
-        if context["value"] is not ...:
-            found = context["value"]
-    else:
-        if error["type"].startswith("union_tag"):
-            names, found = (*names, "kind"), found.get("kind")
-        reason, remedy = _explained(error, found, ".".join(names))
+        return _told(error.get("ctx", {}), location, content, more)
+    names, found = _follow(location, content)
+    if error["type"].startswith("union_tag"):
+        names, found = (*names, "kind"), found.get("kind")
+    reason, remedy = _explained(error, found, ".".join(names))
+    return _wrong(names, found, reason, remedy, more)
+
+
+def _told(
+    said: Mapping[str, Any], location: tuple[int | str, ...], content: object, more: int = 0
+) -> InputError:
+    """An error of `invalid`, by its context, at a place as an InputError."""
+    names, found = _follow(location, content)
+    if said["key"]:
+        below, found = _follow(tuple(said["key"].split(".")), found)
+        names += below
+    if said["value"] is not ...:
+        found = said["value"]
+    return _wrong(names, found, said["reason"], said["remedy"], more)
+
+
+def _wrong(
+    names: tuple[str, ...], found: object, reason: str, remedy: str, more: int
+) -> InputError:
     if more:
         remedy = f"{remedy} ({more} more after this)"
     return InputError(".".join(names) or "scene", found, reason, remedy)

@@ -12,7 +12,7 @@ from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Row
 from hpcclear.scene.costs import Cost
 from hpcclear.scene.fields import Quantity, invalid
-from hpcclear.scene.named import NamedInput, Range, list_of, number_of, range_of, texts_in
+from hpcclear.scene.named import NamedInput, Range, texts_in, with_paths
 from hpcclear.scene.paths import described, quantities
 
 LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
@@ -46,8 +46,9 @@ class Variable(NamedInput):
     cost: Cost | None = None
     """Cost of a design as a function of this value, for the statistic "cost" of a case."""
 
-    @classmethod
-    def _without_numbers(cls, data: Mapping[str, object]) -> Mapping[str, Any]:
+    @staticmethod
+    def _without_numbers(data: Mapping[str, object]) -> Mapping[str, Any]:
+        """The row with what it drives that is no number of the mechanism elsewhere, and ``paths`` of () if nothing is left."""
         if "catalogue" in data and "path" not in data:
             return {**data, "paths": texts_in(data.get("paths"))}
         given = data.get("paths", data.get("path", ()))
@@ -83,8 +84,13 @@ class Variable(NamedInput):
         kept = {key: value for key, value in data.items() if key != "path"}
         return {**kept, "paths": (), "follows": tuple(of_rows)}
 
+    @model_validator(mode="before")
     @classmethod
-    def _in_si(cls, row: dict[str, Any], paths: tuple[str, ...]) -> dict[str, Any]:
+    def _in_si(cls, data: object) -> object:
+        """The row with its paths, and numbers in the unit of these."""
+        if not isinstance(data, Mapping):
+            return data
+        row, paths = with_paths(cls._without_numbers(data))
         kinds = [key for key in _KINDS if key in row]
         if len(kinds) != 1:
             raise invalid(
@@ -103,18 +109,18 @@ class Variable(NamedInput):
                     "Write range = [lower, upper] instead",
                     key="ratio",
                 )
-            return row | {"ratio": range_of(row["ratio"], Quantity("", above=0), "ratio")}
+            return row | {"ratio": Quantity("", above=0).range(row["ratio"], "ratio")}
         known = [quantities()[path] for path in paths] or [_of_input(row)]
         if kind == "range":
             given = row["range"]
             for one in reversed(known):
-                row["range"] = range_of(given, one, "range")
+                row["range"] = one.range(given, "range")
             if "step" in row:
-                row["step"] = number_of(row["step"], Quantity(known[0].unit, above=0), "step")
+                row["step"] = Quantity(known[0].unit, above=0).convert(row["step"], "step")
                 choices.grid(row["range"][0], row["range"][1], row["step"])
         else:
             for one in reversed(known):
-                found = list_of(row["values"], one, "values", 2, choices.MOST)
+                found = one.several(row["values"], "values", 2, choices.MOST)
             if len(set(found)) < len(found):
                 raise invalid("a value stands there twice", "Remove one", "values")
             row["values"] = tuple(sorted(found))

@@ -27,8 +27,8 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.compiling import compile_ahead
 from hpcclear.ensemble.identity import run_key
+from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import Options, Place, Session
-from hpcclear.ensemble.simulate import saving
 from hpcclear.ranks.boundary import alone
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks

@@ -2,11 +2,13 @@
 
 A design of the search has some hundred simulations, from which a probability of 1e-3 is extrapolated
 (`hpcclear.statistics.random.tail`). A model of such indices over designs knows which way is safer, but not where the threshold
-is. So the best design that it allows is simulated until its probability is known, the model is shifted by what it was wrong
-there, and the best design is sought anew (sequential optimisation and reliability assessment).
-
-Along the edge an objective changes by little while designs change by much, and which way is better depends on the slopes of
+is. Along the edge an objective changes by little while designs change by much, and which way is better depends on the slopes of
 the constraint there. So the search ends with designs next to the edge, on both sides of each variable.
+
+Of probabilities of failure level and slopes are then sampled together, in smaller and smaller regions about the best design
+(`hpcclear.study.nearby`). Where there are other constraints, the best design that the model allows is simulated until it is
+decided, the model is shifted by what it was wrong there, and the best design is sought anew (sequential optimisation and
+reliability assessment).
 
 Source: X. Du and W. Chen, "Sequential optimization and reliability assessment method for efficient probabilistic design",
 J. Mech. Design 126 (2004) 225-233, doi:10.1115/1.1649968.
@@ -21,12 +23,15 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import snapped
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
+from hpcclear.statistics.random.indices import quadratic
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search.infill import TwoScales
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.settings import SwarmSettings
-from hpcclear.study import goals, rare, truth, verdicts
+from hpcclear.study import goals, nearby, rare, truth, verdicts
+from hpcclear.study.nearby import Nearby
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
@@ -37,6 +42,21 @@ ROUNDS = 4
 AIM, LESS = 0.8, 0.75
 """Probability that is sought, over the largest that is allowed: so much below it can be shown; and what is sought of that after
 a design that could not be decided."""
+
+AIMS = 0.88, 0.78, 0.65
+"""The same of the designs that are verified where all constraints are probabilities of failure."""
+
+TRIED, AGREE = 6, 0.3
+"""There: designs that are looked at first, at most, and the error of the model of the search at one that is small enough."""
+
+REACHES, DRAWS = (0.15, 0.08, 0.04, 0.015), (32, 32, 64, 64)
+"""Half of a region over each range, the first and smaller ones, and draws of each of its designs."""
+
+TURNS, MISSED = 8, 0.05
+"""Regions at most, and how much the index of the best design may change in the last of them: some 15 % of a probability."""
+
+FARTHEST = 4.0
+"""Largest shortfall of an index that is modelled: what lies beyond is extrapolated."""
 
 NEAR, CLOSE = 0.65, 0.9
 """Of the allowed probability: a design that significantly keeps it and has between these is near enough. Nearer to it the
@@ -62,12 +82,27 @@ def cases_of(study: Study) -> list[Case]:
     return [case for case in study.cases if any(not one.exact for one in case.kept)]
 
 
+def of_failures(case: Case) -> bool:
+    """Whether all constraints that simulations decide are probabilities of failure."""
+    return all(one.statistic == "exceedance" for one in case.kept if not one.exact)
+
+
 def simulations(study: Study) -> int:
     """Simulations of all rounds, at most."""
-    each = truth.expected(study)
-    return sum(
-        ROUNDS * (each + verdicts.usual_in(case, study.verification)) for case in cases_of(study)
-    )
+    each, looked = truth.expected(study), truth.search_length(study) * REPLICATES
+    found = 0
+    for case in cases_of(study):
+        if of_failures(case):
+            failures = sum(not one.exact for one in case.kept)
+            found += TRIED * looked + failures * nearby.simulations(DRAWS, TURNS)
+        else:
+            found += ROUNDS * (each + verdicts.usual_in(case, study.verification))
+    return found
+
+
+def designs(study: Study) -> int:
+    """Designs at the edge of all cases that are verified, at most."""
+    return sum(len(AIMS) if of_failures(case) else ROUNDS for case in cases_of(study))
 
 
 def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> Result:
@@ -111,8 +146,9 @@ def neighbours(
     names = run.study.design_variables(case.name)
     bounds, rng = _bounds(run, case), run.rng("edge", case.name, str(len(coordinates)))
     with threadpool_limits(limits=1, user_api="blas"):
-        models = _models(run, case, coordinates, values, excess, rng)
-        judged = _judge(run, case, *models, _gap(case, AIM))
+        model = _steering(coordinates, excess, bounds, rng)
+        objectives = _objectives(run, case, coordinates, values, rng)
+        judged = _judge(run, case, model, objectives, _gap(case, AIM))
         place = _best(judged, bounds, _first(coordinates, excess), rng)
     moves = np.diag(aside * (bounds[:, 1] - bounds[:, 0]))
     points = np.clip(np.vstack([place, place + moves, place - moves]), *bounds.T)
@@ -130,20 +166,29 @@ def _first(coordinates: Array, excess: Array) -> Array:
     return coordinates[np.argsort(excess, kind="stable")[: PARTICLES // 2]]
 
 
-def _models(
-    run: StudyRun, case: Case, coordinates: Array, values: Array, excess: Array, rng: np.random.Generator
-) -> tuple[TwoScales, list[Predict]]:  # fmt: skip
-    """What steers to the constraints, and the first two objectives, as functions of designs."""
+def _steering(
+    coordinates: Array, excess: Array, bounds: Array, rng: np.random.Generator
+) -> Predict:
+    """What steers to the constraints as a function of designs: a polynomial, and a model of what that leaves."""
+    near = np.clip(excess, -FARTHEST, FARTHEST)
+    trend = quadratic(coordinates, near, bounds)
+    model = TwoScales(coordinates, near - trend(coordinates), bounds, rng)
+    return lambda points: trend(points) + model.predict(points)
+
+
+def _objectives(
+    run: StudyRun, case: Case, coordinates: Array, values: Array, rng: np.random.Generator
+) -> list[Predict]:
+    """The first two objectives as functions of designs."""
     bounds = _bounds(run, case)
-    model = TwoScales(coordinates, excess, bounds, rng)
-    return model, [
+    return [
         exact or TwoScales(coordinates, column, bounds, rng).predict
         for exact, column in zip(goals.exact_in(run.scene, case)[:2], values.T, strict=False)
     ]
 
 
 def _judge(
-    run: StudyRun, case: Case, model: TwoScales, objectives: list[Predict], off: float
+    run: StudyRun, case: Case, model: Predict, objectives: list[Predict], off: float
 ) -> Judge:
     """Objectives of designs and by how much they break the constraints, which are shifted by `off`."""
     names = run.study.design_variables(case.name)
@@ -151,7 +196,7 @@ def _judge(
     def judged(points: Array) -> tuple[Array, Array]:
         points = snapped(run.study, names, points)
         least = np.column_stack([one(points) for one in objectives])
-        return least, np.maximum(model.predict(points) + off, 0.0)
+        return least, np.maximum(model(points) + off, 0.0)
 
     return judged
 
@@ -167,7 +212,10 @@ def _of_case(
     shift, aim = 0.0, AIM
     try:
         with threadpool_limits(limits=1, user_api="blas"):
-            model, objectives = _models(run, case, coordinates, values, excess, rng)
+            if of_failures(case):
+                return _of_failures(run, case, coordinates, values, excess)
+            model = _steering(coordinates, excess, bounds, rng)
+            objectives = _objectives(run, case, coordinates, values, rng)
     except InputError:  # too few designs that did not fail for a model
         return kept
     start = _first(coordinates, excess)
@@ -180,7 +228,7 @@ def _of_case(
             if safe is not None and beyond is not None:
                 place = _between(safe, beyond, -_gap(case, aim))
             place = snapped(run.study, names, place[None])[0]
-            guess = float(model.predict(place[None])[0])
+            guess = float(model(place[None])[0])
         row = to_physical(run.scene, names, place[None])[0]
         choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
         try:
@@ -200,6 +248,57 @@ def _of_case(
             beyond = place, now
         shift, aim = now - guess, aim * (LESS if standing == Standing.UNDECIDED else 1.0)
     return kept
+
+
+def _of_failures(
+    run: StudyRun, case: Case, coordinates: Array, values: Array, excess: Array
+) -> list[Choice]:
+    """The same where all constraints are probabilities of failure: the draws of many designs next to each other make one
+    model of their indices (`hpcclear.study.nearby`). It begins where the search takes the best design to be; each turn goes on
+    from the best design of the last one, in a smaller region if that was inside of it."""
+    bounds, rng = _bounds(run, case), run.rng("edge", case.name)
+    near, names = Nearby(run, case, bounds, rng), run.study.design_variables(case.name)
+    objectives = _objectives(run, case, coordinates, values, rng)
+    start = _first(coordinates, excess)
+
+    def best(model: Predict, region: Array, first: Array, aim: float) -> Array:
+        judged = _judge(run, case, model, objectives, _gap(case, aim))
+        place = _best(judged, region, np.clip(first, *region.T), rng)
+        return snapped(run.study, names, place[None])[0]
+
+    for _ in range(TRIED):
+        guess = _steering(coordinates, excess, bounds, rng)
+        place = best(guess, bounds, start, AIM)
+        true = _looked_at(run, case, place)
+        if abs(true - guess(place[None])[0]) < AGREE:
+            break
+        coordinates, excess = np.vstack([coordinates, place]), np.append(excess, true)
+    step, last = 0, len(REACHES) - 1
+    for _ in range(TURNS):
+        near.draw(place, REACHES[step], guess, DRAWS[step])
+        missed = abs(near.shortfall(place[None]) - guess(place[None]))[0]
+        guess = near.fixed()
+        place = best(guess, near.region, place[None], AIM)
+        broken = guess(place[None])[0] > 0.0
+        if step == last and missed < MISSED and not broken:
+            break
+        if broken:
+            step = max(step - 1, 0)
+        elif not near.at_end(place):
+            step = min(step + 1, last)
+    points = np.array([best(guess, near.region, place[None], aim) for aim in AIMS])
+    rows = to_physical(run.scene, names, points)
+    return [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+
+
+def _looked_at(run: StudyRun, case: Case, place: Array) -> float:
+    """What steers to the constraints of a design, by as many simulations as the search gives one."""
+    count = truth.search_length(run.study)
+    names = run.study.design_variables(case.name)
+    row = to_physical(run.scene, names, place[None])[0]
+    choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
+    found = truth.sequences(run, [choice], "edge", "search", count, count * REPLICATES)
+    return float(found["excess"][0])
 
 
 def _between(safe: tuple[Array, float], beyond: tuple[Array, float], sought: float) -> Array:

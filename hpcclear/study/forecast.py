@@ -20,29 +20,32 @@ from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import generator, unit_lhs
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
+from hpcclear.scene.streams import generator
 from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.study import extent, goals, truth, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
-DESIGNS, LENGTHS, PART = 4, (32, 16, 8), 4
-"""Designs of a case, points of each of their replicates (the most that `LONGEST` allows; of 8 the forecast was off by up to 2.9
-times), and what part of these shows how fast errors fall."""
+DESIGNS, LENGTHS, PART = 4, (64, 32, 16, 8), 4
+"""Designs of a case, points of each of their replicates (the most that `LONGEST` allows), and what part of these shows how
+fast errors fall."""
 
 FALL = 0.5, 1.5
-"""Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f."""
+"""Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f. The mean shows it
+first: the error of a deviation by few points falls alike whether f is rough or smooth."""
 
-USUAL = {"verification": 0.8, "infill": 0.8}
-"""Of the most designs that a stage may have."""
+USUAL = {"verification": 0.8, "infill": 0.8, "edge": 0.55}
+"""Of the most simulations of a stage, or of the most designs that are verified."""
 
 CONTESTED = 1.35
-"""Times the simulations that an accuracy takes: what designs get beyond it while they may be the best."""
+"""Times the simulations that the accuracy of an objective takes: what designs get beyond it while they may be the best."""
 
-SAFE = 0.6
-"""Of the simulations that decide a rare failure: what a design takes on average, since most are far from the threshold."""
+NEAR = 0.3
+"""Of what a rare failure takes by more weighted simulations than the fewest: what a design takes on average, since most are far
+from the threshold."""
 
 LONGEST = 10.0
 """Seconds that a pilot may take."""
@@ -95,10 +98,13 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
         each = np.mean([_of_case(run, case, lengths[0]) for case in study.cases])
     except InputError:
         return sum(samples.values()), seconds
-    rare = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
-    rare //= len(study.cases)
-    designs = samples["verification"] / (truth.expected(study) + rare)
-    samples["verification"] = int(designs * (each + SAFE * rare))
+    settings = study.verification
+    usual, fewest = (
+        sum(cost(case, settings) for case in study.cases) // len(study.cases)
+        for cost in (verdicts.usual_in, verdicts.fewest_in)
+    )
+    designs = samples["verification"] / (truth.expected(study) + usual)
+    samples["verification"] = int(designs * (each + fewest + NEAR * (usual - fewest)))
     for name, share in USUAL.items():
         samples[name] = int(share * samples[name])
     return sum(samples.values()), here.seconds / here.count
@@ -121,12 +127,15 @@ def _of_case(run: StudyRun, case: Case, length: int) -> float:
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         steep = np.log(early / late) / np.log(PART)
-        fall = np.clip(np.nanmean(np.where(np.isfinite(steep), steep, np.nan), axis=0), *FALL)
+        shown = np.nanmean(np.where(np.isfinite(steep), steep, np.nan), axis=0)
+        fall = np.clip((shown + shown[0]) / 2.0, *FALL)
         needed = length * REPLICATES * late ** (1.0 / np.nan_to_num(fall, nan=FALL[0]))
-    most = np.nan_to_num(needed, nan=0.0).max(axis=1)
-    longer = np.sqrt(2.0) * (CONTESTED if settings.contest > 1 else 1.0)  # lengths double
+    if settings.contest > 1:
+        objectives = sum(not goal.exact for goal in case.goals)
+        needed[:, 2 : 2 + objectives] *= CONTESTED
+    most = np.sqrt(2.0) * np.nan_to_num(needed, nan=0.0).max(axis=1)  # lengths double
     least = truth.first_length(settings) * REPLICATES
-    each = np.clip(longer * most, least, settings.most_samples)
+    each = np.clip(most, least, settings.most_samples)
     return float(each.mean())
 
 

@@ -16,7 +16,8 @@ from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.goals import Goal
 from hpcclear.scene.points import snapped
 from hpcclear.scene.random_inputs import RandomInput
-from hpcclear.scene.sampling import generator, offsets, sobol, unit_lhs
+from hpcclear.scene.sampling import offsets, unit_lhs
+from hpcclear.scene.streams import generator, sobol
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.inputs import Derived, RandomVariable
 from hpcclear.statistics.random.moments import Drawn, RobustObjective

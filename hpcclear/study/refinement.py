@@ -85,7 +85,7 @@ def simulations(study: Study) -> tuple[int, int]:
     extremes, spread = chosen_in_all(study)
     rays = sum(RAYS * len(study.design_variables(case.name)) for case in study.cases)
     rounds = study.verification.infill_rounds * study.verification.infill_designs
-    each = length(study) * REPLICATES
+    each = truth.search_length(study) * REPLICATES
     return (extremes + spread + rays) * each, rounds * len(study.cases) * each
 
 
@@ -94,13 +94,9 @@ def at_edges(study: Study) -> int:
     if study.verification.infill_rounds == 0:
         return 0
     beside = sum(2 * len(study.design_variables(case.name)) + 1 for case in edge.cases_of(study))
-    return edge.simulations(study) + len(edge.ASIDE) * beside * length(study) * REPLICATES
-
-
-def length(study: Study) -> int:
-    """Points of each replicate that a design of the search gets: fewer than verified ones, a power of two."""
-    wanted = min(study.verification.infill_samples, study.verification.draws or truth.FIRST)
-    return 2 ** max(int(np.log2(max(wanted, REPLICATES) // REPLICATES)), 1)
+    return (
+        edge.simulations(study) + len(edge.ASIDE) * beside * truth.search_length(study) * REPLICATES
+    )
 
 
 def by_statistics(study: Study, r2: float) -> bool:
@@ -189,7 +185,7 @@ def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
     settings = run.study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
-    each = length(run.study) * REPLICATES
+    each = truth.search_length(run.study) * REPLICATES
     cases = len(run.study.cases)
     most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
     left = (most - len(begun["case"])) // cases
@@ -293,7 +289,7 @@ def _simulated(run: StudyRun, choices: Sequence[Choice], stage: str) -> Result:
         nothing = np.empty((0, len(names)))
         none = {"values": np.empty((0, most)), "errors": np.empty((0, most)), "excess": np.empty(0)}
         return {"case": np.array([], "U1"), "design": nothing, **none}
-    count = length(run.study)
+    count = truth.search_length(run.study)
     found = truth.sequences(run, choices, stage, "search", count, count * REPLICATES)
     return {
         "case": np.array([choice.case for choice in choices]),

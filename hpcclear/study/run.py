@@ -13,7 +13,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import generator
+from hpcclear.scene.streams import generator
 from hpcclear.scene.study import Study
 from hpcclear.study.simulations import Simulations
 

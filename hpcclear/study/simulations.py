@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.progress import Progress, Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint

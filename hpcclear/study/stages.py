@@ -17,6 +17,7 @@ from hpcclear.study import (
     certificate,
     chaos,
     contributions,
+    edge,
     fronts,
     lives,
     optimisation,
@@ -182,6 +183,7 @@ def _designs(scene: Scene) -> int:
     found = sum(optimisation.chosen_in_all(study))
     if study.verification.infill_rounds:
         found += 2 * ends_in_all(study)  # runners-up, and what is believed to be the ends
+        found += edge.designs(study)
     return found + len(study.cases) + len(printed_designs(scene))  # the original, in each case
 
 

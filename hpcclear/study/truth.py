@@ -122,6 +122,12 @@ def first_length(settings: Verification) -> int:
     return scrambled_length(min(least, settings.most_samples))
 
 
+def search_length(study: Study) -> int:
+    """Points of each replicate that a design of the search gets: fewer than verified ones, a power of two."""
+    wanted = min(study.verification.infill_samples, study.verification.draws or FIRST)
+    return 2 ** max(int(np.log2(max(wanted, REPLICATES) // REPLICATES)), 1)
+
+
 def expected(study: Study) -> int:
     """Simulations of a design, on average: those for the standard deviation of the paper's designs, whose half-width was
     1.4 % after 512 and fell as the power 0.6 of their number."""

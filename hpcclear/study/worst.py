@@ -16,7 +16,7 @@ from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
-from hpcclear.scene.sampling import sobol
+from hpcclear.scene.streams import sobol
 from hpcclear.study import rare
 from hpcclear.study.contributions import inputs_of
 from hpcclear.study.optimisation import Choice

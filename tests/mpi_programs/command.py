@@ -22,8 +22,9 @@ import numpy as np
 
 from hpcclear import cli
 from hpcclear.ensemble import simulate
-from hpcclear.ranks import launcher, stopping
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks import launcher, leading, stopping
+from hpcclear.ranks.schedule import Task
+from hpcclear.ranks.team import Ranks
 from hpcclear.results import checkpoint
 
 RANK = launcher.launched_rank() or 0
@@ -115,9 +116,9 @@ def make_watched(payload: dict, ranks: Ranks) -> Watched:
 
 
 def watch() -> None:
-    run_points, everywhere, stage = Ranks.run_points, Ranks.everywhere, Ranks.stage
+    run_points, everywhere, stage = leading.run_points, Ranks.everywhere, Ranks.stage
 
-    def watched_run_points(self, task: Task, points, *, on_records=None, **options):
+    def watched_run_points(ranks: Ranks, task: Task, points, *, on_records=None, **options):
         note("stage", [task.name])
 
         def receive(records: np.ndarray) -> None:
@@ -126,7 +127,7 @@ def watch() -> None:
             if on_records is not None:
                 on_records(records)
 
-        return run_points(self, task, points, on_records=receive, **options)
+        return run_points(ranks, task, points, on_records=receive, **options)
 
     def watched_everywhere(self: Ranks, name: str, *rest: object) -> None:
         note("stage", [name])
@@ -139,7 +140,7 @@ def watch() -> None:
     simulate.make_evaluator = make_watched  # type: ignore[assignment]
     Ranks.stage = watched_stage  # type: ignore[method-assign]
     Ranks.everywhere = watched_everywhere  # type: ignore[method-assign]
-    Ranks.run_points = watched_run_points  # type: ignore[method-assign]
+    leading.run_points = watched_run_points  # type: ignore[assignment]
     bracket(checkpoint.Checkpoint, "__init__", "", "opened")
     bracket(checkpoint.Checkpoint, "flush", "saving", "saved")
     bracket(checkpoint.Checkpoint, "save_stage", "saving a stage", "saved a stage")

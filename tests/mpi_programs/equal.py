@@ -8,8 +8,9 @@ import numpy as np
 from synthetic import design, make_sleeping
 
 from hpcclear.ranks.boundary import run_on_ranks
-from hpcclear.ranks.schedule import COLUMNS
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks.leading import run_points
+from hpcclear.ranks.schedule import COLUMNS, Task
+from hpcclear.ranks.team import Ranks
 
 
 def leave_a_mark(name: str, ranks: Ranks) -> None:
@@ -26,12 +27,12 @@ def program(ranks: Ranks) -> None:
     def task(name: str, workers: int | None = None) -> Task:
         return Task(name, make_sleeping, {"cost": 2e-3, "lanes": 4}, workers=workers)
 
-    full = ranks.run_points(task("full"), points, on_records=seen.append)
-    half = ranks.run_points(task("half"), points, completed=full[::2])
-    few = ranks.run_points(task("sleep"), points[:1])
-    none = ranks.run_points(task("sleep"), points[:0])
-    streamed = ranks.run_points(task("sleep"), points[:9], on_records=seen.append, keep=False)
-    on_one = ranks.run_points(task("on one", 1), points)
+    full = run_points(ranks, task("full"), points, on_records=seen.append)
+    half = run_points(ranks, task("half"), points, completed=full[::2])
+    few = run_points(ranks, task("sleep"), points[:1])
+    none = run_points(ranks, task("sleep"), points[:0])
+    streamed = run_points(ranks, task("sleep"), points[:9], on_records=seen.append, keep=False)
+    on_one = run_points(ranks, task("on one", 1), points)
     ranks.everywhere("everywhere", leave_a_mark, sys.argv[1])
     called = sorted(
         path.name for path in Path(sys.argv[1]).parent.glob(f"{Path(sys.argv[1]).name}-*")

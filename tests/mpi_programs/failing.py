@@ -12,7 +12,9 @@ from synthetic import SleepingWorker, design
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import run_on_ranks
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks.leading import run_points
+from hpcclear.ranks.schedule import Task
+from hpcclear.ranks.team import Ranks
 
 HOW, MARK = sys.argv[1], pathlib.Path(sys.argv[2])
 OTHER = 1
@@ -119,7 +121,7 @@ def program(ranks: Ranks) -> int | None:
     payload = Unwelcome() if HOW == "payload" else None
     if "call" in HOW.split():
         ranks.everywhere("call", call, None)
-    ranks.run_points(Task("sampling", make, payload), design(20_000), on_records=count)
+    run_points(ranks, Task("sampling", make, payload), design(20_000), on_records=count)
     return None
 
 

@@ -12,7 +12,9 @@ import numpy as np
 from synthetic import SleepingWorker, design, make_sleeping
 
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ranks.team import Ranks, Task
+from hpcclear.ranks.leading import run_points
+from hpcclear.ranks.schedule import Task
+from hpcclear.ranks.team import Ranks
 
 WHERE, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
 
@@ -46,7 +48,7 @@ def program(ranks: Ranks) -> None:
     if WHERE == "begin":
         time.sleep(0.3)
     if WHERE == "set-up of a rank":
-        ranks.run_points(Task("slow", make_slowly, {"cost": 1e-3}), design(10**6))
+        run_points(ranks, Task("slow", make_slowly, {"cost": 1e-3}), design(10**6))
     if WHERE == "call of a rank":
         ranks.everywhere("call", wait_on_ranks, None)
     if WHERE == "polling":
@@ -62,5 +64,5 @@ def program(ranks: Ranks) -> None:
     completed = np.frombuffer(path.read_bytes() if path.exists() else b"", OUTCOME)
     task = Task("sampling", make_sleeping, {"cost": 4e-3, "lanes": 2})
     points = design(100_000 if WHERE == "limited" else 800)
-    result = ranks.run_points(task, points, completed=completed, on_records=save)
+    result = run_points(ranks, task, points, completed=completed, on_records=save)
     np.save(FOLDER / "result.npy", result)

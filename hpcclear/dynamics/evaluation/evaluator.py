@@ -10,20 +10,20 @@ from hpcclear.base.arrays import Array, Booleans, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
-from hpcclear.base.objectives import MEAN_GAP, RATE, Objective
+from hpcclear.base.objectives import MEAN_GAP, RATE, Objective, asked
 from hpcclear.base.outcome import IMPACTS, RESPONSES, Flag, Status, unknown
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.joint_laws import widest_contact
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.planar import energy
-from hpcclear.dynamics.setup.parameters import Numbers, parameters
+from hpcclear.dynamics.setup.parameters import parameters, widest_contact
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes, PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
+from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
 from hpcclear.scene.record import has_pressure, record_of
 
 VECTORS = 4
@@ -148,6 +148,7 @@ class Evaluator:
             )
         self._problem = problem
         self._record, self._pressed = record_of(scene), has_pressure(scene)
+        self._asked = self._record, responses_reported(problem), scene.objective
         self._starts: dict[int, float] = {}  # energy of what runs, J
         self._values: dict[int, Array] = {}  # of what runs, for its pressures
         self._partial: dict[int, Records] = {}
@@ -182,10 +183,7 @@ class Evaluator:
         """Work for about `seconds`; return the records of what finished meanwhile."""
         self._lanes.advance(seconds)
         labels, outcome, par = self._lanes.collect()
-        responses = responses_reported(self._problem)
-        records = outcome_records(
-            labels, outcome, par, self._record, responses, self.scene.objective
-        )
+        records = outcome_records(labels, outcome, par, *self._asked)
         if self._pressed:
             nothing = np.zeros(len(self._columns.names))
             values = [self._values.pop(label, nothing) for label in labels.tolist()]
@@ -208,6 +206,24 @@ class Evaluator:
             if (group["flags"] & _ARRIVED).all():
                 done.append(joined(sample, self._partial.pop(sample), self._objective))
         return np.array(done, self._record)
+
+
+class Judge:
+    """A rank's worker: an evaluator whose records contain the requested objective; see `hpcclear.ranks.schedule.Worker`."""
+
+    def __init__(self, evaluator: Worker, objective: Objective) -> None:
+        self._evaluator, self._objective = evaluator, objective
+        self.lanes = evaluator.lanes
+        self.submit = evaluator.submit
+
+    @property
+    def pending(self) -> int:
+        """Samples submitted and not finished."""
+        return self._evaluator.pending
+
+    def advance(self, seconds: float) -> Records:
+        """Work for about `seconds`; records of what finished meanwhile."""
+        return asked(self._evaluator.advance(seconds), self._objective)
 
 
 def with_pressures(

@@ -6,7 +6,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.joint_laws import stored_energy
+from hpcclear.dynamics.laws import numbers
+from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.planar.problem import linkage_of
@@ -55,6 +56,22 @@ def energies(
             gaps[:, k] -= _depth(scene, par, places[k], direction, turns)
     elastic = stored_energy(scene, par, gaps, active[:, places], places)
     return kinetic, kinetic + potential + elastic
+
+
+def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: Any) -> Array:
+    """Energy stored in the contacts at `places`, J, (t,); parameters (PARAMETERS,) or (t, PARAMETERS), gaps and contact flags
+    (t, places): under `latched` laws a penetration counts only while in contact."""
+    table = scene.effects.contact
+    if table is None or not len(places):
+        return np.zeros(len(gaps))
+    law = with_constants(table.declared)
+    depth = np.maximum(gaps, 0.0)
+    on = active if law.latched else np.ones_like(depth)
+    each = on * numbers.stored(
+        law, depth, numbers.read_from(law, Parameters(par).contact_numbers[..., places, :])
+    )
+    total: Array = each.sum(axis=-1)
+    return total
 
 
 def _depth(scene: Scene, par: Array, place: int, direction: Array, turns: Any) -> Array | float:

@@ -183,9 +183,20 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
 
 
 def sample_of(scene: Scene, points: Points | None) -> Mechanism:
-    """The mechanisms of samples with the scene's structure; of the scene itself without points."""
-    points = Points((), np.empty((1, 0)), ()) if points is None else points
-    return with_columns(scene, linkage_of(scene).mechanism, points)
+    """The mechanisms of samples with the scene's structure; of the scene itself without points.
+
+    Those of the last points are kept, since parameters, starts and contacts of samples are made from the same object.
+    """
+    if points is None:
+        return with_columns(scene, linkage_of(scene).mechanism, Points((), np.empty((1, 0)), ()))
+    for known, its, made in _LAST:
+        if known is scene and its is points:
+            return made
+    _LAST[:] = [(scene, points, with_columns(scene, linkage_of(scene).mechanism, points))]
+    return _LAST[0][2]
+
+
+_LAST: list[tuple[Scene, Points, Mechanism]] = []
 
 
 def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:

@@ -8,12 +8,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.joint_laws import stored_energy
 from hpcclear.dynamics.layout.views import Parameters, Rates
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, LooseSlot, as_complex, split
 from hpcclear.dynamics.linkage.poses import Pose
+from hpcclear.dynamics.planar.energy import stored_energy
 from hpcclear.dynamics.planar.path import followed
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene

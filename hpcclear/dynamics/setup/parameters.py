@@ -5,49 +5,37 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import WIDEST
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.joint_laws import fill, swing
+from hpcclear.dynamics.contacts.declared import Shape
+from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.laws import laws, numbers
+from hpcclear.dynamics.laws.constant import with_constants
+from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
+from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.planar import bristles
 from hpcclear.dynamics.planar.prescribed import held_extremes
-from hpcclear.dynamics.planar.problem import is_prescribed, linkage_of, parameters_of
+from hpcclear.dynamics.planar.problem import is_prescribed, parameters_of
+from hpcclear.dynamics.setup.further import (
+    further_rows,
+    has_waves,
+    with_further_numbers,
+    with_waves,
+)
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.mechanism import length_path
+from hpcclear.scene.points import Numbers, Points
+from hpcclear.scene.record import has_pressure
 
-SAME_LENGTH = 0.01
-"""By how much length over diameter may differ between samples of a film that is solved for one, relative: worn bearings are
-wider."""
+HERTZ_RANGE = 0.25
+"""Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.
 
-
-RAMP = 0.1
-"""Of a threshold of wear, relative: beyond it by so much, all of the force wears."""
+Hertz's contact radius is a = sqrt(R_B R_J d/c) here; a theory of small contacts has lost its ground when a exceeds half
+the journal's radius, a contact of 30 degrees to either side. That is d > 0.25 c R_J/R_B.
+"""
 
 OF_RAMP, OF_FORCE = 0.5, 0.003
 """Of friction's ramp, and of the forces of inertia: what errors of explicit steps at the edge of stability may come to."""
-
-
-class Numbers:
-    """The scene's numbers, a column of the points where one drives the entry: ``numbers("drive.speed")``."""
-
-    def __init__(self, scene: Scene, points: Points | None) -> None:
-        self.scene = scene
-        self.points = points
-        self.size = 1 if points is None else len(points)
-        self._columns = {}
-        if points is not None:
-            for k, paths in enumerate(points.paths):
-                self._columns.update(dict.fromkeys(paths, points.values[:, k]))
-
-    def __call__(self, path: str) -> Array:
-        """Values of an entry, shape (size,), SI."""
-        column = self._columns.get(path)
-        return np.full(self.size, self.scene.number(path)) if column is None else column
-
-    def known(self, path: str) -> Array:
-        """The same, 0 of an entry that the scene has not."""
-        there = path in self._columns or path in self.scene.numeric_paths()
-        return self(path) if there else np.zeros(self.size)
 
 
 def parameters(scene: Scene, points: Points | None = None) -> Array:
@@ -55,8 +43,8 @@ def parameters(scene: Scene, points: Points | None = None) -> Array:
     get = Numbers(scene, points)
     p = _parameters(scene, points, get)
     p[:, at.EDGE] = _needed_at_edge(scene, get, p)
-    p = _with_waves(scene, get, p) if _has_waves(scene) else p
-    return _with_further_numbers(scene, get, p) if further_rows(scene) else p
+    p = with_waves(scene, get, p) if has_waves(scene) else p
+    return with_further_numbers(scene, get, p) if further_rows(scene) else p
 
 
 def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
@@ -72,6 +60,82 @@ def _parameters(scene: Scene, points: Points | None, get: Numbers) -> Array:
         held_extremes(scene, points, get.size) if held else np.nan
     )
     return p
+
+
+def shape_of(scene: Scene, get: Numbers, label: str) -> Shape:
+    """Numbers of a contact's shape."""
+    key = scene.joint_key(label)
+    return GEOMETRIES[scene.clearance_joint(label).geometry].shape(
+        lambda name: get(f"{key}.{name}")
+    )
+
+
+def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
+    """Numbers of a contact's samples by the names of `declared.JOINT`, (m,)."""
+    key, materials = scene.joint_key(label), scene.materials_key(label)
+    shape = shape_of(scene, get, label)
+    clearance, bearing, journal = shape.radii
+    moduli, ratios = (
+        [get(f"{materials}.{part}.{entry}") for part in ("bearing", "journal")]
+        for entry in ("youngs_modulus", "poisson_ratio")
+    )
+    h_bearing, h_journal = map(reduced_compliance, moduli, ratios)
+    alpha, beta = dundurs(moduli, ratios)
+    path = length_path(scene.clearance_joint(label))
+    return {
+        "stiffness": sphere_stiffness(h_bearing, h_journal, shape.radius),
+        "compliance": h_bearing + h_journal,
+        "bearing_radius": bearing,
+        "journal_radius": journal,
+        "clearance": clearance,
+        "length": np.full_like(clearance, np.nan) if path is None else get(f"{key}.{path}"),
+        "dundurs_alpha": alpha,
+        "dundurs_beta": beta,
+    }
+
+
+def _given(get: Numbers, kind: str, table: Any) -> dict[str, Any]:
+    """A law's parameters of samples, (m,); lists as they are."""
+    values = {one.name: table.value(one.name) for one in table.declared.parameters}
+    return {
+        name: tuple(value) if isinstance(value, tuple) else get(f"effects.{kind}.{name}")
+        for name, value in values.items()
+    }
+
+
+def fill(scene: Scene, get: Numbers, label: str, force: Array, p: Array) -> None:
+    """Fill one contact's block of parameters but for its film (a view, first column its first entry).
+
+    `force`: what inertia comes to, N, (m,): laws whose force is no power of the depth are looked at there.
+    """
+    joint, shape = joint_numbers(scene, get, label), shape_of(scene, get, label)
+    p[:, at.CLEARANCE] = shape.clearance
+    p[:, at.BEARING_RADIUS] = shape.bearing_radius
+    p[:, at.JOURNAL_RADIUS] = shape.journal_radius
+    table: Any = scene.effects.contact
+    law = with_constants(table.declared)
+    given = {**joint, **_given(get, "contact", table)}
+    rows = numbers.rows_of(law, given, len(p))
+    p[:, at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + rows.shape[1]] = rows
+    found = numbers.sample_numbers(law, given)
+    p[:, at.EXPONENT], p[:, at.DAMPING] = numbers.shape_near(law, force, found)
+    if law.deepest is None:
+        ratio = joint["journal_radius"] / joint["bearing_radius"]
+        p[:, at.DEEPEST_VALID] = HERTZ_RANGE * ratio * joint["clearance"]
+    else:
+        p[:, at.DEEPEST_VALID] = numbers.evaluate(law.deepest, found)
+    if GEOMETRIES[scene.clearance_joint(label).geometry].along_a_line:  # a corner is small
+        p[:, at.DEEPEST_VALID] = np.minimum(p[:, at.DEEPEST_VALID], HERTZ_RANGE * shape.radius)
+    rubs = scene.effects.friction
+    if rubs.law == "none":
+        return
+    given = {**joint, **_given(get, "friction", rubs)}
+    friction = with_constants(rubs.declared)
+    rows = numbers.rows_of(friction, given, len(p))
+    p[:, at.FRICTION_NUMBERS : at.FRICTION_NUMBERS + rows.shape[1]] = rows
+    found = numbers.sample_numbers(friction, given)
+    ramp, slope = numbers.steepness_of(friction, found, len(p))
+    p[:, at.INVERSE_RAMP], p[:, at.STEEPNESS] = ramp, slope
 
 
 def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: int) -> None:
@@ -112,9 +176,17 @@ def _needed_at_edge(scene: Scene, get: Numbers, p: Array) -> Array:
         own = p[:, at.JOINT_BLOCKS + place * at.JOINT_ROWS :]
         if scene.effects.friction.law != "none":
             needed = np.maximum(needed, own[:, at.INVERSE_RAMP] / OF_RAMP)
-        frequency = np.sqrt(swing(scene, p, place, force) / mass)
+        frequency = np.sqrt(_swing(scene, p, place, force) / mass)
         needed = np.maximum(needed, mass * frequency / (OF_FORCE * force))
     return (1.0 + pin) * needed
+
+
+def _swing(scene: Scene, p: Array, place: int, force: Array) -> Array:
+    """Stiffness of a joint's contact where its elastic force is `force` (m,), N/m, of parameters (m, PARAMETERS)."""
+    law = with_constants(scene.effects.contact.declared)  # type: ignore[union-attr]
+    known = numbers.read_from(law, Parameters(p).contact_numbers[..., place, :])
+    found: Array = numbers.swing(law, force, known)
+    return found
 
 
 def _mass(scene: Scene, get: Numbers) -> Array:
@@ -130,104 +202,25 @@ def _inertia(scene: Scene, get: Numbers, p: Array) -> Array:
     return np.maximum(_mass(scene, get) * pin * turning, 1e-300)
 
 
-def parameter_rows(scene: Scene) -> int:
-    """Parameters of a sample."""
-    waving = at.FURTHER if _has_waves(scene) else linkage_of(scene).parameter_rows
-    return further_rows(scene) or waving
+def widest_contact(scene: Scene, get: Numbers, forces: Array) -> dict[str, Array]:
+    """Fields of `outcome.WIDEST`, (m, MAX_JOINTS) each, at normal forces (m, MAX_JOINTS) of samples; 0 without contact.
 
-
-def _has_waves(scene: Scene) -> bool:
-    """Whether there are parameters of waves or of thresholds of wear."""
-    return any(scene.waves().values()) or scene.has_thresholds
-
-
-def _with_waves(scene: Scene, get: Numbers, p: Array) -> Array:
-    """With the waves of surfaces that are out of round, and thresholds of wear; of joints without the former are 0."""
-    rows = np.zeros((len(p), at.FURTHER))
-    rows[:, : p.shape[1]] = p
-    for joint in scene.pins():
-        own = rows[:, at.WAVES + 2 * waves_at(scene, joint)[0] :]
-        paths = wave_paths(scene, joint)
-        for k in range(len(paths) // 2):
-            cosine, sine = (get.known(path) for path in paths[2 * k : 2 * k + 2])
-            n = int(paths[2 * k].rpartition("_")[2])
-            own[:, 4 * k : 4 * k + 4] = np.stack([cosine, sine, n * sine, -n * cosine], axis=-1)
-    for joint, place in zip(scene.contact_labels(), scene.open_places, strict=True):
-        row = at.THRESHOLDS + 2 * place
-        rows[:, row : row + 2] = _share_that_wears(scene, get, joint)
-    return rows
-
-
-def _share_that_wears(scene: Scene, get: Numbers, joint: str) -> Array:
-    """Slope, 1/N, and offset of the share of a joint's normal force that wears, shape (samples, 2); 0 and 1 for all of it."""
-    key, wear = scene.joint_key(joint), scene.clearance_joint(joint).wear
-    if wear is None or wear.threshold is None:
-        return np.tile([0.0, 1.0], (get.size, 1))
-    size = 2.0 * get(f"{key}.bearing_radius") * get(f"{key}.wear.length")
-    slope = 1.0 / (RAMP * get(f"{key}.wear.threshold") * size)
-    return np.stack([slope, np.full(get.size, -1.0 / RAMP)], axis=-1)
-
-
-def waves_at(scene: Scene, joint: str) -> tuple[int, int]:
-    """First row of a joint's waves among `layout.WAVE_ROWS`, and how many.
-
-    Raises
-    ------
-    InputError
-        If there are more than rows.
+    Empty where the geometry of contact has no pressure; NaN at places without a contact.
     """
-    rows = 2 * sum(scene.waves().values())
-    first = rows * _place(scene, joint)
-    if first + rows > at.WAVE_ROWS:
-        raise InputError(
-            "wear.harmonics" if scene.wear is not None and scene.wear.waves else f"{scene.joint_key(joint)}.out_of_round",
-            rows // 2, f"all joints together have more than {at.WAVE_ROWS // 2} waves",
-            f"Take {at.WAVE_ROWS // 2 // (_place(scene, joint) + 1) // 2} around each surface at most",
-        )  # fmt: skip
-    return first, rows
-
-
-def wave_paths(scene: Scene, joint: str) -> list[str]:
-    """Entries of a joint's waves, in the order of their rows."""
-    return [
-        f"{scene.joint_key(joint)}.out_of_round.{surface}.{part}_{n + 1}"
-        for surface, count in scene.waves().items()
-        for n in range(count)
-        for part in ("cosine", "sine")
-    ]
-
-
-def _solved_films(scene: Scene) -> dict[str, Any]:
-    """Joints whose films have further numbers, and the functions that give these."""
-    known = {name: laws("film")[film.model].further for name, film in scene.films().items()}
-    return {name: further for name, further in known.items() if further is not None}
-
-
-def further_rows(scene: Scene) -> int:
-    """Parameters of a sample with films that have further numbers; 0 without such films."""
-    last = max((_place(scene, joint) for joint in _solved_films(scene)), default=-1)
-    return 0 if last < 0 else at.FURTHER + at.FURTHER_ROWS * (last + 1)
-
-
-def _place(scene: Scene, joint: str) -> int:
-    """Which place among the kernel's joints a joint has."""
-    return scene.joint_labels.index(joint)
-
-
-def _with_further_numbers(scene: Scene, get: Numbers, p: Array) -> Array:
-    """With what films are solved for once a bearing."""
-    rows = np.zeros((len(p), further_rows(scene)))
-    rows[:, : p.shape[1]] = p
-    for joint, further in _solved_films(scene).items():
-        key, table = scene.joint_key(joint), scene.pin(joint)
-        ratio = 0.5 * table.film.length / table.bearing_radius  # type: ignore[union-attr]
-        varied = 0.5 * get(f"{key}.film.length") / get(f"{key}.bearing_radius")
-        if (np.abs(varied / ratio - 1.0) > SAME_LENGTH).any():
-            raise InputError(
-                f"{key}.film.model", scene.films()[joint].model,
-                "the samples differ in length over diameter, but the film is solved for one ratio",
-                'Vary neither film.length nor bearing_radius, or take model = "short" or "long"',
-            )  # fmt: skip
-        first = at.FURTHER + at.FURTHER_ROWS * _place(scene, joint)
-        rows[:, first : first + at.FURTHER_ROWS] = further(ratio)
-    return rows
+    if not has_pressure(scene):
+        return {}
+    law: Any = scene.effects.contact.declared  # type: ignore[union-attr]
+    functions = {name: getattr(law.geometry, attribute) for name, attribute in WIDEST.items()}
+    by_depth = any("depth" in law.arguments(one) for one in functions.values())
+    found = {name: np.full(forces.shape, np.nan) for name in WIDEST}
+    for place, label in zip(scene.open_places, scene.contact_labels(), strict=True):
+        given = joint_numbers(scene, get, label)
+        own = numbers.sample_numbers(law, given | _given(get, "contact", scene.effects.contact))
+        force = forces[:, place]
+        state = {**own, "force": force}
+        if by_depth:
+            state["depth"] = numbers.depth_at(law, force, own)
+        for name, function in functions.items():
+            value = numbers.evaluate(function, state)
+            found[name][:, place] = np.where(force == 0.0, 0.0, value)
+    return found

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics.setup.parameters import Numbers
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
 
 
 @dataclass(frozen=True)

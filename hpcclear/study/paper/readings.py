@@ -15,7 +15,7 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
-from hpcclear.ensemble.simulate import sample_points
+from hpcclear.ensemble.samples import sample_points
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset

@@ -1,0 +1,50 @@
+"""Random numbers of a study: each follows from its seed, a purpose ("train", "test", ...) and, for Monte Carlo, an index."""
+
+import hashlib
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+
+
+def _words(text: str) -> tuple[int, ...]:
+    """A text as words of a spawn key."""
+    return tuple(int(word) for word in np.frombuffer(hashlib.sha256(text.encode()).digest(), "<u4"))
+
+
+def generator(seed: int, *labels: str) -> np.random.Generator:
+    """A stream of random numbers of its own for each purpose, from the study's seed."""
+    return np.random.default_rng(_seed(seed, *labels))
+
+
+def _seed(seed: int, *labels: str) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=sum((_words(label) for label in labels), ()))
+
+
+def uniform(seed: int, purpose: str, name: str, first: int, count: int) -> Array:
+    """Numbers `first` to `first + count` of one stream, strictly between 0 and 1, shape
+    (count,)."""
+    # Philox is counter-based: it can start anywhere. One step of its counter gives four numbers.
+    bits = np.random.Philox(_seed(seed, purpose, name))
+    bits.advance(first // 4)
+    numbers = np.random.Generator(bits).random(first % 4 + count)[first % 4 :]
+    return (
+        numbers + 2.0**-54
+    )  # multiples of 2^-53 from 0 on, moved off 0, where quantiles are infinite
+
+
+SOBOL_BITS = 30
+"""Digits of a point of a Sobol sequence; a sequence has as many points as they can represent."""
+
+
+def sobol(dimensions: int, rng: np.random.Generator, first: int, count: int) -> Array:
+    """Points `first` to `first + count` of a scrambled Sobol sequence, strictly between 0 and 1,
+    shape (count, dimensions)."""
+    from scipy.stats import qmc  # most of a second to import; a single response needs none of it
+
+    if dimensions == 0:
+        return np.empty((count, 0))
+    sequence = qmc.Sobol(dimensions, scramble=True, bits=SOBOL_BITS, rng=rng)
+    if first:
+        sequence.fast_forward(first)
+    return sequence.random(count) + 0.5 * 2.0**-SOBOL_BITS  # as in `uniform`, off 0
