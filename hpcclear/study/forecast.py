@@ -35,7 +35,7 @@ fast errors fall."""
 
 FALL = 0.5, 1.5
 """Between these is the power of the number of simulations by which errors fall: of rough f, and of smooth f. The mean shows it
-first: the error of a deviation by few points falls alike whether f is rough or smooth."""
+first: the error of a standard deviation by few points falls alike whether f is rough or smooth."""
 
 USUAL = {"verification": 0.8, "infill": 0.8, "edge": 0.55}
 """Of the most simulations of a stage, or of the most designs that are verified."""
