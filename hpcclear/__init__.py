@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from hpcclear.study import run_study
     from hpcclear.study.api import effects
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = [
     "ContactLaw",
