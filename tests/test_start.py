@@ -70,7 +70,7 @@ def test_a_response_that_is_compiled_loads_nothing_that_only_compiling_needs(tmp
         "sklearn",
         "xarray",
     }
-    assert loaded_by(command(*words), compiling | others) == {"numba", "xarray"}
+    assert loaded_by(command(*words), compiling | others) == {"numba"}
 
 
 @pytest.mark.parametrize(("ends", "code"), [("3", 3), ("None", 0), ("'why'", 1)])

@@ -36,6 +36,11 @@ class Variable:
         """Return the values, of the shape of the dimensions."""
         return self.values
 
+    def __array__(
+        self, dtype: np.typing.DTypeLike | None = None, copy: bool | None = None
+    ) -> np.ndarray:
+        return np.array(self.values, dtype, copy=copy)
+
     def __float__(self) -> float:
         return float(self.values)
 
