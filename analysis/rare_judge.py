@@ -199,6 +199,8 @@ def probability(scene: Scene, choice: Choice, simulations: int, rng: np.random.G
         if level >= goal.limit:
             break
         seeds = np.flatnonzero(f > level)
+        if not len(seeds):
+            break  # the largest f is that of many: none is larger
         found *= len(seeds) / len(f)
         u, f = u[seeds], f[seeds]
         chains_u, chains_f = [u], [f]
