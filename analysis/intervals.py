@@ -15,11 +15,12 @@ import itertools
 from pathlib import Path
 
 import numpy as np
-from directly import run_of
+from directly import Here, run_of
 from regret import STUDIES, scene_of
 
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread, student
@@ -43,6 +44,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1, help="designs and scatter of so many kinds")
     parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--csv", type=Path, default=RESULTS)
+    parser.add_argument(
+        "--truths", type=Path, help="directory that keeps the truths, to go on or to judge anew"
+    )
     words = parser.parse_args()
     rows = []
     print(*FIELDS)
@@ -52,7 +56,14 @@ def main() -> None:
         changes = {"study.verification.most_samples": words.samples, "study.accuracy": None}
         scene = scene_of(name).with_(changes | {"study.seed": 31 + seed})
         designs = spread_out(scene, seed)
-        exact = truths(scene, designs, words.truth)
+        kept = words.truths and words.truths / f"{Path(name).stem}_{seed}_{words.truth}.npy"
+        if kept and kept.exists():
+            exact = np.load(kept)
+        else:
+            exact = truths(scene, designs, words.truth)
+        if kept:
+            words.truths.mkdir(parents=True, exist_ok=True)
+            np.save(kept, exact)
         for rtol in TOLERANCES:
             found = checked(scene.with_({"numerics.rtol": rtol}), designs, exact)
             rows.append((Path(name).stem, seed, rtol, *found))
@@ -93,6 +104,7 @@ def truths(scene: Scene, designs: list[Choice], count: int) -> np.ndarray:
 def checked(scene: Scene, designs: list[Choice], exact: np.ndarray) -> tuple[int, int, int, float]:
     """How many intervals hold, how many would without the share of the tolerance, of how many; and how much wider they are."""
     run = run_of(scene)
+    run.simulations = Once(scene)
     plain = limits(truth.results_of(run, designs, truth.made(run, designs)))
     run.of = lambda other: run_of(other)
     run.simulations.next = 40_000  # as large a study as usual, of which pairs take a share
@@ -112,6 +124,20 @@ def checked(scene: Scene, designs: list[Choice], exact: np.ndarray) -> tuple[int
         int(known.sum()),
         round(float(np.median(wider[known])), 2),
     )
+
+
+class Once(Here):
+    """Simulates nothing twice."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self._kept: dict[bytes, np.ndarray] = {}
+
+    def _records(self, points: Points, stage: str) -> np.ndarray:
+        key = points.values.tobytes()
+        if key not in self._kept:
+            self._kept[key] = super()._records(points, stage)
+        return self._kept[key]
 
 
 def limits(true: dict[str, np.ndarray]) -> np.ndarray:

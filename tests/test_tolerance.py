@@ -48,14 +48,17 @@ def _dynamics(monkeypatch):
 
 def test_exact_estimates_stand_by_themselves_and_unknown_ones_get_the_mean():
     values = np.array([1.0, 2.0, 6.0])
-    found, doubt = together(values, np.zeros(3))
+    found, doubt = together(values, np.zeros(3), 1.0)
     np.testing.assert_allclose(found, values, rtol=1e-6)
     assert (doubt < 1e-6).all()
-    found, doubt = together(np.append(values, np.nan), np.zeros(4))
-    assert found[3] == pytest.approx(3.0, rel=1e-6)
-    assert doubt[3] > np.sqrt(7.0)  # the standard deviation of the three
-    assert np.isnan(together(np.full(2, np.nan), np.zeros(2))).all()
-    np.testing.assert_allclose(together(values[:1], np.array([0.5])), [[1.0], [0.5]])
+    found, doubt = together(np.append(values, np.nan), np.zeros(4), 1.0)
+    assert 0.5 < found[3] < 3.0  # between 0 and the mean of the three
+    assert 2.0 < doubt[3] < 6.0  # their standard deviation is 2.6
+    assert np.isnan(together(np.full(2, np.nan), np.zeros(2), 1.0)).all()
+    found, doubt = together(np.array([50.0]), np.array([0.5]), 1.0)
+    assert (found[0], doubt[0]) == pytest.approx((50.0, 0.5), rel=0.03)  # not typical, but known
+    found, doubt = together(np.array([5.0]), np.array([50.0]), 1.0)
+    assert (abs(found[0]), doubt[0]) < (0.5, 10.0)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.5, 2.0])
@@ -63,14 +66,9 @@ def test_what_is_known_of_like_numbers_together_is_as_exact_as_stated(scatter):
     rng = np.random.default_rng(52)
     true = 1.0 + scatter * rng.standard_normal((400, 12))
     errors = rng.uniform(0.2, 2.0, true.shape)
-    found, doubt = np.moveaxis(
-        [
-            together(*row)
-            for row in zip(true + errors * rng.standard_normal(true.shape), errors, strict=True)
-        ],
-        1,
-        0,
-    )
+    values = true + errors * rng.standard_normal(true.shape)
+    each = [together(*row, 1.0) for row in zip(values, errors, strict=True)]
+    found, doubt = np.moveaxis(each, 1, 0)
     assert (abs(found - true) <= 1.96 * doubt).mean() > 0.935
     assert (doubt < errors).mean() > 0.95
     assert ((found - true) ** 2).mean() < 0.7 * (errors**2).mean()

@@ -1,32 +1,32 @@
 """What several estimates of like numbers say together of each of them: random effects.
 
 The numbers scatter about a common mean, and each estimate has an error. Noisy estimates lean on the common mean, exact ones
-stand by themselves. How much the numbers scatter is not known either: it is averaged over, weighted by how well it explains
-the estimates.
+stand by themselves. How large the mean and the scatter are is not known either: both are averaged over, weighted by how well
+they explain the estimates. Beforehand they are about as large as is typical, or many times larger or smaller (half-Cauchy
+densities): that decides where estimates are too noisy to show anything, and nowhere else.
 
 Sources: D. B. Rubin, "Estimation in parallel randomized experiments", J. Educ. Stat. 6 (1981), doi:10.3102/10769986006004377;
 A. Gelman, "Prior distributions for variance parameters in hierarchical models", Bayesian Analysis 1 (2006),
-doi:10.1214/06-BA117A (all standard deviations of the scatter are equally likely beforehand).
+doi:10.1214/06-BA117A.
 """
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 
-EXACT = 1e-9
-"""Error, over the largest of all numbers, below which an estimate counts as exact."""
-
-LEAST, MOST, COUNT = 1e-4, 3.0, 200
-"""Standard deviations of the scatter that are averaged over: over the largest difference and error, and how many."""
+SIZES = np.geomspace(1e-3, 1e3, 37)
+"""Of mean and scatter, over what is typical, that are averaged over."""
 
 
-def together(values: Array, errors: Array) -> tuple[Array, Array]:
+def together(values: Array, errors: Array, typical: float) -> tuple[Array, Array]:
     """Estimates of each of n numbers by all of them, and their standard errors.
 
     Parameters
     ----------
     values, errors : array, shape (n,)
         Estimates and standard errors; where one of them is NaN, only the others are known of that number.
+    typical : float
+        How large such numbers are as a rule.
 
     Returns
     -------
@@ -36,24 +36,19 @@ def together(values: Array, errors: Array) -> tuple[Array, Array]:
     known = np.isfinite(values) & np.isfinite(errors)
     if not known.any():
         return np.full(len(values), np.nan), np.full(len(values), np.nan)
-    least = EXACT * float(abs(values[known]).max()) or EXACT
-    error = np.where(known, np.maximum(errors, least), np.inf)
-    value = np.where(known, values, 0.0)
-    largest = max(float(np.ptp(values[known])), float(error[known].max()))
-    scatter = largest * np.concatenate([[0.0], np.geomspace(LEAST, MOST, COUNT)])
-    # rows: standard deviations of the scatter
-    variances = error**2 + scatter[:, None] ** 2
-    total = (1.0 / variances).sum(axis=1)
-    mean = (value / variances).sum(axis=1) / total
-    off = np.where(known, (value - mean[:, None]) ** 2 / variances, 0.0).sum(axis=1)
-    logarithm = -0.5 * (np.log(variances[:, known]).sum(axis=1) + np.log(total) + off)
-    weights = np.exp(logarithm - logarithm.max()) * np.gradient(scatter)
+    value, own = np.where(known, values, 0.0), np.where(known, errors, 0.0) ** 2
+    # rows: all pairs of sizes of mean and scatter; columns: numbers
+    large, scatter = (size.reshape(-1, 1) ** 2 for size in np.meshgrid(*[typical * SIZES] * 2))
+    each = np.where(known, 1.0 / (own + scatter), 0.0)
+    sharp = each.sum(axis=1, keepdims=True) + 1.0 / large
+    mean = (each * value).sum(axis=1, keepdims=True) / sharp
+    off = (each * (value - mean) ** 2).sum(axis=1, keepdims=True) + mean**2 / large
+    logarithm = np.log(each[:, known]).sum(axis=1, keepdims=True) - np.log(large * sharp) - off
+    before = [np.sqrt(size) / (1.0 + size / typical**2) for size in (large, scatter)]
+    weights = np.exp(0.5 * (logarithm - logarithm.max())) * before[0] * before[1]
     weights /= weights.sum()
-    own = np.where(
-        known, scatter[:, None] ** 2 / variances, 0.0
-    )  # what an estimate counts beside the mean
-    found = mean[:, None] + own * (value - mean[:, None])
-    beside = np.where(known, own * np.where(known, error, 0.0) ** 2, scatter[:, None] ** 2)
-    doubt = beside + (1.0 - own) ** 2 / total[:, None]
-    middle = weights @ found
-    return middle, np.sqrt(weights @ (doubt + (found - middle) ** 2))
+    counts = each * scatter  # what an estimate counts beside the mean
+    found = mean + counts * (value - mean)
+    doubt = np.where(known, counts * own, scatter) + (1.0 - counts) ** 2 / sharp
+    middle = (weights * found).sum(axis=0)
+    return middle, np.sqrt((weights * (doubt + (found - middle) ** 2)).sum(axis=0))
