@@ -1,5 +1,6 @@
 """Rare failures: indices from few values, probabilities by importance sampling, and designs at the edge of what is allowed."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -124,6 +125,23 @@ def test_what_cannot_fail_has_an_upper_limit_all_the_same():
     soon = Rare(3, 1.0 + 1e-9, negligible=1e-2)
     answered(soon.prepared(np.random.default_rng(2)), lambda u: np.tanh(plane(u)))
     assert soon.simulations < made.simulations
+
+
+@pytest.mark.parametrize(("limit", "before"), [(1.01, (0, 8192)), (1.01, (1, 8192))])
+def test_where_weights_are_worth_nothing_all_draws_are_plain_and_count(limit, before):
+    """f is bounded and rougher than any density can follow: weighted draws show nothing below 1e-2 here."""
+    made = Rare(3, limit, 1e-6, before)
+    rough = partial(answered, f=lambda u: np.sin(1e5 * u.sum(axis=1)))
+    rough(made.prepared(np.random.default_rng(1)))
+    rough(made.lengthened(128, [np.random.default_rng([2, k]) for k in range(REPEATS)]))
+    assert not made.begun_anew()
+    assert (made.weights == 1.0).all()
+    hits, draws = before[0] + int((made.f > limit).sum()), 8192 + 128 * REPEATS
+    assert (made.draws, made.interval(0.95).value) == (draws, hits / draws)
+    found = made.interval(0.95)
+    assert found.upper == pytest.approx(stats.beta.ppf(0.975, hits + 1, draws - hits))
+    least = stats.beta.ppf(0.025, hits, draws - hits + 1) if hits else 0.0
+    assert found.lower == pytest.approx(least)
 
 
 def test_values_that_failed_are_left_out_and_weights_are_bounded():

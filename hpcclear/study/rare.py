@@ -39,6 +39,8 @@ class Failing(NamedTuple):
 
     choice: Choice
     goal: Constraint
+    before: tuple[int, int] = 0, 0
+    """Failures of plain draws, and their number."""
 
 
 class Found(NamedTuple):
@@ -47,8 +49,8 @@ class Found(NamedTuple):
     own: Limited
     sure: Limited
     simulations: int
-    length: int
-    """Draws of all repeats, without pilots."""
+    draws: int
+    """Draws behind the probability, without pilots."""
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
@@ -56,7 +58,11 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
     they can be; besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     where = [
-        (row, k, Failing(choice, goal))
+        (
+            row,
+            k,
+            Failing(choice, goal, _before(true, row, len(run.study.case(choice.case).goals) + k)),
+        )
         for row, choice in enumerate(choices)
         for k, goal in enumerate(run.study.case(choice.case).kept)
         if verdicts.rare(goal, run.study.verification)
@@ -73,9 +79,15 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
         true["goal"][row, column] = np.clip(
             its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
         )
-        true["counted"][row, k] = its.length
+        true["counted"][row, k] = its.draws
         true["rare_samples"][row] += its.simulations
     return verdicts.decided(run, choices, true)
+
+
+def _before(true: Result, row: int, column: int) -> tuple[int, int]:
+    """Failures of the plain draws of a design, and their number."""
+    draws, share = int(true["samples"][row] - true["failed"][row]), true["goal"][row, column]
+    return (round(float(share) * draws), draws) if np.isfinite(share) else (0, 0)
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
@@ -91,7 +103,12 @@ def probabilities(
 ) -> list[Found]:
     """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long."""
     rates = [
-        Rare(len(run.study.case(one.choice.case).random), _limit(one), NEGLIGIBLE * one.goal.most)
+        Rare(
+            len(run.study.case(one.choice.case).random),
+            _limit(one),
+            NEGLIGIBLE * one.goal.most,
+            one.before,
+        )
         for one in asked
     ]
     begun = [
@@ -117,7 +134,7 @@ def probabilities(
             one.interval(run.study.verification.confidence),
             one.interval(verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
-            one.f.size,
+            one.draws,
         )
         for one, number in zip(rates, many, strict=True)
     ]

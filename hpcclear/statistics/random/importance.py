@@ -7,7 +7,8 @@ limit is the probability without bias, however rough f is. The share of the inpu
 regions that the pilot missed. What the repeats disagree by is the error.
 
 Where (nearly) no value lies beyond the limit, what is known of the largest lower level that enough values exceed is an upper
-limit for it.
+limit for it. Where f is so rough that weighted draws are worth hardly more than plain ones, and the pilot meets no failure,
+draws are plain ones, and are counted with all earlier ones of the design (Clopper and Pearson).
 
 Sources: R. Y. Rubinstein and D. P. Kroese, "The Cross-Entropy Method" (2004), doi:10.1007/978-1-4757-4321-0; of
 mixtures that bound weights T. Hesterberg, "Weighted average importance sampling and defensive mixture distributions",
@@ -22,7 +23,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.student import student
-from hpcclear.statistics.random.replicates import Limited, spread
+from hpcclear.statistics.random.replicates import Limited, of_hits, spread
 
 REPEATS = 16
 """Independent repeats, whose disagreement is the error."""
@@ -61,9 +62,13 @@ MOST = 100.0
 ENOUGH = 20.0
 """Equally weighted draws that those beyond a level are worth, at least, for an interval of its probability."""
 
+WORTH = 6.0
+"""Plain draws that a weighted one of a pilot without failures is worth, at least, or plain ones are drawn. By a lower level
+a bound of p takes `ENOUGH` draws of about p / 2; by plain draws without any failure 4 to 6 over p."""
+
 
 class Density:
-    """A mixture of the inputs' own density, a wide one and fitted ones.
+    """A mixture of the inputs' own density, a wide one and fitted ones; of their own one alone if none is fitted.
 
     Parameters
     ----------
@@ -74,9 +79,10 @@ class Density:
     """
 
     def __init__(self, shares: Array, centres: Array, covariances: Array) -> None:
-        size = centres.shape[1]
+        size, self.plain = centres.shape[1], not len(shares)
         own = np.zeros((2, size)), np.stack([np.eye(size), WIDE**2 * np.eye(size)])
-        self._shares = np.concatenate([[OWN, SPREAD], (1.0 - OWN - SPREAD) * shares])
+        first = [1.0, 0.0] if self.plain else [OWN, SPREAD]
+        self._shares = np.concatenate([first, (1.0 - sum(first)) * shares])
         self._centres = np.concatenate([own[0], centres])
         self._factors = np.linalg.cholesky(np.concatenate([own[1], covariances]))
 
@@ -147,7 +153,7 @@ def pilot(
     dimensions: int, limit: float, rng: np.random.Generator, negligible: float = 0.0
 ) -> Generator[Array, Array, Density]:
     """Yield draws u, (n, d), take f there, (n,), NaN where it failed, and return a density near where f exceeds the limit, or
-    a lower level whose probability is `negligible` already."""
+    a lower level whose probability is `negligible` already; the inputs' own one where neither is reached and that is better."""
     density = Density(np.ones(1), np.zeros((1, dimensions)), WIDE**2 * np.eye(dimensions)[None])
     reached, last = -np.inf, False
     for _ in range(LEVELS):
@@ -160,7 +166,13 @@ def pilot(
         elite = known & (f >= level)
         weights = density.weights(u[elite])
         density = fitted(u[elite], weights)
-        if last or level <= reached or weights.sum() / known.sum() < negligible:
+        if last or weights.sum() / known.sum() < negligible:
+            break
+        if level <= reached:
+            if f[known].max() <= limit and weights.sum() < WORTH * (weights**2).sum():
+                return Density(
+                    np.ones(0), np.zeros((0, dimensions)), np.zeros((0, dimensions, dimensions))
+                )
             break
         reached, last = level, level >= limit  # once more at the limit
     return density
@@ -174,6 +186,8 @@ class Rare:
     ----------
     negligible : float
         A probability below which its upper limit is enough.
+    before : (int, int)
+        Failures of earlier plain draws, and their number; they count with plain ones.
     f, weights : array, shape (REPEATS, n)
         All draws of the repeats so far.
     """
@@ -181,6 +195,7 @@ class Rare:
     dimensions: int
     limit: float
     negligible: float = 0.0
+    before: tuple[int, int] = 0, 0
     density: Density | None = None
     f: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
     weights: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
@@ -222,7 +237,8 @@ class Rare:
     def begun_anew(self) -> bool:
         """Drop draws of which a few are worth nearly all, for a density that is fitted to them, too; whether that was done."""
         u, weights = (np.concatenate(part) for part in zip(*self._failing, strict=True))
-        if self._anew == ANEW or len(u) < self.dimensions or self.known:
+        assert self.density is not None  # after the pilot
+        if self._anew == ANEW or len(u) < self.dimensions or self.known or self.density.plain:
             return False
         self._anew += 1
         self.density = fitted(u, weights)
@@ -246,6 +262,13 @@ class Rare:
         self.factor = float(min(1.0 + bias / least, MOST)) if least > 0.0 else MOST
 
     @property
+    def draws(self) -> int:
+        """Draws behind the probability: of all repeats, and the earlier ones that count."""
+        if self.density is not None and self.density.plain:
+            return self.before[1] + int(np.isfinite(self.f).sum())
+        return self.f.size
+
+    @property
     def known(self) -> bool:
         """Whether those beyond the limit are worth enough draws."""
         return _worth(self.f, self.weights, self.limit) >= ENOUGH
@@ -253,7 +276,12 @@ class Rare:
     def interval(self, confidence: float) -> Limited:
         """The probability with confidence intervals, at a two-sided confidence."""
         one = weighted(self.f, self.weights, self.limit, confidence)
-        if self.known:
+        plain = self.density is not None and self.density.plain
+        if plain:
+            hits = self.before[0] + int((self.f > self.limit).sum())
+            ends = of_hits(hits, self.draws, confidence)
+            one = Limited(hits / self.draws, one.shifts, *ends)
+        if plain or self.known:
             upper = min(self.factor * one.upper, 1.0)
             return Limited(one.value, one.shifts, one.lower / self.factor, upper)
         known = np.sort(self.f[np.isfinite(self.f)])[::-1]
