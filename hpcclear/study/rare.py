@@ -17,6 +17,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
+from hpcclear.scene.stages import Verification
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, tolerance, verdicts
@@ -160,7 +161,7 @@ def _streams(run: StudyRun, purpose: str, round_: int) -> list[np.random.Generat
 
 def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
     settings = run.study.verification
-    if 2 * rate.f.size > max(settings.most_samples, LENGTH * REPEATS):
+    if rate.f.size >= most_draws(settings):
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
@@ -170,6 +171,13 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
         return True
     return goals.accurate(
         one.goal, _goal_value(rate.interval(settings.confidence)), run.study.wanted
+    )
+
+
+def most_draws(settings: Verification) -> int:
+    """Draws of all repeats of a design, at most."""
+    return (
+        LENGTH * REPEATS * 2 ** int(np.log2(max(settings.most_samples / (LENGTH * REPEATS), 1.0)))
     )
 
 
