@@ -67,6 +67,10 @@ CONTESTED = 1.5
 CLEAR = 3.5
 """Standard errors that a probability of failure at the edge is from the largest allowed one when it is decided."""
 
+CLEARLY, OPEN = 6.0, 0.4
+"""Failures that plain simulations of a design at the edge meet, from which on they decide those that are far from it as a rule;
+and the share of them that stays open then."""
+
 NEAR = 0.3
 """Of what a rare failure takes by more weighted simulations than the fewest: what a design takes on average, since most are far
 from the threshold."""
@@ -122,17 +126,13 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
         each = np.array([_of_case(run, case, lengths[0]) for case in study.cases])
     except InputError:
         return sum(samples.values()), seconds
-    settings = study.verification
-    usual, fewest = (
-        sum(cost(case, settings) for case in study.cases) // len(study.cases)
-        for cost in (verdicts.usual_in, verdicts.fewest_in)
-    )
     statistics = refinement.by_statistics(study, _r2(run))
-    designs = _verified(scene, statistics)
-    found = _searched(study, statistics)
-    at_edge = np.maximum([_at_edge(case, settings) for case in study.cases], each) - each
-    found["verification"] = designs * (each.mean() + fewest + NEAR * (usual - fewest))
-    found["verification"] += edge.designs(study) * at_edge.mean()
+    designs, found = _verified(scene, statistics), _searched(study, statistics)
+    at_edge = edge.designs(study) if study.verification.infill_rounds else 0
+    found["verification"] = 0.0
+    for case, its in zip(study.cases, each, strict=True):
+        near, far = (_verifying(case, study.verification, its, side) for side in (True, False))
+        found["verification"] += (at_edge * near + (designs - at_edge) * far) / len(study.cases)
     found["chaos"] = designs * 2 * chaos.PAIRS
     samples |= {name: int(extent.loads_of(scene) * count) for name, count in found.items()}
     return sum(samples.values()), here.seconds / here.count
@@ -219,20 +219,21 @@ def _of_case(run: StudyRun, case: Case, length: int) -> float:
     return float(each.mean())
 
 
-def _at_edge(case: Case, settings: Verification) -> float:
-    """Simulations of a design at the edge of probabilities of failure that are no rare ones, on average."""
-    most = np.array(
-        [
-            one.most
-            for one in case.kept
-            if one.statistic == "exceedance" and one.most > 0.0 and not verdicts.rare(one, settings)
-        ]
-    )
-    if not len(most) or settings.draws is not None:
-        return 0.0
+def _verifying(case: Case, settings: Verification, each: float, near: bool) -> float:
+    """Simulations of a verified design, near the edge of its constraints or far from it, from those for its accuracy."""
+    failures = [one for one in case.kept if one.statistic == "exceedance" and one.most > 0.0]
+    rare = [one for one in failures if verdicts.rare(one, settings)]
+    usual, fewest = (of(case, settings) for of in (verdicts.usual_in, verdicts.fewest_in))
+    weighted = fewest + NEAR * (usual - fewest)
+    if not near:
+        plain = all(each * one.most > CLEARLY for one in rare)
+        return each + (OPEN if plain else 1.0) * weighted
+    if len(rare) == len(failures) or settings.draws is not None:
+        return each + weighted
+    most = np.array([one.most for one in failures if one not in rare])
     aims = np.array([*edge.AIMS, edge.LAST[1]])[:, None]
-    needed = (CLEAR / (1.0 - aims)) ** 2 * (1.0 / (aims * most) - 1.0) * aims**2
-    return float(np.clip(needed.max(axis=1), 0.0, settings.most_samples).mean())
+    needed = ((CLEAR / (1.0 - aims)) ** 2 * aims * (1.0 / most - aims)).max(axis=1)
+    return float(np.clip(needed, each, settings.most_samples).mean()) + weighted
 
 
 def _errors(run: StudyRun, choice: Choice, values: Array) -> Array:
