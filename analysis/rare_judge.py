@@ -81,17 +81,8 @@ def main() -> None:
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
     if words.scene is None:
-        rows = {}
-        if RESULTS.exists():
-            with RESULTS.open(newline="") as file:
-                rows = {row["scene"]: row for row in csv.DictReader(file)}
         for name in words.only:
-            row = judged(own(name), words.out / name, words.simulations)
-            rows[name] = {"scene": name} | row
-            with RESULTS.open("w", newline="") as file:
-                table = csv.DictWriter(file, FIELDS)
-                table.writeheader()
-                table.writerows(rows[name] for name in OWN if name in rows)
+            write({"scene": name} | judged(own(name), words.out / name, words.simulations))
         return
     scene = load_scene(words.scene)
     (case,) = scene.required_study.cases
@@ -99,6 +90,19 @@ def main() -> None:
         row = case.kept[0].model_dump(exclude_none=True) | {"most": most}
         changed = scene.with_({f"study.cases.{case.name}.constraints": [row]})
         judged(changed, words.out / f"{Path(words.scene).stem}_{most:g}", words.simulations)
+
+
+def write(row: dict[str, Any]) -> None:
+    """Renew a row of the results; those of other scenes stay."""
+    rows = {}
+    if RESULTS.exists():
+        with RESULTS.open(newline="") as file:
+            rows = {one["scene"]: one for one in csv.DictReader(file)}
+    rows[row["scene"]] = row
+    with RESULTS.open("w", newline="") as file:
+        table = csv.DictWriter(file, FIELDS)
+        table.writeheader()
+        table.writerows(rows[name] for name in OWN if name in rows)
 
 
 def own(name: str) -> Scene:
@@ -123,33 +127,34 @@ def own(name: str) -> Scene:
 
 def judged(scene: Scene, place: Path, simulations: int) -> dict[str, Any]:
     """One study and its recommended design."""
-    begun = time.process_time()
+    kept, begun = place / f"row_{simulations}.json", time.process_time()
     place, count = regret.carried_out(scene, place)
+    if kept.exists():
+        row: dict[str, Any] = json.loads(kept.read_text())
+        return row
     seconds = time.process_time() - begun
     table = dataset.read(place / "verification.nc", "verification")
     best = table.sel(design=recommended(table))
     (case,) = scene.required_study.cases
     names = scene.required_study.design_variables(case.name)
     choice = Choice("", case.name, {name: float(best[name]) for name in names})
-    kept = place / f"judge_{simulations}.json"
-    if not kept.exists():
-        each = [
-            probability(scene, choice, simulations // REPEATS, np.random.default_rng([81, k]))
-            for k in range(REPEATS)
-        ]
-        kept.write_text(json.dumps(each))
-    each = np.array(json.loads(kept.read_text()))
+    each = np.array([
+        probability(scene, choice, simulations // REPEATS, np.random.default_rng([81, k]))
+        for k in range(REPEATS)
+    ])  # fmt: skip
     reach = student(0.95, REPEATS - 1) * each.std(ddof=1) / REPEATS**0.5
     print(f"allowed {case.kept[0].most:g}; study: {best['constraints'].item()}")
     first = float(best["first_true"])
     given = (first - best_allowed(scene, choice, float(each.mean()), simulations)) / abs(first)
     print(f"  judge {each.mean():.3g} ± {reach:.2g} (95 %); first objective {first:.4f}; {choice.design}")  # fmt: skip
     print(f"  given away {given:.2%}; {count} simulations, {seconds:.0f} s of one core", flush=True)
-    return {
+    row = {
         "f": scene.objective.name, "most": case.kept[0].most, "stated": best["constraints"].item(),
         "judge": f"{each.mean():.3g}", "error": f"{reach:.2g}", "objective": f"{first:.5g}",
         "given_away": f"{given:.4f}", "simulations": count, "seconds": round(seconds, 1),
     }  # fmt: skip
+    kept.write_text(json.dumps(row))
+    return row
 
 
 def best_allowed(scene: Scene, choice: Choice, share: float, simulations: int) -> float:

@@ -1,6 +1,5 @@
 """Rare failures: indices from few values, probabilities by importance sampling, and designs at the edge of what is allowed."""
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -127,21 +126,39 @@ def test_what_cannot_fail_has_an_upper_limit_all_the_same():
     assert soon.simulations < made.simulations
 
 
-@pytest.mark.parametrize(("limit", "before"), [(1.01, (0, 8192)), (1.01, (1, 8192))])
+def chaotic(u):
+    """Nothing that a density could follow, with the distribution of a normal number."""
+    return stats.norm.ppf(np.mod(1e5 * u.sum(axis=1), 1.0))
+
+
+@pytest.mark.parametrize(
+    ("limit", "before"), [(6.0, (0, 8192)), (6.0, (1, 8192)), (2.0, (150, 8192))]
+)
 def test_where_weights_are_worth_nothing_all_draws_are_plain_and_count(limit, before):
-    """f is bounded and rougher than any density can follow: weighted draws show nothing below 1e-2 here."""
-    made = Rare(3, limit, 1e-6, before)
-    rough = partial(answered, f=lambda u: np.sin(1e5 * u.sum(axis=1)))
-    rough(made.prepared(np.random.default_rng(1)))
-    rough(made.lengthened(128, [np.random.default_rng([2, k]) for k in range(REPEATS)]))
+    """Weighted draws would show no probability below 1e-2, and others no better than plain ones."""
+    made = Rare(3, limit, 1e-12, before)
+    answered(made.prepared(np.random.default_rng(1)), chaotic)
+    answered(made.lengthened(128, [np.random.default_rng([2, k]) for k in range(REPEATS)]), chaotic)
     assert not made.begun_anew()
+    assert made.plain
     assert (made.weights == 1.0).all()
     hits, draws = before[0] + int((made.f > limit).sum()), 8192 + 128 * REPEATS
-    assert (made.draws, made.interval(0.95).value) == (draws, hits / draws)
     found = made.interval(0.95)
+    assert (made.draws, found.value) == (draws, hits / draws)
     assert found.upper == pytest.approx(stats.beta.ppf(0.975, hits + 1, draws - hits))
     least = stats.beta.ppf(0.025, hits, draws - hits + 1) if hits else 0.0
     assert found.lower == pytest.approx(least)
+    for f, dimensions, _ in CASES.values():
+        assert not estimated(f, dimensions, 3.1, 1).plain
+
+
+def test_what_the_tolerance_takes_of_plain_draws_is_part_of_their_interval():
+    made, choice = Rare(3, 6.0, 1e-12, (5, 8192)), SimpleNamespace(case="made")
+    answered(made.prepared(np.random.default_rng(1)), chaotic)
+    one, wider = (
+        rare._interval(rare.Failing(choice, None, (), by), made, 0.95) for by in (0.0, 1e-4)
+    )
+    assert (wider.lower, wider.upper) == pytest.approx((one.lower - 1e-4, one.upper + 1e-4))
 
 
 def test_values_that_failed_are_left_out_and_weights_are_bounded():

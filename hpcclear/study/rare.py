@@ -7,6 +7,7 @@ that changes is part of the interval. Where plain and weighted samples contradic
 """
 
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,8 @@ class Failing(NamedTuple):
     goal: Constraint
     before: tuple[int, int] = 0, 0
     """Failures of plain draws, and their number."""
+    taken: float = 0.0
+    """What the tolerance takes of it, by pairs of these."""
 
 
 class Found(NamedTuple):
@@ -132,19 +135,25 @@ def probabilities(
     _pair(run, asked, rates)
     return [
         Found(
-            one.interval(run.study.verification.confidence),
-            one.interval(verdicts.level(run.study.verification, number, one.f.size)),
+            _interval(its, one, run.study.verification.confidence),
+            _interval(its, one, verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
             one.draws,
         )
-        for one, number in zip(rates, many, strict=True)
+        for its, one, number in zip(asked, rates, many, strict=True)
     ]
 
 
+def _interval(asked: Failing, rate: Rare, confidence: float) -> Limited:
+    """With what the tolerance takes, which that of weighted draws has in it."""
+    one, wider = rate.interval(confidence), asked.taken if rate.plain else 0.0
+    return replace(one, lower=max(one.lower - wider, 0.0), upper=min(one.upper + wider, 1.0))
+
+
 def _pair(run: StudyRun, asked: Sequence[Failing], rates: Sequence[Rare]) -> None:
-    """Take a few draws of each probability that is known again at a stricter tolerance."""
+    """Take a few draws of each probability that is known again at a stricter tolerance; of plain ones pairs are known."""
     scene, left = tolerance.stricter(run.scene)
-    tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known]
+    tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known and not one.plain]
     _together(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
     run.simulations.next = tight.simulations.next
 
@@ -165,12 +174,14 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
-        verdicts.of_interval(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
+        verdicts.of_interval(
+            one.goal, _goal_value(_interval(one, rate, sure)), rate.f.size, sure
+        ).standing
         is not Standing.UNDECIDED
     ):
         return True
     return goals.accurate(
-        one.goal, _goal_value(rate.interval(settings.confidence)), run.study.wanted
+        one.goal, _goal_value(_interval(one, rate, settings.confidence)), run.study.wanted
     )
 
 

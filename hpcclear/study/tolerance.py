@@ -214,6 +214,7 @@ def _widened(
             + true["goal"][k, :count].tolist()
         )
         wider = share * _scales(run, choice, values)
+        true["taken"][k, : count - first] = wider[3 + first :]
         for name, more in zip(("mean_reach", "deviation_reach"), wider[:2], strict=True):
             true[name][k] += more
         for lower, upper, value, more in (
