@@ -3,13 +3,15 @@
     python analysis/forecasts.py                # ten studies, a minute on one core; writes analysis/results/forecasts.csv
     python analysis/forecasts.py --first 500 --studies 20
 
-Kinds of f (closed_forms.py), objectives, constraints, accuracies, numbers of designs and of rounds are drawn. Printed is the
-forecast over what is simulated.
+Kinds of f (closed_forms.py, and so rough that statistics are searched in place of f), objectives, constraints, accuracies,
+numbers of designs and of rounds are drawn; a third of the studies asks for a search by statistics. Printed is the forecast
+over what is simulated.
 """
 
 import argparse
 import csv
 import tempfile
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +26,7 @@ from hpcclear.scene import Scene
 from hpcclear.study import forecast
 
 RESULTS = Path(__file__).parent / "results" / "forecasts.csv"
-FIELDS = "seed", "kind", "asked", "forecast", "simulations", "ratio"
+FIELDS = "seed", "kind", "search", "asked", "forecast", "simulations", "ratio"
 WITHIN = 1.5
 
 MASS = {"formula": "0 - m2 - m3"}
@@ -36,6 +38,9 @@ ASKED: dict[str, tuple[list[Any], float | None]] = {
     "deviation": (["deviation"], None),
 }
 """Objectives, and the probability of failure that is allowed."""
+
+KINDS, VERY = ("smooth", "rough", "two modes", "chaotic", "very rough"), (0.4, 0.8)
+"""Of f, and the amplitude of the short waves of the last: of a surrogate's R2 below 0.9."""
 
 
 def main() -> None:
@@ -51,7 +56,8 @@ def main() -> None:
         with dynamics(form), tempfile.TemporaryDirectory() as name:
             said, _ = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)
             _, count = carried_out(scene, Path(name) / "out")
-        values = seed, kind, asked, said, count, round(said / count, 3)
+        search = scene.required_study.surrogate.of or "by default"
+        values = seed, kind, search, asked, said, count, round(said / count, 3)
         rows.append(dict(zip(FIELDS, values, strict=True)))
         print(*values, flush=True)
         with words.out.open("w", newline="") as file:
@@ -65,8 +71,10 @@ def main() -> None:
 def study(seed: int) -> tuple[Scene, Form, str, str]:
     """A random study, its formula, the kind of this, and what is asked."""
     rng = np.random.default_rng([41, seed])
-    kind = str(rng.choice(["smooth", "rough", "two modes", "chaotic"]))
+    kind = str(rng.choice(KINDS))
     form, random, asked = form_of(rng, kind), random_inputs(rng), list(ASKED)[seed % len(ASKED)]
+    if kind == "very rough":
+        form = replace(form, rough=rng.uniform(*VERY))
     objectives, most = ASKED[asked]
     case: dict[str, Any] = {"objectives": objectives}
     if most is not None:
@@ -84,12 +92,10 @@ def study(seed: int) -> tuple[Scene, Form, str, str]:
         "mean": float(rng.uniform(0.001, 0.005)),
         "deviation": float(rng.uniform(0.005, 0.03)),
     }
-    return (
-        scene_of(seed, random, case, verification=verification, accuracy=accuracy),
-        form,
-        kind,
-        asked,
-    )
+    scene = scene_of(seed, random, case, verification=verification, accuracy=accuracy)
+    if rng.random() < 1.0 / 3.0:
+        scene = scene.with_({"study.surrogate.of": "statistics"})
+    return scene, form, kind, asked
 
 
 if __name__ == "__main__":

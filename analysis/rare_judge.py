@@ -3,11 +3,13 @@
     python analysis/rare_judge.py OUT scene.toml                      # carries the study out in OUT, then judges
     python analysis/rare_judge.py OUT scene.toml --most 1e-2 1e-3 1e-4 --simulations 100000
     python analysis/rare_judge.py OUT                                 # `OWN` scenes; writes analysis/results/rare_scenes.csv
+    python analysis/rare_judge.py OUT --only four_stroke press        # renews these rows of it
 
 For each allowed probability the study is carried out (or found in OUT), and its recommended design is judged on random inputs
 that the study never saw: `REPEATS` subset simulations, whose disagreement is the judge's error. Printed are the allowed
 probability, what the study states, what the judge finds, the first objective, and how much of it is given away: to the best
-design that is allowed, which is sought by a model of the reliability index over `WIDE` designs, and judged as well.
+design that is allowed, which is sought by a model of the reliability index over `WIDE` designs and then, by judging, between
+designs that are allowed and not.
 
 Source: S.-K. Au and J. L. Beck, "Estimation of small failure probabilities in high dimensions by subset simulation", Prob. Eng.
 Mech. 16 (2001), doi:10.1016/S0266-8920(01)00019-4; conditional steps I. Papaioannou, W. Betz, K. Zwirglmaier and D. Straub,
@@ -37,8 +39,12 @@ from hpcclear.study import edge, rare, truth
 from hpcclear.study.optimisation import Choice
 
 REPEATS, SHARE, CORRELATION, LEVELS = 8, 0.1, 0.8, 9
-WIDE, LENGTH, ROUNDS = 20, 64, 2
+WIDE, LENGTH, ROUNDS = 20, 64, 3
 """Designs of the judge's own search, points of each of their replicates, and designs that it then judges."""
+
+HALVINGS, CLOSE = 4, 5e-4
+"""Designs that are judged between one that is allowed and one that is not, at most, and the relative difference of their first
+objective that is small enough."""
 
 RESULTS = Path(__file__).parent / "results" / "rare_scenes.csv"
 FIELDS = "scene", "f", "most", "stated", "judge", "error", "objective", "given_away", "simulations", "seconds"  # fmt: skip
@@ -71,17 +77,12 @@ def main() -> None:
     parser.add_argument("scene", nargs="?")
     parser.add_argument("--most", type=float, nargs="*")
     parser.add_argument("--simulations", type=int, default=100_000)
+    parser.add_argument("--only", nargs="*", default=list(OWN), help="of the `OWN` scenes")
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
     if words.scene is None:
-        rows = []
-        for name in OWN:
-            row = judged(own(name), words.out / name, words.simulations)
-            rows.append({"scene": name} | row)
-            with RESULTS.open("w", newline="") as file:
-                table = csv.DictWriter(file, FIELDS)
-                table.writeheader()
-                table.writerows(rows)
+        for name in words.only:
+            write({"scene": name} | judged(own(name), words.out / name, words.simulations))
         return
     scene = load_scene(words.scene)
     (case,) = scene.required_study.cases
@@ -89,6 +90,19 @@ def main() -> None:
         row = case.kept[0].model_dump(exclude_none=True) | {"most": most}
         changed = scene.with_({f"study.cases.{case.name}.constraints": [row]})
         judged(changed, words.out / f"{Path(words.scene).stem}_{most:g}", words.simulations)
+
+
+def write(row: dict[str, Any]) -> None:
+    """Renew a row of the results; those of other scenes stay."""
+    rows = {}
+    if RESULTS.exists():
+        with RESULTS.open(newline="") as file:
+            rows = {one["scene"]: one for one in csv.DictReader(file)}
+    rows[row["scene"]] = row
+    with RESULTS.open("w", newline="") as file:
+        table = csv.DictWriter(file, FIELDS)
+        table.writeheader()
+        table.writerows(rows[name] for name in OWN if name in rows)
 
 
 def own(name: str) -> Scene:
@@ -113,71 +127,81 @@ def own(name: str) -> Scene:
 
 def judged(scene: Scene, place: Path, simulations: int) -> dict[str, Any]:
     """One study and its recommended design."""
-    begun = time.process_time()
+    kept, begun = place / f"row_{simulations}.json", time.process_time()
     place, count = regret.carried_out(scene, place)
+    if kept.exists():
+        row: dict[str, Any] = json.loads(kept.read_text())
+        return row
     seconds = time.process_time() - begun
     table = dataset.read(place / "verification.nc", "verification")
     best = table.sel(design=recommended(table))
     (case,) = scene.required_study.cases
     names = scene.required_study.design_variables(case.name)
     choice = Choice("", case.name, {name: float(best[name]) for name in names})
-    kept = place / f"judge_{simulations}.json"
-    if not kept.exists():
-        each = [
-            probability(scene, choice, simulations // REPEATS, np.random.default_rng([81, k]))
-            for k in range(REPEATS)
-        ]
-        kept.write_text(json.dumps(each))
-    each = np.array(json.loads(kept.read_text()))
+    each = np.array([
+        probability(scene, choice, simulations // REPEATS, np.random.default_rng([81, k]))
+        for k in range(REPEATS)
+    ])  # fmt: skip
     reach = student(0.95, REPEATS - 1) * each.std(ddof=1) / REPEATS**0.5
     print(f"allowed {case.kept[0].most:g}; study: {best['constraints'].item()}")
     first = float(best["first_true"])
     given = (first - best_allowed(scene, choice, float(each.mean()), simulations)) / abs(first)
     print(f"  judge {each.mean():.3g} ± {reach:.2g} (95 %); first objective {first:.4f}; {choice.design}")  # fmt: skip
     print(f"  given away {given:.2%}; {count} simulations, {seconds:.0f} s of one core", flush=True)
-    return {
+    row = {
         "f": scene.objective.name, "most": case.kept[0].most, "stated": best["constraints"].item(),
         "judge": f"{each.mean():.3g}", "error": f"{reach:.2g}", "objective": f"{first:.5g}",
         "given_away": f"{given:.4f}", "simulations": count, "seconds": round(seconds, 1),
     }  # fmt: skip
+    kept.write_text(json.dumps(row))
+    return row
 
 
 def best_allowed(scene: Scene, choice: Choice, share: float, simulations: int) -> float:
-    """The least first objective that a probability of failure allows, near which some designs were judged.
+    """The least first objective that a probability of failure allows, of designs that were judged.
 
     `edge` seeks it by the index that 1024 simulations of each design extrapolate, shifted by what that is wrong at the design
-    judged last. From there on the index is taken for linear.
+    judged last. Then designs are judged between the best one that is allowed and the best one that is not (halving), all
+    on the same random numbers.
     """
     run, case = run_of(scene), scene.required_study.cases[0]
     run.rng = lambda *words: np.random.default_rng(83)
     names, goal = list(choice.design), case.kept[0]
     region, rng = box(scene, names), np.random.default_rng(82)
     unit = unit_lhs(WIDE, len(names), rng)
-    where = [list(choice.design.values())]
-    where += (region.lower + unit * (region.upper - region.lower)).tolist()
-    choices = [Choice("", case.name, dict(zip(names, row, strict=True))) for row in where]
+    where = np.vstack([list(choice.design.values()), region.lower + unit * (region.upper - region.lower)])  # fmt: skip
+    choices = [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in where]
     found = truth.sequences(run, choices, "search", "search", LENGTH, LENGTH * REPLICATES)
     values = found["goal"][:, : len(case.goals)]
     bounds = edge._bounds(run, case)
-    model = edge._steering(np.array(where), found["excess"], bounds, rng)
-    objectives = edge._objectives(run, case, np.array(where), values, rng)
-    shares, least = [share], [float(objectives[0](np.array(where[:1]))[0])]
-    last = np.array(where[0])
-    for number in range(ROUNDS):
-        short = of_share(goal.most) - of_share(shares[-1]) - float(model(last[None])[0])
-        last = edge._best(edge._judge(run, case, model, objectives, short), bounds, np.array(where), rng)  # fmt: skip
-        trial = Choice("", case.name, dict(zip(names, last.tolist(), strict=True)))
-        shares.append(np.mean([
-            probability(scene, trial, simulations // REPEATS, np.random.default_rng([84, number, k]))
+    model = edge._steering(where, found["excess"], bounds, rng)
+    objectives = edge._objectives(run, case, where, values, rng)
+    met = {goal.most >= share: (float(objectives[0](where[:1])[0]), where[0])}
+
+    def judged(place: np.ndarray) -> float:
+        """The share of a design, which takes the place of a worse one that is allowed or not as it is."""
+        trial = Choice("", case.name, dict(zip(names, place.tolist(), strict=True)))
+        found = np.mean([
+            probability(scene, trial, simulations // REPEATS, np.random.default_rng([84, k]))
             for k in range(REPEATS // 2)
-        ]))  # fmt: skip
-        least.append(float(objectives[0](last[None])[0]))
-        print(f"  tried: {trial.design}: {shares[-1]:.3g}, objective {least[-1]:.4f}", flush=True)
-    index = [of_share(one) for one in (shares[0], shares[-1])]
-    if abs(index[1] - index[0]) < 1e-3:
-        return min(least[0], least[-1])
-    slope = (least[-1] - least[0]) / (index[1] - index[0])
-    return min(least[0], least[-1] + slope * (of_share(goal.most) - index[1]))
+        ])  # fmt: skip
+        least, kept = float(objectives[0](place[None])[0]), bool(found <= goal.most)
+        print(f"  tried: {trial.design}: {found:.3g}, objective {least:.5g}", flush=True)
+        if kept not in met or least < met[kept][0] or not kept:
+            met[kept] = least, place
+        return float(found)
+
+    last = where[0]
+    for _ in range(ROUNDS):
+        short = of_share(goal.most) - of_share(share) - float(model(last[None])[0])
+        last = edge._best(edge._judge(run, case, model, objectives, short), bounds, where, rng)
+        share = judged(last)
+    for _ in range(HALVINGS if len(met) == 2 else 0):
+        (kept, inside), (broken, outside) = met[True], met[False]
+        if kept - broken <= CLOSE * abs(kept):
+            break
+        judged((inside + outside) / 2.0)
+    return met[True][0] if True in met else np.nan
 
 
 def probability(scene: Scene, choice: Choice, simulations: int, rng: np.random.Generator) -> float:

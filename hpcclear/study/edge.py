@@ -25,6 +25,7 @@ from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import snapped
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
+from hpcclear.statistics.random import importance
 from hpcclear.statistics.random.indices import quadratic
 from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search.infill import TwoScales
@@ -32,7 +33,7 @@ from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.study import goals, nearby, rare, truth, verdicts
 from hpcclear.study.nearby import Nearby
-from hpcclear.study.optimisation import Choice
+from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
 
@@ -43,9 +44,12 @@ AIM, LESS = 0.8, 0.75
 """Probability that is sought, over the largest that is allowed: so much below it can be shown; and what is sought of that after
 a design that could not be decided."""
 
-AIMS = 0.88, 0.78, 0.65, 0.2
-"""The same of the designs that are verified where all constraints are probabilities of failure. The last can be shown with few
-simulations, and costs little where probabilities fall steeply."""
+AIMS, LAST = (0.88, 0.78, 0.65), (0.05, 0.4)
+"""The same of the designs that are verified where all constraints are probabilities of failure; and the range of one more: as
+much as the simulations of a design can show, and no more than what holds if the model of indices is somewhat wrong."""
+
+SURE = 2.0
+"""Times the standard error that is expected there: few of the draws that show it carry most of it."""
 
 TRIED, AGREE = 6, 0.3
 """There: designs that are looked at first, at most, and the error of the model of the search at one that is small enough."""
@@ -103,7 +107,7 @@ def simulations(study: Study) -> int:
 
 def designs(study: Study) -> int:
     """Designs at the edge of all cases that are verified, at most."""
-    return sum(len(AIMS) if of_failures(case) else ROUNDS for case in cases_of(study))
+    return sum(len(AIMS) + 1 if of_failures(case) else ROUNDS for case in cases_of(study))
 
 
 def approach(run: StudyRun, known: Mapping[str, tuple[Array, Array, Array]]) -> Result:
@@ -287,9 +291,19 @@ def _of_failures(
             step = max(step - 1, 0)
         elif not near.at_end(place):
             step = min(step + 1, last)
-    points = np.array([best(guess, near.region, place[None], aim) for aim in AIMS])
+    error = near.error(rare.most_draws(run.study.verification))
+    aims = *AIMS, shown(run.study, error)
+    points = np.array([best(guess, near.region, place[None], aim) for aim in aims])
     rows = to_physical(run.scene, names, points)
     return [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+
+
+def shown(study: Study, error: float) -> float:
+    """Probability over the largest that is allowed which is shown to keep it, by its relative standard error."""
+    settings = study.verification
+    many = sum(chosen_in_all(study)) // len(study.cases) + len(AIMS)
+    sure = verdicts.level(settings, many, settings.most_samples)
+    return float(np.clip(1.0 / importance.reach(SURE * error, sure), *LAST))
 
 
 def _looked_at(run: StudyRun, case: Case, place: Array) -> float:

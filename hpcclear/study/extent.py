@@ -29,9 +29,14 @@ def samples_of(scene: Scene) -> dict[str, int]:
 
 def _of_stages(scene: Scene) -> dict[str, int]:
     """The same of all stages but the effect screening, whose size goes by theirs."""
+    loads = loads_of(scene)
+    return {part: loads * count for stage in STAGES for part, count in stage.samples(scene).items()}
+
+
+def loads_of(scene: Scene) -> int:
+    """How many load cases each design is simulated at."""
     loads = scene.required_study.load_cases
-    cases = 1 if loads is None else len(loads.options or ())
-    return {part: cases * count for stage in STAGES for part, count in stage.samples(scene).items()}
+    return 1 if loads is None else len(loads.options or ())
 
 
 def responses_of(scene: Scene) -> int:

@@ -141,6 +141,18 @@ class Nearby:
         near = abs(place[:, None] - self.region) < 0.02 * np.diff(self.region, axis=1)
         return bool((near & (self.region != self._bounds)).any())
 
+    def error(self, draws: int) -> float:
+        """Relative standard error of a probability of failure in the last region by so many draws of its density, the largest
+        over the constraints."""
+        found = []
+        for goal, density in zip(self._goals, self._densities, strict=True):
+            _, u, failing = self._known(goal)
+            squares = (
+                len(u) * (failing * density.weights(u)).sum()
+            )  # of weights by that density, as failing weighs draws
+            found.append(squares / failing.sum() ** 2 - 1.0 if failing.any() else np.inf)
+        return float(np.sqrt(max(max(found), 0.0) / draws))
+
     def fixed(self) -> Predict:
         """`shortfall` as it is now, whatever is drawn later."""
         return copy.copy(self).shortfall

@@ -149,8 +149,9 @@ class Choice:
 
 
 def chosen_in_all(study: Study) -> tuple[int, int]:
-    """How many designs `extremes` chooses, and `spread` at most."""
-    return 2 * ends_in_all(study), study.verification.designs * len(study.cases)
+    """How many designs `extremes` chooses, and `spread` at most; the front of one objective is its end."""
+    fronts = sum(len(case.goals) > 1 for case in study.cases)
+    return 2 * ends_in_all(study), study.verification.designs * fronts
 
 
 def extremes(run: StudyRun, fronts: Result) -> list[Choice]:

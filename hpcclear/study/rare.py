@@ -7,6 +7,7 @@ that changes is part of the interval. Where plain and weighted samples contradic
 """
 
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
+from hpcclear.scene.stages import Verification
 from hpcclear.statistics.random.importance import REPEATS, Rare
 from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import goals, tolerance, verdicts
@@ -39,6 +41,10 @@ class Failing(NamedTuple):
 
     choice: Choice
     goal: Constraint
+    before: tuple[int, int] = 0, 0
+    """Failures of plain draws, and their number."""
+    taken: float = 0.0
+    """What the tolerance takes of it, by pairs of these."""
 
 
 class Found(NamedTuple):
@@ -47,8 +53,8 @@ class Found(NamedTuple):
     own: Limited
     sure: Limited
     simulations: int
-    length: int
-    """Draws of all repeats, without pilots."""
+    draws: int
+    """Draws behind the probability, without pilots."""
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
@@ -56,7 +62,11 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
     they can be; besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     where = [
-        (row, k, Failing(choice, goal))
+        (
+            row,
+            k,
+            Failing(choice, goal, _before(true, row, len(run.study.case(choice.case).goals) + k)),
+        )
         for row, choice in enumerate(choices)
         for k, goal in enumerate(run.study.case(choice.case).kept)
         if verdicts.rare(goal, run.study.verification)
@@ -73,9 +83,15 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
         true["goal"][row, column] = np.clip(
             its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
         )
-        true["counted"][row, k] = its.length
+        true["counted"][row, k] = its.draws
         true["rare_samples"][row] += its.simulations
     return verdicts.decided(run, choices, true)
+
+
+def _before(true: Result, row: int, column: int) -> tuple[int, int]:
+    """Failures of the plain draws of a design, and their number."""
+    draws, share = int(true["samples"][row] - true["failed"][row]), true["goal"][row, column]
+    return (round(float(share) * draws), draws) if np.isfinite(share) else (0, 0)
 
 
 def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], column: int) -> None:
@@ -91,7 +107,12 @@ def probabilities(
 ) -> list[Found]:
     """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long."""
     rates = [
-        Rare(len(run.study.case(one.choice.case).random), _limit(one), NEGLIGIBLE * one.goal.most)
+        Rare(
+            len(run.study.case(one.choice.case).random),
+            _limit(one),
+            NEGLIGIBLE * one.goal.most,
+            one.before,
+        )
         for one in asked
     ]
     begun = [
@@ -114,19 +135,25 @@ def probabilities(
     _pair(run, asked, rates)
     return [
         Found(
-            one.interval(run.study.verification.confidence),
-            one.interval(verdicts.level(run.study.verification, number, one.f.size)),
+            _interval(its, one, run.study.verification.confidence),
+            _interval(its, one, verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
-            one.f.size,
+            one.draws,
         )
-        for one, number in zip(rates, many, strict=True)
+        for its, one, number in zip(asked, rates, many, strict=True)
     ]
 
 
+def _interval(asked: Failing, rate: Rare, confidence: float) -> Limited:
+    """With what the tolerance takes, which that of weighted draws has in it."""
+    one, wider = rate.interval(confidence), asked.taken if rate.plain else 0.0
+    return replace(one, lower=max(one.lower - wider, 0.0), upper=min(one.upper + wider, 1.0))
+
+
 def _pair(run: StudyRun, asked: Sequence[Failing], rates: Sequence[Rare]) -> None:
-    """Take a few draws of each probability that is known again at a stricter tolerance."""
+    """Take a few draws of each probability that is known again at a stricter tolerance; of plain ones pairs are known."""
     scene, left = tolerance.stricter(run.scene)
-    tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known]
+    tight, rows = run.of(scene), [k for k, one in enumerate(rates) if one.known and not one.plain]
     _together(tight, [asked[k] for k in rows], [rates[k].paired(left) for k in rows], "pairs")
     run.simulations.next = tight.simulations.next
 
@@ -143,16 +170,25 @@ def _streams(run: StudyRun, purpose: str, round_: int) -> list[np.random.Generat
 
 def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
     settings = run.study.verification
-    if 2 * rate.f.size > max(settings.most_samples, LENGTH * REPEATS):
+    if rate.f.size >= most_draws(settings):
         return True
     sure = verdicts.level(settings, many, rate.f.size)
     if (
-        verdicts.of_interval(one.goal, _goal_value(rate.interval(sure)), rate.f.size, sure).standing
+        verdicts.of_interval(
+            one.goal, _goal_value(_interval(one, rate, sure)), rate.f.size, sure
+        ).standing
         is not Standing.UNDECIDED
     ):
         return True
     return goals.accurate(
-        one.goal, _goal_value(rate.interval(settings.confidence)), run.study.wanted
+        one.goal, _goal_value(_interval(one, rate, settings.confidence)), run.study.wanted
+    )
+
+
+def most_draws(settings: Verification) -> int:
+    """Draws of all repeats of a design, at most."""
+    return (
+        LENGTH * REPEATS * 2 ** int(np.log2(max(settings.most_samples / (LENGTH * REPEATS), 1.0)))
     )
 
 

@@ -89,6 +89,17 @@ def simulations(study: Study) -> tuple[int, int]:
     return (extremes + spread + rays) * each, rounds * len(study.cases) * each
 
 
+def first_designs(study: Study, statistics: bool) -> int:
+    """Designs that a search begins with, as a rule."""
+    extremes, between = chosen_in_all(study)
+    if study.swarm.runs == 1:  # averages over one run are its ends
+        extremes //= 2
+    sizes = [len(study.design_variables(case.name)) for case in study.cases]
+    if statistics:
+        return extremes + sum(map(_wide, sizes))
+    return extremes + between + RAYS * sum(sizes)
+
+
 def at_edges(study: Study) -> int:
     """Simulations of designs at the edge of constraints and next to it, at most."""
     if study.verification.infill_rounds == 0:
@@ -128,7 +139,7 @@ def search(
     begun = run.stage("check-0", _begin_wide if statistics else _begin, start)
     met = {case.name: [_tried(run, case.name, begun, None)] for case in run.study.cases}
     patience = PATIENCE * (PARTS if statistics else 1)
-    for round_, count in enumerate(_rounds(run, begun, statistics)):
+    for round_, count in enumerate(rounds(run.study, len(begun["case"]), statistics)):
         going = {
             name: its[-1] for name, its in met.items() if not _stands(run, name, its, patience)
         }
@@ -180,16 +191,14 @@ def _beside(run: StudyRun, tried: Mapping[str, Tried], stage: str, aside: float)
     return _simulated(run, chosen, stage)
 
 
-def _rounds(run: StudyRun, begun: Result, statistics: bool) -> list[int]:
-    """Designs of a case in each round. A search by statistics has fewer in all than the other one, first designs included:
-    those of the swarm between its ends are left out."""
-    settings = run.study.verification
+def rounds(study: Study, begun: int, statistics: bool) -> list[int]:
+    """Designs of a case in each round after so many first designs. A search by statistics has fewer in all than the other one,
+    first designs included: those of the swarm between its ends are left out."""
+    settings = study.verification
     if not statistics:
         return [settings.infill_designs] * settings.infill_rounds
-    each = truth.search_length(run.study) * REPLICATES
-    cases = len(run.study.cases)
-    most = sum(simulations(run.study)) // each - chosen_in_all(run.study)[1]
-    left = (most - len(begun["case"])) // cases
+    most = sum(simulations(study)) // (truth.search_length(study) * REPLICATES)
+    left = (most - chosen_in_all(study)[1] - begun) // len(study.cases)
     count = max(settings.infill_designs // PARTS, 1)
     return [count] * (left // count)
 
@@ -224,10 +233,15 @@ def _begin_wide(run: StudyRun, start: Sequence[Choice]) -> Result:
     for case in run.study.cases:
         names = run.study.design_variables(case.name)
         region, rng = box(run.scene, names), run.rng("search", case.name)
-        unit = unit_lhs(max(FIRST * len(names), len(names) + 4), len(names), rng)
+        unit = unit_lhs(_wide(len(names)), len(names), rng)
         chosen += _distinct([one for one in start if one.case == case.name and one.name])
         chosen += _choices(run, case.name, region.lower + unit * (region.upper - region.lower))
     return _simulated(run, chosen, "check-0")
+
+
+def _wide(variables: int) -> int:
+    """Designs all over the box that a search by statistics begins with."""
+    return max(FIRST * variables, variables + 4)
 
 
 def _distinct(choices: Sequence[Choice]) -> list[Choice]:

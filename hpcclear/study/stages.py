@@ -178,7 +178,7 @@ def _of_search(scene: Scene) -> dict[str, int]:
 
 
 def _designs(scene: Scene) -> int:
-    """How many are verified at most."""
+    """How many designs are verified at most."""
     study = scene.required_study
     found = sum(optimisation.chosen_in_all(study))
     if study.verification.infill_rounds:

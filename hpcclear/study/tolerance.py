@@ -288,6 +288,7 @@ def _widened(
         count, first = len(bias) - 3, len(run.study.case(choice.case).goals)
         sure = student(verdicts.level(settings, many[k], whole[0].size), taken.freedom)
         goals = true["goal"][k, :count]
+        true["taken"][k, : count - first] = (bias + sure * error)[3 + first :]
         for name, values, part, times in (
             ("percentile", true["percentile"][k : k + 1], slice(2, 3), far),
             ("goal", goals, slice(3, None), far),

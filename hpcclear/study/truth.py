@@ -316,7 +316,7 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
         ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
-        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``counted``, ``standing``
+        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``taken`` (by the tolerance), ``counted``, ``standing``
         and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
         `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
     """
@@ -349,6 +349,7 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         kept = run.study.case(choice.case).kept
         certain = [goals.goal_value(goal, whole, choice.design, sure) for goal in kept]
         missing = [np.nan] * (held - len(kept))
+        row["taken"] = [0.0] * len(certain) + missing
         row["counted"] = [float(values.size)] * len(certain) + missing
         row["excess"] = goals.steered(kept, whole, choice.design)
         row["sure_lower"] = [one.lower for one in certain] + missing

@@ -7,7 +7,8 @@ limit is the probability without bias, however rough f is. The share of the inpu
 regions that the pilot missed. What the repeats disagree by is the error.
 
 Where (nearly) no value lies beyond the limit, what is known of the largest lower level that enough values exceed is an upper
-limit for it.
+limit for it. Where f is so rough that the levels of a pilot rise no further and weighted draws are worth hardly more than
+plain ones, draws are plain, and are counted with all earlier ones of the design (Clopper and Pearson).
 
 Sources: R. Y. Rubinstein and D. P. Kroese, "The Cross-Entropy Method" (2004), doi:10.1007/978-1-4757-4321-0; of
 mixtures that bound weights T. Hesterberg, "Weighted average importance sampling and defensive mixture distributions",
@@ -22,7 +23,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.student import student
-from hpcclear.statistics.random.replicates import Limited, spread
+from hpcclear.statistics.random.replicates import Limited, of_hits, spread
 
 REPEATS = 16
 """Independent repeats, whose disagreement is the error."""
@@ -61,9 +62,14 @@ MOST = 100.0
 ENOUGH = 20.0
 """Equally weighted draws that those beyond a level are worth, at least, for an interval of its probability."""
 
+WORTH, FEW = (2.0, 6.0), 8
+"""Plain draws that a weighted one is worth, at least, or plain ones are drawn: by failures, and by the last level where a pilot
+meets none. By a lower level a bound of p takes `ENOUGH` draws of about p / 2; by plain draws without any failure 4 to 6 over p.
+`FEW` failures show it."""
+
 
 class Density:
-    """A mixture of the inputs' own density, a wide one and fitted ones.
+    """A mixture of the inputs' own density, a wide one and fitted ones; of their own one alone if none is fitted.
 
     Parameters
     ----------
@@ -74,11 +80,18 @@ class Density:
     """
 
     def __init__(self, shares: Array, centres: Array, covariances: Array) -> None:
-        size = centres.shape[1]
+        size, self.plain = centres.shape[1], not len(shares)
         own = np.zeros((2, size)), np.stack([np.eye(size), WIDE**2 * np.eye(size)])
-        self._shares = np.concatenate([[OWN, SPREAD], (1.0 - OWN - SPREAD) * shares])
+        first = [1.0, 0.0] if self.plain else [OWN, SPREAD]
+        self._shares = np.concatenate([first, (1.0 - sum(first)) * shares])
         self._centres = np.concatenate([own[0], centres])
         self._factors = np.linalg.cholesky(np.concatenate([own[1], covariances]))
+
+    @classmethod
+    def own(cls, dimensions: int) -> "Density":
+        """That of the inputs alone."""
+        none = [np.empty((0,) + (dimensions,) * k) for k in range(3)]
+        return cls(*none)
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
         """So many draws, (count, d)."""
@@ -147,7 +160,8 @@ def pilot(
     dimensions: int, limit: float, rng: np.random.Generator, negligible: float = 0.0
 ) -> Generator[Array, Array, Density]:
     """Yield draws u, (n, d), take f there, (n,), NaN where it failed, and return a density near where f exceeds the limit, or
-    a lower level whose probability is `negligible` already."""
+    a lower level whose probability is `negligible` already; the inputs' own one where neither is reached and that is about as
+    good."""
     density = Density(np.ones(1), np.zeros((1, dimensions)), WIDE**2 * np.eye(dimensions)[None])
     reached, last = -np.inf, False
     for _ in range(LEVELS):
@@ -160,10 +174,22 @@ def pilot(
         elite = known & (f >= level)
         weights = density.weights(u[elite])
         density = fitted(u[elite], weights)
-        if last or level <= reached or weights.sum() / known.sum() < negligible:
+        if last or weights.sum() / known.sum() < negligible:
             break
+        if level <= reached:
+            return (
+                Density.own(dimensions) if _little(weights, weights[f[elite] > limit]) else density
+            )
         reached, last = level, level >= limit  # once more at the limit
     return density
+
+
+def _little(weights: Array, failing: Array) -> bool:
+    """Whether weighted draws are worth hardly more than plain ones, by weights of those beyond a level and of failures."""
+    if 0 < len(failing) < FEW:
+        return False
+    least, weights = (WORTH[0], failing) if len(failing) else (WORTH[1], weights)
+    return bool(weights.sum() < least * (weights**2).sum())
 
 
 @dataclass
@@ -174,6 +200,8 @@ class Rare:
     ----------
     negligible : float
         A probability below which its upper limit is enough.
+    before : (int, int)
+        Failures of earlier plain draws, and their number; they count with plain ones.
     f, weights : array, shape (REPEATS, n)
         All draws of the repeats so far.
     """
@@ -181,6 +209,7 @@ class Rare:
     dimensions: int
     limit: float
     negligible: float = 0.0
+    before: tuple[int, int] = 0, 0
     density: Density | None = None
     f: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
     weights: Array = field(default_factory=lambda: np.empty((REPEATS, 0)))
@@ -222,7 +251,7 @@ class Rare:
     def begun_anew(self) -> bool:
         """Drop draws of which a few are worth nearly all, for a density that is fitted to them, too; whether that was done."""
         u, weights = (np.concatenate(part) for part in zip(*self._failing, strict=True))
-        if self._anew == ANEW or len(u) < self.dimensions or self.known:
+        if self._anew == ANEW or len(u) < self.dimensions or self.known or self.plain:
             return False
         self._anew += 1
         self.density = fitted(u, weights)
@@ -246,6 +275,18 @@ class Rare:
         self.factor = float(min(1.0 + bias / least, MOST)) if least > 0.0 else MOST
 
     @property
+    def plain(self) -> bool:
+        """Whether draws are those of the inputs' own density."""
+        return self.density is not None and self.density.plain
+
+    @property
+    def draws(self) -> int:
+        """Draws behind the probability: of all repeats, and the earlier ones that count."""
+        if self.plain:
+            return self.before[1] + int(np.isfinite(self.f).sum())
+        return self.f.size
+
+    @property
     def known(self) -> bool:
         """Whether those beyond the limit are worth enough draws."""
         return _worth(self.f, self.weights, self.limit) >= ENOUGH
@@ -253,7 +294,11 @@ class Rare:
     def interval(self, confidence: float) -> Limited:
         """The probability with confidence intervals, at a two-sided confidence."""
         one = weighted(self.f, self.weights, self.limit, confidence)
-        if self.known:
+        if self.plain:
+            hits = self.before[0] + int((self.f > self.limit).sum())
+            ends = of_hits(hits, self.draws, confidence)
+            one = Limited(hits / self.draws, one.shifts, *ends)
+        if self.plain or self.known:
             upper = min(self.factor * one.upper, 1.0)
             return Limited(one.value, one.shifts, one.lower / self.factor, upper)
         known = np.sort(self.f[np.isfinite(self.f)])[::-1]
@@ -285,6 +330,10 @@ def weighted(f: Array, weights: Array, level: float, confidence: float) -> Limit
     if value <= 0.0:
         return Limited(0.0, shifts, 0.0, 1.0)
     error = float(spread(shifts[None])[0])
-    width = WIDER * student(confidence, int((counts > 0).sum()) - 1)
-    factor = float(np.exp(min(error / value * width, 500.0)))
+    factor = reach(error / value, confidence, int((counts > 0).sum()))
     return Limited(value, shifts, value / factor, min(value * factor, 1.0))
+
+
+def reach(error: float, confidence: float, repeats: int = REPEATS) -> float:
+    """Upper end of the interval of a probability over it, from its relative standard error."""
+    return float(np.exp(min(error * WIDER * student(confidence, repeats - 1), 500.0)))

@@ -203,11 +203,16 @@ def _interval_of_share(
     # as many independent draws, fewer for an error of few degrees of freedom
     worth = (student(confidence, total - 1) / student(confidence, int((counts > 0).sum()) - 1)) ** 2
     draws = share * (1.0 - share) / error**2 * worth if 0.0 < share < 1.0 else float(total)
-    hits, tail = share * draws, (1.0 - confidence) / 2.0
-    lower = float(scipy.special.betaincinv(hits, draws - hits + 1.0, tail)) if share > 0.0 else 0.0
+    return of_hits(share * draws, draws, confidence)
+
+
+def of_hits(hits: float, draws: float, confidence: float) -> tuple[float, float]:
+    """Interval of a probability, at a two-sided confidence, from so many hits of independent draws (Clopper and Pearson)."""
+    tail = (1.0 - confidence) / 2.0
+    lower = float(scipy.special.betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
     upper = (
         float(scipy.special.betaincinv(hits + 1.0, draws - hits, 1.0 - tail))
-        if share < 1.0
+        if hits < draws
         else 1.0
     )
     return lower, upper
