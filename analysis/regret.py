@@ -357,7 +357,7 @@ def measured(
         )
         regret = (values[row] - values[least]) / abs(values[least])
         r2 = float(models.r2[-1])
-        told = (
+        cells = (
             label,
             of,
             int((of == "statistics") == (r2 < by_statistics.ROUGH)),
@@ -369,7 +369,7 @@ def measured(
             round(float(errors[row]), 6),
             int(broken[row]),
         )
-        told_of.append(dict(zip(FIELDS, told, strict=True)))
+        told_of.append(dict(zip(FIELDS, cells, strict=True)))
     return told_of
 
 
