@@ -1,6 +1,6 @@
 """Are total Sobol indices of inputs that do nothing 0 within their errors, however chaotic f is? Counted on formulas.
 
-    python analysis/noise_floor.py      # seconds on one core
+    python analysis/noise_floor.py      # half a minute on one core
 
 f is the first of three inputs and a part that each evaluation draws anew. Indices, the share of that part and their errors are
 those of a study; half-widths are those of 95 %.
@@ -12,7 +12,7 @@ import numpy as np
 
 from hpcclear.statistics.sensitivity import analyse_sobol, noise_share, sobol_design
 
-SHARES, ROWS, SEEDS = (0.05, 0.3, 0.6, 0.95), (64, 256, 1024), 25
+SHARES, ROWS, SEEDS = (0.05, 0.3, 0.6, 0.95), (64, 256, 1024), 100
 INPUTS = 3
 
 

@@ -17,6 +17,7 @@ from hpcclear.cli.plan import RESERVE, describe, preview, slurm
 from hpcclear.ensemble.samples import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.study import chaos, extent, tolerance
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -79,12 +80,13 @@ def test_simulations_of_a_study_are_counted():
 
     verified = load_scene(JOBS / "robust_slider_crank.toml").study.verification
     designs = 2 * (4 + verified.designs + 1) + 4  # printed in the paper's Table 4
-    pairs = 4 * (10_000 // tolerance.DRAWS - 10)  # of the ends of both cases
+    each = REPLICATES * tolerance.FEW
+    pairs = designs * (each - 10)
     assert counted(10_000, 0) - counted(10, 0) == designs * 9_990 + pairs
     rays, swarm = 2 * 6 * 4, 2 * (4 + verified.designs)
     search = rays + swarm + 2 * 3 * verified.infill_designs
     beside = (
-        2 * 2 * 2 * (10_000 + 2 * chaos.PAIRS)
+        2 * 2 * 2 * (10_000 + each + 2 * chaos.PAIRS)
     )  # runners-up, and what is believed to be the ends
     assert counted(10_000, 3) - counted(10_000, 0) == search * verified.infill_samples + beside
 

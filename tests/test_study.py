@@ -306,7 +306,7 @@ def test_a_study_simulates_what_it_says_beforehand(tmp_path, monkeypatch, overri
     monkeypatch.setattr(responses, "simulate", respond)
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     said = {stage: count for stage, count in extent.samples_of(scene).items() if count}
-    at_most = ("check", "infill", "verification", "chaos") if len(overrides) > 1 else ()
+    at_most = ("check", "infill", "verification", "pairs", "chaos") if len(overrides) > 1 else ()
     for stage in at_most:  # rounds may win nothing, fronts be short
         assert 0.5 * said[stage] < made[stage] <= said.pop(stage)
         del made[stage]

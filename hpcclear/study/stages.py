@@ -191,10 +191,11 @@ def _of_verification(scene: Scene) -> dict[str, int]:
     study = scene.required_study
     failing = sum(verdicts.usual_in(case, study.verification) for case in study.cases)
     each = truth.expected(study) + failing // len(study.cases)
-    return {
-        "verification": _designs(scene) * each,
-        "pairs": tolerance.simulations(study),
-    }
+    designs = _designs(scene)
+    before = (_of_wear, _of_sensitivity, _of_surrogates, _of_search)
+    others = designs * each + sum(sum(stage(scene).values()) for stage in before)
+    pairs = tolerance.simulations(study, designs, others)
+    return {"verification": designs * each, "pairs": pairs}
 
 
 def _of_lives(scene: Scene) -> dict[str, int]:

@@ -74,7 +74,7 @@ def made(
     run: StudyRun,
     choices: Sequence[Choice],
     before: Sequence[Array] = (),
-    wanted: MomentAccuracy | None = None,
+    wanted: Sequence[MomentAccuracy] = (),
 ) -> list[Array]:
     """f of designs, by as many simulations as the study requires, (2, replicates, values) each as `doubled` returns them.
 
@@ -155,17 +155,17 @@ def doubled(
     length: int,
     most: int,
     before: Sequence[Array] = (),
-    wanted: MomentAccuracy | None = None,
+    wanted: Sequence[MomentAccuracy] = (),
 ) -> list[Array]:
     """Objectives and whether beyond Hertz's range, (k, replicates, values) of each design: `length` points of each replicate,
-    doubled until accurate (as the study requires, or as `wanted`) or beyond `most` simulations; `before` is continued."""
-    wanted = wanted or run.study.wanted
+    doubled until accurate (as the study or `wanted` of each requires) or beyond `most` simulations; `before` is continued."""
+    wanted = wanted or [run.study.wanted] * len(choices)
     made = list(before) or [nothing(run)] * len(choices)
     many = verdicts.rivals(choices)
     while True:
         rows = [
             k for k, one in enumerate(made)
-            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one, wanted, many[k]))
+            if one.size == 0 or (2 * one[0].size <= most and not _accurate(run, choices[k], one, wanted[k], many[k]))
         ]  # fmt: skip
         if not rows:
             return made

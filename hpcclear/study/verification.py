@@ -246,6 +246,7 @@ def write(
         if study.paired:
             data[f"{name}_within"] = true[f"{name}_reach"] / abs(true[name])
         data[f"{name}_tolerance"] = true["tolerance"][:, column]
+        data[f"{name}_tolerance_error"] = true["tolerance_error"][:, column]
         if name in printed:
             data[f"{name}_paper"] = printed[name]
     for name in ("percentile", "percentile_lower", "percentile_upper"):

@@ -1,12 +1,12 @@
 """Whether stated intervals hold the truth at any tolerance: verified designs at loose tolerances against a strict one.
 
-    python analysis/coverage.py                  # ten studies, an hour on one core; writes analysis/results/coverage.csv
-    python analysis/coverage.py press my.toml    # some of them, or a scene with one case of one's own
+    python analysis/intervals.py                  # ten studies, a quarter of an hour; writes analysis/results/intervals.csv
+    python analysis/intervals.py press my.toml    # some of them, or a scene with one case of one's own
 
 Studies are those of analysis/regret.py. Designs spread over the box are verified as a study does, at relative tolerances of
 1e-4, 1e-5 and 1e-6. The truth of a design is `TRUTH` simulations at 1e-9, on scatter of their own. It has an error too, which
 is independent of that of the intervals: their reaches, and that of the truth, add up as the root of their squares.
-`by_samples_alone` counts the intervals of mean and standard deviation without the share of the tolerance.
+`by_samples_alone` counts the intervals without the share of the tolerance, `wider` is the median ratio of widths.
 """
 
 import argparse
@@ -15,23 +15,27 @@ import itertools
 from pathlib import Path
 
 import numpy as np
-from directly import run_of
+from directly import Here, run_of
 from regret import STUDIES, scene_of
 
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.study import tolerance, truth
 from hpcclear.study.optimisation import Choice
 
-RESULTS = Path(__file__).parent / "results" / "coverage.csv"
-FIELDS = "study", "seed", "rtol", "hold", "by_samples_alone", "intervals"
+RESULTS = Path(__file__).parent / "results" / "intervals.csv"
+FIELDS = "study", "seed", "rtol", "hold", "by_samples_alone", "intervals", "wider"
 TRUTH, STRICT = 2048, 1e-9
+FIRST = 2
+"""Seed: 0 and 1 served to develop the intervals."""
+
 TOLERANCES = 1e-4, 1e-5, 1e-6
-DESIGNS = 3
-"""Verified at each tolerance, the ends of their case among them."""
+DESIGNS = 6
+"""Verified at each tolerance, the two ends of their case among them: fewer than in a study, which know more of each other."""
 
 
 def main() -> None:
@@ -41,8 +45,11 @@ def main() -> None:
     parser.add_argument("--truth", type=int, default=TRUTH)
     parser.add_argument("--samples", type=int, default=1024)
     parser.add_argument("--seeds", type=int, default=1, help="designs and scatter of so many kinds")
-    parser.add_argument("--first", type=int, default=0, help="seed")
+    parser.add_argument("--first", type=int, default=FIRST, help="seed")
     parser.add_argument("--csv", type=Path, default=RESULTS)
+    parser.add_argument(
+        "--truths", type=Path, help="directory that keeps the truths, to go on or to judge anew"
+    )
     words = parser.parse_args()
     rows = []
     print(*FIELDS)
@@ -52,14 +59,21 @@ def main() -> None:
         changes = {"study.verification.most_samples": words.samples, "study.accuracy": None}
         scene = scene_of(name).with_(changes | {"study.seed": 31 + seed})
         designs = spread_out(scene, seed)
-        exact = truths(scene, designs, words.truth)
+        kept = words.truths and words.truths / f"{Path(name).stem}_{seed}_{words.truth}.npy"
+        if kept and kept.exists():
+            exact = np.load(kept)
+        else:
+            exact = truths(scene, designs, words.truth)
+        if kept:
+            words.truths.mkdir(parents=True, exist_ok=True)
+            np.save(kept, exact)
         for rtol in TOLERANCES:
             found = checked(scene.with_({"numerics.rtol": rtol}), designs, exact)
             rows.append((Path(name).stem, seed, rtol, *found))
             print(*rows[-1], flush=True)
         with words.csv.open("w", newline="") as file:
             csv.writer(file).writerows([FIELDS, *rows])
-    hold, plain, count = np.array([row[3:] for row in rows]).sum(axis=0)
+    hold, plain, count = np.array([row[3:6] for row in rows]).sum(axis=0)
     print(
         f"{hold} of {count} hold ({hold / count:.1%}), by samples alone {plain} ({plain / count:.1%})"
     )
@@ -90,36 +104,53 @@ def truths(scene: Scene, designs: list[Choice], count: int) -> np.ndarray:
     )
 
 
-def checked(scene: Scene, designs: list[Choice], exact: np.ndarray) -> tuple[int, int, int]:
-    """How many intervals hold, how many would without the share of the tolerance, of how many."""
+def checked(scene: Scene, designs: list[Choice], exact: np.ndarray) -> tuple[int, int, int, float]:
+    """How many intervals hold, how many would without the share of the tolerance, of how many; and how much wider they are."""
     run = run_of(scene)
+    run.simulations = Once(scene)
+    plain = limits(truth.results_of(run, designs, truth.made(run, designs)))
     run.of = lambda other: run_of(other)
     run.simulations.next = 40_000  # as large a study as usual, of which pairs take a share
-    true = tolerance.verified(run, designs)
+    whole = limits(tolerance.verified(run, designs))
     far = student(scene.required_study.verification.confidence, REPLICATES - 1)
-    hold = plain = count = 0
-    for k in range(len(designs)):
-        for column, name in enumerate(("mean", "deviation", "percentile")):
-            if column < 2:
-                reaches = np.array([true[f"{name}_reach"][k]] * 2)
-                more = true["tolerance"][k, column] * abs(true[name][k])
-            else:
-                reaches = np.array(
-                    [
-                        true[name][k] - true["percentile_lower"][k],
-                        true["percentile_upper"][k] - true[name][k],
-                    ]
-                )
-                more = 0.0
-            value, error = exact[k, column]
-            off = value - true[name][k]
-            if not np.isfinite([*reaches, off, error]).all():
-                continue
-            reach = reaches[int(off > 0.0)]
-            hold += abs(off) <= np.hypot(reach, far * error)
-            plain += abs(off) <= np.hypot(max(reach - more, 0.0), far * error)
-            count += 1
-    return int(hold), int(plain), count
+    known = np.isfinite(exact).all(axis=2) & np.isfinite([*plain, *whole]).all(axis=0)
+    hold = [
+        abs(exact[..., 0] - value)
+        <= np.hypot(
+            np.where(exact[..., 0] < value, value - lower, upper - value), far * exact[..., 1]
+        )
+        for value, lower, upper in (whole, plain)
+    ]
+    wider = (whole[2] - whole[1]) / (plain[2] - plain[1])
+    return (
+        *(int(one[known].sum()) for one in hold),
+        int(known.sum()),
+        round(float(np.median(wider[known])), 2),
+    )
+
+
+class Once(Here):
+    """Simulates nothing twice."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self._kept: dict[bytes, np.ndarray] = {}
+
+    def _records(self, points: Points, stage: str) -> np.ndarray:
+        key = points.values.tobytes()
+        if key not in self._kept:
+            self._kept[key] = super()._records(points, stage)
+        return self._kept[key]
+
+
+def limits(true: dict[str, np.ndarray]) -> np.ndarray:
+    """Mean, deviation and percentile of designs with their confidence limits, (3, n, 3): value, lower, upper."""
+    rows = [
+        [true[name] + sign * true[f"{name}_reach"] for sign in (0.0, -1.0, 1.0)]
+        for name in ("mean", "deviation")
+    ]
+    rows.append([true[name] for name in ("percentile", "percentile_lower", "percentile_upper")])
+    return np.moveaxis(np.array(rows), 0, 2)
 
 
 if __name__ == "__main__":
