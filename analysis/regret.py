@@ -10,7 +10,8 @@ goes on from both: a search by expected improvement with `WIDE` more designs and
 What counts is what a study recommends by: the first objective, or mean + 2 standard deviations where both are minimised.
 
 The best designs of the reference are compared by `CHOSEN` simulations each. The best of them and the recommended ones
-are then judged by `JUDGED` simulations of another scatter, which no search and no choice has seen.
+are then judged by `JUDGED` simulations of another scatter, which no search and no choice has seen, or by up to `MOST` until the
+standard errors of the differences are below `SURE`.
 Regret is how far a recommended design is above the least of these three, with the standard error of that difference. It
 is never negative, so the least of three has some luck: a regret within its error is none.
 Results are kept in OUT, so that the command goes on where it was stopped.
@@ -40,17 +41,19 @@ from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known
-from hpcclear.study import forecast, refinement, run_study, simulations, truth
+from hpcclear.study import by_statistics, forecast, run_study, simulations, tried, truth
 from hpcclear.study.optimisation import Choice
 
 HERE = Path(__file__).parent
 JOBS = HERE.parent / "jobs"
 WIDE, ROUNDS, BATCH, POINTS = 24, 6, 8, 256
-CHOSEN, JUDGED, BEST = 512, 4096, 6
+CHOSEN, JUDGED, MOST, BEST = 512, 4096, 16384, 6
+SURE = 0.0025
 RESULTS = HERE / "results" / "regret.csv"
 FIELDS = (
     "study",
     "searched_by",
+    "by_default",
     "r2_of_f",
     "simulations",
     "forecast",
@@ -295,7 +298,9 @@ def main() -> None:
     parser.add_argument("studies", nargs="*", default=list(STUDIES))
     parser.add_argument("--seed", type=int, help="another seed than the study's")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="of the reference")
-    parser.add_argument("--judged", type=int, default=JUDGED, help="simulations of each design")
+    parser.add_argument(
+        "--of", nargs="*", default=["f", "statistics"], help="what is searched: f, statistics"
+    )
     parser.add_argument("--csv", type=Path, default=RESULTS)
     words = parser.parse_args()
     words.out.mkdir(exist_ok=True)
@@ -306,14 +311,14 @@ def main() -> None:
         if words.seed is not None:
             scene = scene.with_({"study.seed": words.seed})
         label = Path(name).stem + ("" if words.seed is None else f"_{words.seed}")
-        for row in measured(words.out / label, label, scene, words.rounds, words.judged):
+        for row in measured(words.out / label, label, scene, words.rounds, words.of):
             rows.append(row)
             print(*row.values(), flush=True)
         with words.csv.open("w", newline="") as file:
             table = csv.DictWriter(file, FIELDS)
             table.writeheader()
             table.writerows(rows)
-    for of in ("f", "statistics", "default"):
+    for of in (*words.of, "default"):
         some = [
             row["regret"]
             for row in rows
@@ -323,12 +328,12 @@ def main() -> None:
 
 
 def measured(
-    place: Path, label: str, scene: Scene, rounds: int, judged: int
+    place: Path, label: str, scene: Scene, rounds: int, ways: list[str]
 ) -> list[dict[str, Any]]:
-    """Carry out a study both ways; the regret of each, relative to the least, in rows of the table."""
+    """Carry out a study in some ways; the regret of each, relative to the least, in rows of the table."""
     place.mkdir(exist_ok=True)
     runs = {}
-    for of in ("f", "statistics"):
+    for of in ways:
         changed = scene.with_({"study.surrogate.of": of})
         runs[of] = carried_out(changed, place / of)
     case = scene.required_study.cases[0].name
@@ -341,35 +346,30 @@ def measured(
     kept = place / "reference.npy"
     if not kept.exists():
         found = choices_of(scene, case, reference(scene, case, rounds, np.array(taken)))
-        values, _, broken = merits(scene, found, CHOSEN, "chosen")
+        values, _, broken = merits(scene, found, told(scene, found, CHOSEN // REPLICATES, "chosen"))
         np.save(kept, list(found[int(np.where(broken, np.inf, values).argmin())].design.values()))
-    values, shifts, broken = merits(
-        scene, choices_of(scene, case, [*taken, np.load(kept)]), judged, "judge"
-    )
-    least = int(np.where(broken, np.inf, values).argmin())
+    values, errors, broken, least = judged(scene, choices_of(scene, case, [*taken, np.load(kept)]))
     told_of = []
-    for row, (of, (directory, count)) in enumerate(runs.items()):
+    for row, (of, (directory, spent)) in enumerate(runs.items()):
         models = dataset.read(directory / "kriging.nc", "kriging")
         said, _ = forecast.expected(
             scene.with_({"study.surrogate.of": of}), partial(evaluated, scene), 1e-3
         )
-        scale = abs(values[least])
-        regret = (values[row] - values[least]) / scale
-        error = float(spread((shifts[row] - shifts[least])[None])[0]) / scale
+        regret = (values[row] - values[least]) / abs(values[least])
         r2 = float(models.r2[-1])
-        told = (
+        cells = (
             label,
             of,
-            int((of == "statistics") == (r2 < refinement.ROUGH)),
+            int((of == "statistics") == (r2 < by_statistics.ROUGH)),
             round(r2, 3),
-            count,
+            spent,
             said,
             f"{values[least]:.6g}",
             round(regret, 6),
-            round(error, 6),
+            round(float(errors[row]), 6),
             int(broken[row]),
         )
-        told_of.append(dict(zip(FIELDS, told, strict=True)))
+        told_of.append(dict(zip(FIELDS, cells, strict=True)))
     return told_of
 
 
@@ -379,11 +379,25 @@ def choices_of(scene: Scene, case: str, rows: Any) -> list[Choice]:
     return [Choice("", case, dict(zip(names, map(float, row), strict=True))) for row in rows]
 
 
+def judged(scene: Scene, choices: list[Choice]) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """What a study recommends designs by, relative standard errors of the differences from the least, whether designs break a
+    constraint, and which is the least: by more and more simulations until that is known well enough."""
+    run, length = run_of(scene), JUDGED // REPLICATES
+    made = [truth.nothing(run)] * len(choices)
+    while True:
+        truth.lengthen(run, choices, made, range(len(made)), "judge", "judge", length)
+        values, shifts, broken = merits(scene, choices, truth.results_of(run, choices, made))
+        least = int(np.where(broken, np.inf, values).argmin())
+        errors = spread(shifts - shifts[least]) / abs(values[least])
+        length = made[0].shape[2]
+        if errors.max() < SURE or 2 * length * REPLICATES > MOST:
+            return values, errors, broken, least
+
+
 def merits(
-    scene: Scene, choices: list[Choice], count: int, purpose: str
+    scene: Scene, choices: list[Choice], found: dict[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a study recommends designs by, its values in the replicates, and whether designs break a constraint."""
-    found = told(scene, choices, count // REPLICATES, purpose)
+    """What a study recommends designs by, what replicates shift it, and whether designs break a constraint."""
     weights = np.array([1.0, SPAN] if scene.required_study.case(choices[0].case).plain else [1.0])
     values, shifts = (found[part][:, : len(weights)] for part in ("goal", "goal_shifts"))
     return values @ weights, np.einsum("nkr,k->nr", shifts, weights), found["excess"] > 0.0
@@ -423,13 +437,13 @@ def reference(scene: Scene, case: str, rounds: int, start: np.ndarray) -> np.nda
     run = run_of(scene)
     names = scene.required_study.design_variables(case)
     rng = np.random.default_rng(77)
-    bounds = refinement._bounds(run, names)
-    tried = None
+    bounds = tried.bounds(run, names)
+    known_so_far = None
     unit = unit_lhs(WIDE, len(names), rng)
     where = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])
     where = np.vstack([to_coordinates(scene, names, start), where])
     for _ in range(rounds + 1):
-        choices = refinement._choices(run, case, where)
+        choices = tried.choices(run, case, where)
         found = told(scene, choices, POINTS // REPLICATES, "reference")
         count = len(scene.required_study.case(case).goals)
         made = {
@@ -439,8 +453,8 @@ def reference(scene: Scene, case: str, rounds: int, start: np.ndarray) -> np.nda
             "errors": np.array([spread(one) for one in found["goal_shifts"][:, :count]]),
             "excess": found["excess"],
         }  # fmt: skip
-        tried = refinement._tried(run, case, made, tried)
-        known, space = refinement._problem(run, case, tried)
+        known_so_far = tried.added(run, case, made, known_so_far)
+        known, space = by_statistics._problem(run, case, known_so_far)
         where = improvement.proposals(known, space, BATCH, rng)
         if not len(where):
             break
@@ -455,7 +469,7 @@ def _ended(run: Any, case: str, known: Known, space: improvement.Space, rng: np.
     lucky = np.argsort(known.values[beliefs.allowed] @ goal, kind="stable")[: BEST // 2]
     rows = known.designs[beliefs.allowed][np.union1d(order, lucky)]
     ends = improvement.finalists(known, space, 2, rng)
-    return refinement._choices(run, case, np.unique(np.vstack([rows, ends]), axis=0))
+    return tried.choices(run, case, np.unique(np.vstack([rows, ends]), axis=0))
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.study import refinement, run_study
+from hpcclear.study import run_study, tried
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.surrogates import domain
 
@@ -190,7 +190,7 @@ def test_of_equal_designs_of_a_case_the_first_is_kept():
         Choice(name, case, {"fit": 1.0})
         for name, case in (("end", "one"), ("", "one"), ("", "another"))
     )
-    assert refinement._distinct([first, twin, other]) == [first, other]
+    assert tried.distinct([first, twin, other]) == [first, other]
 
 
 def test_the_cheapest_design_is_that_of_enumeration(results):

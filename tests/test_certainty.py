@@ -15,7 +15,7 @@ from hpcclear.statistics.random.replicates import limits, moments, quantile, sur
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.search.infill import NEAR, TwoScales, believed_ends, proposals
-from hpcclear.study import refinement, truth
+from hpcclear.study import by_f, tried, truth
 from hpcclear.study.optimisation import Choice
 
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
@@ -344,16 +344,15 @@ def test_small_steps_that_a_search_wins_count_together():
         tables = [np.array([[1.0, (1.0 - step * share)]]) for step in steps]
         nothing = np.zeros((1, len(names)))
         return [
-            refinement.Tried(names, nothing, table, np.full(1, -1.0), 0.0 * table)
-            for table in tables
+            tried.Tried(names, nothing, table, np.full(1, -1.0), 0.0 * table) for table in tables
         ]
 
-    assert not refinement._stands(run, case, met([0.0, 0.0, 0.0]))  # too few rounds
-    assert refinement._stands(run, case, met([0.0, 0.3, 0.6, 0.9]))
+    assert not by_f.stands(run, case, met([0.0, 0.0, 0.0]))  # too few rounds
+    assert by_f.stands(run, case, met([0.0, 0.3, 0.6, 0.9]))
     small = met([0.0, 0.4, 0.8, 1.2])
-    assert not refinement._stands(run, case, small)
-    assert refinement._won(run, case, small) == "still lowered the least deviation by 0.6%"
-    assert refinement._stands(run, case, met([0.0, 2.0, 2.0, 2.0, 2.0]))
+    assert not by_f.stands(run, case, small)
+    assert by_f.won(run, case, small) == "the last one still lowered the least deviation by 0.6%"
+    assert by_f.stands(run, case, met([0.0, 2.0, 2.0, 2.0, 2.0]))
 
 
 def test_too_few_designs_for_a_model_are_refused():
@@ -368,8 +367,8 @@ def test_a_round_that_proposes_nothing_ends_the_search():
     (case, *_) = (one.name for one in scene.required_study.cases)
     names = scene.required_study.design_variables(case)
     assert len(names) > 1
-    nothing = refinement._simulated(run, [], "check-1")
-    before = refinement._tried(run, case, nothing, None)
+    nothing = tried.simulated(run, [], "check-1")
+    before = tried.added(run, case, nothing, None)
     assert before.coordinates.shape == (0, len(names))
-    after = refinement._tried(run, case, nothing, before)
+    after = tried.added(run, case, nothing, before)
     assert after.values.shape == (0, 2)

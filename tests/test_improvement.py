@@ -8,9 +8,10 @@ from formula_study import contents, formula, on_two_ranks, scene_of
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
+from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known, Space
-from hpcclear.study import extent, refinement
+from hpcclear.study import by_statistics, extent
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -72,6 +73,38 @@ def test_the_least_of_a_noisy_function_is_found_below_its_noise(seed):
     assert len(ends) <= 8
     assert bowl(ends).min() < 0.004
     assert ends[:, 0].min() < 1e-3
+
+
+def steps(x):
+    """Flat, but for a slope to the left and a narrow valley far from it."""
+    far = (x[:, 0] - 0.8) ** 2 + (x[:, 1] / 4.0 - 0.2) ** 2
+    return 0.1 * x[:, 0] - 0.5 * np.exp(-far / 0.02)
+
+
+def test_what_the_first_designs_missed_is_found():
+    """Twelve designs show a slope. Where it is lowest a model that is sure of it would place all others."""
+    missed, space = 0, Space(BOUNDS, np.eye(1), (None,))
+    for seed in range(6):
+        rng = np.random.default_rng([9, seed])
+        designs = BOUNDS[:, 0] + rng.random((12, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+        designs = designs[steps(designs) > 0.0]
+        noise = 0.01 * rng.standard_normal((60, 1))
+        for _ in range(14):
+            values = steps(designs)[:, None] + noise[: len(designs)]
+            known = Known(designs, values, np.full(values.shape, 0.01))
+            designs = np.vstack([designs, improvement.proposals(known, space, 3, rng)])
+        missed += bool(steps(designs).min() > -0.3)
+    assert missed == 0
+
+
+def test_what_may_be_won_shrinks_with_what_is_known():
+    rng = np.random.default_rng(10)
+    few, many = (searched(space_of(), rounds, rng) for rounds in (0, 8))
+    (first, _), (last, least) = (improvement.hopes(one, space_of(), rng) for one in (few, many))
+    assert first.shape == (2,)
+    assert last[1] <= 1e-9  # its least is known and taken
+    assert 0.0 <= last[0] < 0.5 * first[0]
+    assert abs(least[0]) < 0.01
 
 
 def test_constraints_are_kept():
@@ -137,17 +170,17 @@ def done(carried_out):
 
 def test_statistics_are_searched_by_name_or_where_f_is_rough():
     asked = study().required_study
-    assert refinement.by_statistics(asked, 1.0)
+    assert by_statistics.applies(asked, 1.0)
     for of, r2, expected in (("f", 0.1, False), (None, 0.5, True), (None, 0.95, False), (None, np.nan, True)):  # fmt: skip
         scene = study().with_({"study.surrogate.of": of})
-        assert refinement.by_statistics(scene.required_study, r2) is expected
+        assert by_statistics.applies(scene.required_study, r2) is expected
 
 
 def test_a_search_by_statistics_ends_at_the_front(done):
     """f rises with both masses: the front ends at their bounds; the swarm's own designs are not verified."""
     found = dataset.read(done / "verification.nc", "verification")
     alpha, beta = (found.sel(design=f"robust {end}") for end in ("alpha", "beta"))
-    region = refinement.box(study(), ("m2", "m3"))
+    region = box(study(), ("m2", "m3"))
     np.testing.assert_allclose([float(beta[n]) for n in ("m2", "m3")], region.upper, rtol=1e-3)
     assert float(alpha["first_true"]) == float(found["first_true"].min())
     assert not any("averaged" in name for name in found["design"].to_numpy())

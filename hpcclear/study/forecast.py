@@ -28,6 +28,8 @@ from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.study import (
+    by_f,
+    by_statistics,
     chaos,
     edge,
     extent,
@@ -126,7 +128,7 @@ def expected(scene: Scene, evaluate: Evaluate, seconds: float) -> tuple[int, flo
         each = np.array([_of_case(run, case, lengths[0]) for case in study.cases])
     except InputError:
         return sum(samples.values()), seconds
-    statistics = refinement.by_statistics(study, _r2(run))
+    statistics = by_statistics.applies(study, _r2(run))
     designs, found = _verified(scene, statistics), _searched(study, statistics)
     at_edge = edge.designs(study) if study.verification.infill_rounds else 0
     found["verification"] = 0.0
@@ -143,18 +145,21 @@ def _searched(study: Study, statistics: bool) -> dict[str, float]:
     settings, cases = study.verification, len(study.cases)
     if settings.infill_rounds == 0:
         return {}
-    first = refinement.first_designs(study, statistics)
-    rounds = refinement.rounds(study, first, statistics)
-    patience = refinement.PATIENCE * (refinement.PARTS if statistics else 1)
-    usual = min(len(rounds), patience) + LATER * max(len(rounds) - patience, 0)
-    count = rounds[0] if rounds else 0
-    if not statistics and max(len(case.goals) for case in study.cases) == 1:
-        count = min(count, ALONE)
+    way = by_statistics if statistics else by_f
+    first = way.first_designs(study)
+    rounds = way.rounds(study, first)
+    if not statistics:
+        patience = min(len(rounds), by_f.PATIENCE)
+        count = rounds[0] if max(len(case.goals) for case in study.cases) > 1 else ALONE
+        usual = patience + LATER * (len(rounds) - patience)
+        further = usual * min(count, rounds[0])
+    else:
+        further = sum(rounds)
     each = truth.search_length(study) * REPLICATES
     beside = 0 if statistics else refinement.at_edges(study) - edge.simulations(study)
     return {
         "check": first * each,
-        "infill": usual * count * cases * each,
+        "infill": further * cases * each,
         "edge": EDGE * edge.simulations(study) + beside,
     }
 

@@ -14,6 +14,8 @@ from hpcclear.ranks.progress import duration
 from hpcclear.scene import Scene
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import (
+    by_f,
+    by_statistics,
     certificate,
     chaos,
     contributions,
@@ -105,7 +107,7 @@ def _search(run: StudyRun, models: Models) -> Found:
     found = run.stage("optimisation", optimisation.optimise, models.searched)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
     fronts.write(run, found, [*ends, *between], models.searched)
-    statistics = refinement.by_statistics(run.study, surrogates.checked_r2(run.study, models.kept))
+    statistics = by_statistics.applies(run.study, surrogates.checked_r2(run.study, models.kept))
     better, remarks = refinement.search(run, [*ends, *between], statistics)
     designs = better if better and statistics else [*ends, *(better or between)]
     return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
@@ -173,7 +175,7 @@ def _of_surrogates(scene: Scene) -> dict[str, int]:
 
 
 def _of_search(scene: Scene) -> dict[str, int]:
-    begun, rounds = refinement.simulations(scene.required_study)
+    begun, rounds = by_f.simulations(scene.required_study)
     return {"check": begun, "infill": rounds, "edge": refinement.at_edges(scene.required_study)}
 
 
