@@ -12,10 +12,14 @@ from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
+from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
+from hpcclear.scene.stages import Verification
 from hpcclear.statistics.random import indices, tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare, reach
+from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import edge, rare, verdicts
+from hpcclear.study.verdicts import Standing
 
 # -- indices ----------------------------------------------------------------------------------------
 
@@ -159,6 +163,28 @@ def test_what_the_tolerance_takes_of_plain_draws_is_part_of_their_interval():
         rare._interval(rare.Failing(choice, None, (), by), made, 0.95) for by in (0.0, 1e-4)
     )
     assert (wider.lower, wider.upper) == pytest.approx((one.lower - 1e-4, one.upper + 1e-4))
+
+
+def test_open_constraints_are_sampled_with_what_plain_samples_and_pairs_say(monkeypatch):
+    goal = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
+    case = SimpleNamespace(goals=(None,), kept=(goal, goal))
+    study = SimpleNamespace(case=lambda name: case, verification=Verification())
+    run, asked = SimpleNamespace(study=study), []
+
+    def met(run, failing, many, stage, purpose):
+        asked.extend(failing)
+        return [rare.Found(*[Limited(2e-3, np.zeros(2), 1e-3, 3e-3)] * 2, 7, 9) for _ in failing]
+
+    monkeypatch.setattr(rare, "probabilities", met)
+    monkeypatch.setattr(verdicts, "decided", lambda run, choices, true: true)
+    true = {name: np.full((1, 2), 1e-3) for name in ("sure_lower", "sure_upper", "counted")}
+    true |= {name: np.array([[5.0, 1e-3, 2e-3]]) for name in ("goal", "goal_lower", "goal_upper")}
+    true |= {"samples": np.array([4096]), "failed": np.array([96]), "taken": np.array([[0.1, 0.2]])}
+    true["standing"] = np.array([[Standing.KEPT, Standing.UNDECIDED]])
+    choice = SimpleNamespace(case="made")
+    found = rare.decided(run, [choice], true, "edge")
+    assert asked == [rare.Failing(choice, goal, (8, 4000), 0.2)]
+    assert (found["counted"][0, 1], found["rare_samples"][0], found["goal"][0, 2]) == (9, 7, 2e-3)
 
 
 def test_values_that_failed_are_left_out_and_weights_are_bounded():

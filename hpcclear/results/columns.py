@@ -222,7 +222,7 @@ VERIFICATION: Columns = {
     "constraint_excess": number(("design",), "1",
         "largest violation of a constraint by the estimates, relative to the threshold; at most 0 without a violation"),
     "samples": count(("design",), "number of simulations"),
-    "rare_samples": count(("design",), "number of additional weighted simulations near failure, for rare failures"),
+    "rare_samples": count(("design",), "number of additional simulations that decide rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
     "beyond_hertz": count(("design",), "number of simulations with indentation outside the range of Hertz contact"),
     "random": text(("design",), "random inputs of its case"),

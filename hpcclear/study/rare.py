@@ -62,11 +62,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
     they can be; besides ``rare_samples``, (n,): the simulations that took."""
     true["rare_samples"] = np.zeros(len(choices), np.int64)
     where = [
-        (
-            row,
-            k,
-            Failing(choice, goal, _before(true, row, len(run.study.case(choice.case).goals) + k)),
-        )
+        (row, k, Failing(choice, goal, _before(run, choice, true, row, k), true["taken"][row, k]))
         for row, choice in enumerate(choices)
         for k, goal in enumerate(run.study.case(choice.case).kept)
         if verdicts.rare(goal, run.study.verification)
@@ -88,9 +84,10 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
     return verdicts.decided(run, choices, true)
 
 
-def _before(true: Result, row: int, column: int) -> tuple[int, int]:
-    """Failures of the plain draws of a design, and their number."""
-    draws, share = int(true["samples"][row] - true["failed"][row]), true["goal"][row, column]
+def _before(run: StudyRun, choice: Choice, true: Result, row: int, k: int) -> tuple[int, int]:
+    """Failures of the plain draws of a design, by a constraint, and their number."""
+    share = true["goal"][row, len(run.study.case(choice.case).goals) + k]
+    draws = int(true["samples"][row] - true["failed"][row])
     return (round(float(share) * draws), draws) if np.isfinite(share) else (0, 0)
 
 
