@@ -60,7 +60,7 @@ def searched(space, rounds, rng, error=0.01, excess=None, count=4):
 
 
 def space_of(snap=lambda x: x):
-    return Space(BOUNDS, np.eye(2), (None, lambda x: x[:, 0]), snap)
+    return Space(BOUNDS, np.eye(2), np.eye(2)[0], (None, lambda x: x[:, 0]), snap)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -83,7 +83,7 @@ def steps(x):
 
 def test_what_the_first_designs_missed_is_found():
     """Twelve designs show a slope. Where it is lowest a model that is sure of it would place all others."""
-    missed, space = 0, Space(BOUNDS, np.eye(1), (None,))
+    missed, space = 0, Space(BOUNDS, np.eye(1), np.ones(1), (None,))
     for seed in range(6):
         rng = np.random.default_rng([9, seed])
         designs = BOUNDS[:, 0] + rng.random((12, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
@@ -128,7 +128,7 @@ def test_three_objectives_have_proposals_too_and_the_same_seed_the_same_bits():
     designs = BOUNDS[:, 0] + rng.random((20, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
     values = np.column_stack([bowl(designs), designs[:, 0], -designs[:, 1]])
     known = Known(designs, values, np.full((20, 3), 1e-3))
-    space = Space(BOUNDS, np.eye(3), (None, None, None))
+    space = Space(BOUNDS, np.eye(3), np.eye(3)[0], (None, None, None))
     found = [improvement.proposals(known, space, 6, np.random.default_rng(8)) for _ in range(2)]
     assert found[0].shape == (6, 2)
     np.testing.assert_array_equal(*found)
@@ -137,7 +137,7 @@ def test_three_objectives_have_proposals_too_and_the_same_seed_the_same_bits():
 def test_too_few_designs_for_a_model_are_refused():
     known = Known(np.full((3, 2), 0.5), np.ones((3, 2)), np.ones((3, 2)))
     with pytest.raises(InputError, match="too few valid samples"):
-        improvement.proposals(known, Space(BOUNDS, np.eye(2), (None, None)), 4, np.random.default_rng(1))  # fmt: skip
+        improvement.proposals(known, Space(BOUNDS, np.eye(2), np.eye(2)[0], (None, None)), 4, np.random.default_rng(1))  # fmt: skip
 
 
 # -- a study ----------------------------------------------------------------------------------------

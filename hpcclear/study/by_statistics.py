@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.report.merit import SPAN
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
@@ -127,9 +128,10 @@ def _problem(run: StudyRun, name: str, one: Tried) -> tuple[Known, Space]:
     """What is known of a case, and where to look: each objective, and mean + 2 standard deviations, the usual merit."""
     case = run.study.case(name)
     directions = np.eye(len(case.goals))
+    merit = np.array([1.0, SPAN]) if case.plain else directions[0]
     if case.plain:
-        directions = np.vstack([directions, [1.0, 2.0]])
+        directions = np.vstack([directions, merit])
     snap = partial(snapped, run.study, one.names)
-    space = Space(bounds(run, one.names), directions, exact_in(run.scene, case), snap)
+    space = Space(bounds(run, one.names), directions, merit, exact_in(run.scene, case), snap)
     broken = one.excess if case.kept else None
     return Known(one.coordinates, one.values, one.errors, broken), space

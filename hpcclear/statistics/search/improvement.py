@@ -39,6 +39,9 @@ LENGTHS = (0.1, 1.0)
 """Length scales in the unit cube: a statistic that changes faster is not found by some ten designs per variable. Of few designs
 with errors the likelihood takes any function for a plane, and what looks known is never visited."""
 
+HEDGES = 2
+"""Designs to verify that only may be the best: what is believed of those that are near each other is off together."""
+
 EXPLORED = 3
 """One design in so many is the farthest from all others: expected improvement trusts the model, which may be wrong."""
 
@@ -85,6 +88,8 @@ class Space:
     bounds : array, shape (d, 2)
     directions : array, shape (k, m)
         Weights of the objectives in each sum whose least value counts.
+    merit : array, shape (m,)
+        Those of the sum that counts most.
     exact : sequence of functions or None, length m
         Objectives that are known as functions of designs, (n, d) to (n,).
     snap : function
@@ -93,6 +98,7 @@ class Space:
 
     bounds: Array
     directions: Array
+    merit: Array
     exact: Sequence[Exact | None]
     snap: Snap = lambda designs: designs
 
@@ -220,8 +226,8 @@ def hopes(known: Known, space: Space, rng: np.random.Generator) -> tuple[Array, 
 
 
 def finalists(known: Known, space: Space, most: int, rng: np.random.Generator) -> Array:
-    """Designs that are believed to be the best, shape (k, d): in each direction of those evaluated and of all, and of the front
-    of what is expected of those evaluated as many as spread best, at most so many in all.
+    """Designs that are believed to be the best, shape (k, d): in each direction of those evaluated and of all; `HEDGES` others
+    that may be; and of the front of what is expected of those evaluated as many as spread best, up to so many in all.
 
     Raises
     ------
@@ -239,8 +245,15 @@ def finalists(known: Known, space: Space, most: int, rng: np.random.Generator) -
             point, worth = _best(beliefs, _likely(beliefs, direction), rng)
             if worth > 0.0:
                 found.append(point)
+        merit = _merit(beliefs, space.merit, rng)
+        for _ in range(HEDGES):
+            point, worth = _best(beliefs, merit, rng)
+            if worth > 0.0:
+                found.append(point)
+                beliefs.take(point)
         front = np.flatnonzero(moocore.is_nondominated(means))
-        found += list(designs[front[cut(means[front], max(most - len(found), means.shape[1]))]])
+        if (left := most - len(found)) >= means.shape[1]:
+            found += list(designs[front[cut(means[front], left)]])
         return np.unique(np.array(found), axis=0)
 
 
