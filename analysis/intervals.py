@@ -1,6 +1,6 @@
 """Whether stated intervals hold the truth at any tolerance: verified designs at loose tolerances against a strict one.
 
-    python analysis/intervals.py                  # ten studies, a quarter of an hour; writes analysis/results/intervals.csv
+    python analysis/intervals.py                  # ten studies, half an hour; writes analysis/results/intervals.csv
     python analysis/intervals.py press my.toml    # some of them, or a scene with one case of one's own
 
 Studies are those of analysis/regret.py. Designs spread over the box are verified as a study does, at relative tolerances of
@@ -44,7 +44,7 @@ def main() -> None:
     parser.add_argument("studies", nargs="*", default=list(STUDIES))
     parser.add_argument("--truth", type=int, default=TRUTH)
     parser.add_argument("--samples", type=int, default=1024)
-    parser.add_argument("--seeds", type=int, default=1, help="designs and scatter of so many kinds")
+    parser.add_argument("--seeds", type=int, default=2, help="designs and scatter of so many kinds")
     parser.add_argument("--first", type=int, default=FIRST, help="seed")
     parser.add_argument("--csv", type=Path, default=RESULTS)
     parser.add_argument(

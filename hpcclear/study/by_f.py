@@ -43,11 +43,14 @@ def simulations(study: Study) -> tuple[int, int]:
 
 def first_designs(study: Study) -> int:
     """Designs that it begins with, as a rule."""
-    extremes, between = chosen_in_all(study)
-    if study.swarm.runs == 1:  # averages over one run are its ends
-        extremes //= 2
     sizes = [len(study.design_variables(case.name)) for case in study.cases]
-    return extremes + between + RAYS * sum(sizes)
+    return ends(study) + chosen_in_all(study)[1] + RAYS * sum(sizes)
+
+
+def ends(study: Study) -> int:
+    """Designs of the swarm that are ends of a front, as a rule: averages over one run are the ends themselves."""
+    extremes, _ = chosen_in_all(study)
+    return extremes // 2 if study.swarm.runs == 1 else extremes
 
 
 def rounds(study: Study, begun: int) -> list[int]:

@@ -42,10 +42,8 @@ def applies(study: Study, r2: float) -> bool:
 
 def first_designs(study: Study) -> int:
     """Designs that it begins with, as a rule."""
-    extremes, _ = chosen_in_all(study)
-    if study.swarm.runs == 1:  # averages over one run are its ends
-        extremes //= 2
-    return extremes + sum(_wide(len(study.design_variables(case.name))) for case in study.cases)
+    sizes = [len(study.design_variables(case.name)) for case in study.cases]
+    return by_f.ends(study) + sum(map(_wide, sizes))
 
 
 def _wide(variables: int) -> int:

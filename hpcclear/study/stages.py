@@ -175,6 +175,7 @@ def _of_surrogates(scene: Scene) -> dict[str, int]:
 
 
 def _of_search(scene: Scene) -> dict[str, int]:
+    # a search by statistics has no more in all: what it has beside these its verification saves
     begun, rounds = by_f.simulations(scene.required_study)
     return {"check": begun, "infill": rounds, "edge": refinement.at_edges(scene.required_study)}
 
