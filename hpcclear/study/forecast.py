@@ -56,9 +56,9 @@ first: the error of a standard deviation by few points falls alike whether f is 
 LATER, EDGE, DISTINCT = 0.7, 0.55, 0.9
 """Shares of what there may be: rounds of a search from which on it may end, simulations at edges, designs that differ."""
 
-EACH, BETWEEN, ALONE = 1.75, 0.5, 5
+EACH, BETWEEN, ALONE = 1.75, 0.5, 6
 """Designs that a search by statistics ends with for each direction that it looks in, and of those that may stand between;
-designs of a round for one objective, at most, whatever is allowed."""
+designs of all rounds for one objective, at most, by models on two scales."""
 
 POINTS, FRESH = 150, 50
 """Points of a surrogate of f that shows whether it is rough, and fresh ones that its R2 is of."""
@@ -148,13 +148,12 @@ def _searched(study: Study, statistics: bool) -> dict[str, float]:
     way = by_statistics if statistics else by_f
     first = way.first_designs(study)
     rounds = way.rounds(study, first)
+    further = float(sum(rounds))
     if not statistics:
-        patience = min(len(rounds), by_f.PATIENCE)
-        count = rounds[0] if max(len(case.goals) for case in study.cases) > 1 else ALONE
-        usual = patience + LATER * (len(rounds) - patience)
-        further = usual * min(count, rounds[0])
-    else:
-        further = sum(rounds)
+        patience = sum(rounds[: by_f.PATIENCE])
+        further = patience + LATER * (further - patience)
+        if max(len(case.goals) for case in study.cases) == 1:
+            further = min(further, ALONE)
     each = truth.search_length(study) * REPLICATES
     beside = 0 if statistics else refinement.at_edges(study) - edge.simulations(study)
     return {
