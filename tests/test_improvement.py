@@ -136,8 +136,9 @@ def test_three_objectives_have_proposals_too_and_the_same_seed_the_same_bits():
 
 def test_too_few_designs_for_a_model_are_refused():
     known = Known(np.full((3, 2), 0.5), np.ones((3, 2)), np.ones((3, 2)))
+    space = Space(BOUNDS, np.eye(2), np.eye(2)[0], (None, None))
     with pytest.raises(InputError, match="too few valid samples"):
-        improvement.proposals(known, Space(BOUNDS, np.eye(2), np.eye(2)[0], (None, None)), 4, np.random.default_rng(1))  # fmt: skip
+        improvement.proposals(known, space, 4, np.random.default_rng(1))
 
 
 # -- a study ----------------------------------------------------------------------------------------
