@@ -1,6 +1,7 @@
 """Constraints are decided honestly: verdicts over looks and designs, what an answer says of them, what a decision costs."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from formula_study import scene_of
 from margins import most
 from scipy import stats
 
+from hpcclear.report import merit
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene.goals import Constraint, Goal
@@ -76,6 +78,20 @@ def test_what_is_not_decided_has_a_price():
     assert np.isnan(verdicts.of_interval(goal, at, 2048, 0.95).price)
 
 
+def test_what_the_tolerance_leaves_open_no_simulations_decide():
+    """Of a half-width of 4e-3 the tolerance has half: what is left to the samples falls to 0, or is not enough."""
+    goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
+    near, far = (goals.GoalValue(x, 0.0, x + 0.004, np.zeros(16)) for x in (0.0085, 0.007))
+    assert verdicts.of_interval(goal, near, 2048, 0.95, 0.002) == (Standing.UNDECIDED, np.inf)
+    assert verdicts.of_interval(goal, far, 2048, 0.95, 0.002).price == 8192.0
+    case = SimpleNamespace(goals=[], kept=[goal])
+    values = [np.array([one]) for one in (0.0085, 0.0045, 0.0125)]
+    text = verdicts.words(
+        case, "N", values, np.array([float(Standing.UNDECIDED)]), np.array([np.inf])
+    )
+    assert text.endswith(f"cannot be told ({merit.OPEN})")
+
+
 def test_designs_that_surely_satisfy_all_constraints_come_first():
     kept, open_, broken = map(float, Standing)
     rows, none = [0, 1, 2], np.zeros(3)
@@ -113,6 +129,7 @@ def verified(verdict: str, excess: list[float]):
         ("broken", [0.2, 0.1, 0.3], "robust beta"),
         ("cannot be told (about 8192 simulations would decide)", [0.2, 0.1, 0.3], "robust beta"),
         ("cannot be told (about 8192 simulations would decide)", [-0.1, -0.2, 0.3], "robust alpha"),
+        (f"cannot be told ({merit.OPEN})", [-0.1, -0.2, 0.3], "robust alpha"),
     ],
 )
 def test_no_design_is_recommended_within_constraints_that_it_may_break(verdict, excess, nearest):
@@ -123,6 +140,7 @@ def test_no_design_is_recommended_within_constraints_that_it_may_break(verdict, 
     assert "within the constraints" not in " ".join(one.text for one in lines)
     decides = "study.verification.most_samples=8192 to decide the constraints"
     assert (decides in text["next steps"]) is ("8192" in verdict)
+    assert ("a smaller numerics.rtol" in text["next steps"]) is (merit.OPEN in verdict)
 
 
 def test_a_design_that_surely_satisfies_them_is_recommended():

@@ -13,6 +13,7 @@ from hpcclear.base.outcome import Flag
 from hpcclear.report import alike, failures, scatter
 from hpcclear.report.figures import fits, labels
 from hpcclear.report.merit import (
+    OPEN,
     USUAL,
     VERDICTS,
     baseline_of,
@@ -292,8 +293,11 @@ def _next(
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
         yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
-    prices = re.findall(r"about (\d+) simulations would decide", str(best.get("constraints", "")))
-    if prices:
+    constraints = str(best.get("constraints", ""))
+    prices = re.findall(r"about (\d+) simulations would decide", constraints)
+    if OPEN in constraints:
+        yield "a smaller numerics.rtol (or target_error), to decide the constraints"
+    elif prices:
         key = "most_samples" if ours.attrs.get("method") == "qmc" else "samples"
         yield f"study.verification.{key}={max(map(int, prices))} to decide the constraints"
     if "on_bounds" in best and str(best["on_bounds"].item()):

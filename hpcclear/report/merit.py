@@ -37,6 +37,10 @@ VERDICTS = {"broken": "violated", "cannot be told": "undecided", "kept": "satisf
 """How a file states the verdict on a constraint, the worst first, and what is printed."""
 
 
+OPEN = "the integration tolerance leaves it open"
+"""Said of a constraint that no number of simulations would decide."""
+
+
 def is_plain(one: xr.Dataset) -> bool:
     """Return whether the objectives of its case are mean and standard deviation, without constraints."""
     if "first_goal" not in one:

@@ -55,6 +55,8 @@ class Found(NamedTuple):
     simulations: int
     draws: int
     """Draws behind the probability, without pilots."""
+    taken: float
+    """What the tolerance takes of it."""
 
 
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) -> Result:
@@ -79,7 +81,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
         true["goal"][row, column] = np.clip(
             its.own.value, true["goal_lower"][row, column], true["goal_upper"][row, column]
         )
-        true["counted"][row, k] = its.draws
+        true["counted"][row, k], true["taken"][row, k] = its.draws, its.taken
         true["rare_samples"][row] += its.simulations
     return verdicts.decided(run, choices, true)
 
@@ -136,6 +138,7 @@ def probabilities(
             _interval(its, one, verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,
             one.draws,
+            its.taken if one.plain else one.taken(its.goal.most),
         )
         for its, one, number in zip(asked, rates, many, strict=True)
     ]

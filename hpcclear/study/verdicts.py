@@ -17,6 +17,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.report.figures.labels import between, quantity
+from hpcclear.report.merit import OPEN
 from hpcclear.scene.cases import Case
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.stages import Verification
@@ -45,7 +46,8 @@ class Verdict(NamedTuple):
 
     standing: Standing
     price: float
-    """Simulations of the design that would decide, NaN where it is decided or where no number would."""
+    """Simulations of the design that would decide; infinite where the error of the tolerance leaves it open, NaN where it is
+    decided or the estimate lies on the threshold."""
 
 
 def rivals(choices: Sequence[Choice]) -> list[int]:
@@ -70,8 +72,8 @@ def level(settings: Verification, many: int, simulations: int) -> float:
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
     """What is known of designs, with the verdicts on their constraints from ``sure_lower`` and ``sure_upper``.
 
-    ``counted`` are the simulations behind each constraint. Added are ``standing`` (`Standing`) and ``price``, (n, constraints):
-    the simulations of a design that would decide, NaN where it is decided or where no number would.
+    ``counted`` are the simulations behind each constraint, ``taken`` what the tolerance takes of it. Added are ``standing``
+    (`Standing`) and ``price`` of `Verdict`, (n, constraints).
     """
     true["standing"], true["price"] = np.full((2, *true["sure_lower"].shape), np.nan)
     many = rivals(choices)
@@ -82,7 +84,8 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
             sure = level(run.study.verification, many[row], simulations)
             value = true["goal"][row, len(case.goals) + k]
             interval = true["sure_lower"][row, k], true["sure_upper"][row, k]
-            found = of_interval(goal, GoalValue(value, *interval, _NOTHING), simulations, sure)
+            one, taken = GoalValue(value, *interval, _NOTHING), true["taken"][row, k]
+            found = of_interval(goal, one, simulations, sure, taken)
             true["standing"][row, k], true["price"][row, k] = found
     return true
 
@@ -90,25 +93,33 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
 _NOTHING = np.empty(0)
 
 
-def of_interval(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> Verdict:
-    """How a design stands to a constraint, from an interval at a two-sided confidence by so many simulations, and its price."""
+def of_interval(
+    goal: Constraint, one: GoalValue, simulations: int, confidence: float, taken: float = 0.0
+) -> Verdict:
+    """How a design stands to a constraint, from an interval at a two-sided confidence by so many simulations, and its price.
+    `taken` is the part of the half-width that more simulations leave."""
     if one.upper <= goal.most:
         return Verdict(Standing.KEPT, np.nan)
     if one.lower > goal.most:
         return Verdict(Standing.BROKEN, np.nan)
-    return Verdict(Standing.UNDECIDED, _price(goal, one, simulations, confidence))
+    return Verdict(Standing.UNDECIDED, _price(goal, one, simulations, confidence, taken))
 
 
-def _price(goal: Constraint, one: GoalValue, simulations: int, confidence: float) -> float:
-    """Simulations after which an interval would just exclude the threshold: its width falls as the root of their number."""
+def _price(
+    goal: Constraint, one: GoalValue, simulations: int, confidence: float, taken: float
+) -> float:
+    """Simulations after which an interval would just exclude the threshold: its width falls as the root of their number, but
+    for what the tolerance takes."""
     gap = abs(goal.most - one.value)
+    if taken >= gap > 0.0:
+        return np.inf
     if goal.statistic == "exceedance" and one.value == 0.0:
         needed = without_any(goal.most, confidence)  # the interval narrows as one over the number
     elif not (gap > 0.0 and np.isfinite([one.value, one.lower, one.upper]).all()):
         return np.nan
     else:
         reach = one.upper - one.value if one.value <= goal.most else one.value - one.lower
-        needed = simulations * (reach / gap) ** 2
+        needed = simulations * (max(reach - taken, 0.0) / (gap - taken)) ** 2
     return float(2.0 ** math.ceil(math.log2(max(needed, simulations + 1.0))))
 
 
@@ -204,7 +215,9 @@ def words(case: Case, unit: str, values: Sequence[Array], standings: Array, pric
         text = f"{goal.words(unit)} {quantity(value, own)}"
         text += f" (95 % CI {between(low, high, own)})" if low < high else ""
         text += f" at most {quantity(goal.most, own)}: {Standing(int(standing)).words}"
-        if np.isfinite(price):
+        if np.isinf(price):
+            text += f" ({OPEN})"
+        elif np.isfinite(price):
             text += f" (about {price:.0f} simulations would decide)"
         texts.append(text)
     return "; ".join(texts)

@@ -308,6 +308,12 @@ class Rare:
                 return Limited(one.value, one.shifts, 0.0, upper)
         return Limited(one.value, one.shifts, 0.0, 1.0)
 
+    def taken(self, most: float) -> float:
+        """How far the tolerance alone may move the probability towards one."""
+        value = weighted(self.f, self.weights, self.limit, 0.95).value
+        off = value * (self.factor - 1.0 if value <= most else 1.0 - 1.0 / self.factor)
+        return off if self.known else 0.0
+
 
 def _worth(f: Array, weights: Array, level: float) -> float:
     """Equally weighted draws that those beyond a level are worth."""
