@@ -173,7 +173,9 @@ def test_open_constraints_are_sampled_with_what_plain_samples_and_pairs_say(monk
 
     def met(run, failing, many, stage, purpose):
         asked.extend(failing)
-        return [rare.Found(*[Limited(2e-3, np.zeros(2), 1e-3, 3e-3)] * 2, 7, 9, 0.0) for _ in failing]
+        return [
+            rare.Found(*[Limited(2e-3, np.zeros(2), 1e-3, 3e-3)] * 2, 7, 9, 0.0) for _ in failing
+        ]
 
     monkeypatch.setattr(rare, "probabilities", met)
     monkeypatch.setattr(verdicts, "decided", lambda run, choices, true: true)

@@ -21,7 +21,6 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.cases import Case
-from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import snapped
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
@@ -31,7 +30,7 @@ from hpcclear.statistics.random.tail import of_share
 from hpcclear.statistics.search.infill import TwoScales
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.settings import SwarmSettings
-from hpcclear.study import goals, nearby, rare, truth, verdicts
+from hpcclear.study import goals, nearby, rare, tried, truth, verdicts
 from hpcclear.study.nearby import Nearby
 from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
@@ -149,7 +148,7 @@ def neighbours(
     from threadpoolctl import threadpool_limits
 
     names = run.study.design_variables(case.name)
-    bounds, rng = _bounds(run, case), run.rng("edge", case.name, str(len(coordinates)))
+    bounds, rng = tried.bounds(run, names), run.rng("edge", case.name, str(len(coordinates)))
     with threadpool_limits(limits=1, user_api="blas"):
         model = _steering(coordinates, excess, bounds, rng)
         objectives = _objectives(run, case, coordinates, values, rng)
@@ -158,12 +157,6 @@ def neighbours(
     moves = np.diag(aside * (bounds[:, 1] - bounds[:, 0]))
     points = np.clip(np.vstack([place, place + moves, place - moves]), *bounds.T)
     return np.unique(snapped(run.study, names, points), axis=0)
-
-
-def _bounds(run: StudyRun, case: Case) -> Array:
-    """Of design variables, in sampling coordinates, (d, 2)."""
-    region = box(run.scene, run.study.design_variables(case.name))
-    return np.column_stack([region.lower, region.upper])
 
 
 def _first(coordinates: Array, excess: Array) -> Array:
@@ -185,7 +178,7 @@ def _objectives(
     run: StudyRun, case: Case, coordinates: Array, values: Array, rng: np.random.Generator
 ) -> list[Predict]:
     """The first two objectives as functions of designs."""
-    bounds = _bounds(run, case)
+    bounds = tried.bounds(run, run.study.design_variables(case.name))
     return [
         exact or TwoScales(coordinates, column, bounds, rng).predict
         for exact, column in zip(goals.exact_in(run.scene, case)[:2], values.T, strict=False)
@@ -212,7 +205,7 @@ def _of_case(
     from threadpoolctl import threadpool_limits
 
     names = run.study.design_variables(case.name)
-    bounds, rng = _bounds(run, case), run.rng("edge", case.name)
+    bounds, rng = tried.bounds(run, names), run.rng("edge", case.name)
     kept: list[Choice] = []
     shift, aim = 0.0, AIM
     try:
@@ -234,8 +227,7 @@ def _of_case(
                 place = _between(safe, beyond, -_gap(case, aim))
             place = snapped(run.study, names, place[None])[0]
             guess = float(model(place[None])[0])
-        row = to_physical(run.scene, names, place[None])[0]
-        choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
+        choice = tried.choices(run, case.name, place[None])[0]
         try:
             true = _simulated(run, choice)
         except InputError:  # it fails with all inputs, or makes no mechanism with some
@@ -261,8 +253,9 @@ def _of_failures(
     """The same where all constraints are probabilities of failure: the draws of many designs next to each other make one
     model of their indices (`hpcclear.study.nearby`). It begins where the search takes the best design to be; each turn goes on
     from the best design of the last one, in a smaller region if that was inside of it."""
-    bounds, rng = _bounds(run, case), run.rng("edge", case.name)
-    near, names = Nearby(run, case, bounds, rng), run.study.design_variables(case.name)
+    names = run.study.design_variables(case.name)
+    bounds, rng = tried.bounds(run, names), run.rng("edge", case.name)
+    near = Nearby(run, case, bounds, rng)
     objectives = _objectives(run, case, coordinates, values, rng)
     start = _first(coordinates, excess)
 
@@ -294,8 +287,7 @@ def _of_failures(
     error = near.error(rare.most_draws(run.study.verification))
     aims = *AIMS, shown(run.study, error)
     points = np.array([best(guess, near.region, place[None], aim) for aim in aims])
-    rows = to_physical(run.scene, names, points)
-    return [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+    return tried.choices(run, case.name, points)
 
 
 def shown(study: Study, error: float) -> float:
@@ -309,9 +301,7 @@ def shown(study: Study, error: float) -> float:
 def _looked_at(run: StudyRun, case: Case, place: Array) -> float:
     """What steers to the constraints of a design, by as many simulations as the search gives one."""
     count = truth.search_length(run.study)
-    names = run.study.design_variables(case.name)
-    row = to_physical(run.scene, names, place[None])[0]
-    choice = Choice("", case.name, dict(zip(names, row.tolist(), strict=True)))
+    choice = tried.choices(run, case.name, place[None])[0]
     found = truth.sequences(run, [choice], "edge", "search", count, count * REPLICATES)
     return float(found["excess"][0])
 

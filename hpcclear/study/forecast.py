@@ -18,7 +18,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
-from hpcclear.scene.domain import box, to_physical
+from hpcclear.scene.domain import box
 from hpcclear.scene.points import Points, snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES, Verification
@@ -37,6 +37,7 @@ from hpcclear.study import (
     optimisation,
     refinement,
     surrogates,
+    tried,
     truth,
     verdicts,
 )
@@ -199,8 +200,7 @@ def _of_case(run: StudyRun, case: Case, length: int) -> float:
     names, study = run.study.design_variables(case.name), run.study
     region = box(run.scene, names)
     unit = unit_lhs(DESIGNS, len(names), generator(study.seed, "pilot", case.name))
-    rows = to_physical(run.scene, names, region.lower + unit * (region.upper - region.lower))
-    choices = [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in rows]
+    choices = tried.choices(run, case.name, region.lower + unit * (region.upper - region.lower))
     made = truth.doubled(run, choices, "pilot", "pilot", length, length * REPLICATES)
     settings = study.verification
     if settings.draws is not None:

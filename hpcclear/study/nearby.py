@@ -12,14 +12,12 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.scene.cases import Case
-from hpcclear.scene.domain import to_physical
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import snapped
 from hpcclear.statistics.random import importance, indices
 from hpcclear.statistics.random.importance import Density
 from hpcclear.statistics.random.tail import of_share
-from hpcclear.study import rare
-from hpcclear.study.optimisation import Choice
+from hpcclear.study import rare, tried
 from hpcclear.study.run import StudyRun
 
 DESIGNS, CANDIDATES = 64, 1024
@@ -192,11 +190,7 @@ class Nearby:
         """For random inputs, (n, k): places in a band, (n, d), the designs next to them, and responses of these, (k, n)."""
         at = band.draw(self._rng)
         places = snapped(self._run.study, self._names, at)
-        rows = to_physical(self._run.scene, self._names, places)
-        choices = [
-            Choice("", self._case.name, dict(zip(self._names, row.tolist(), strict=True)))
-            for row in rows
-        ]
+        choices = tried.choices(self._run, self._case.name, places)
         asked = list(zip(choices, np.split(u, DESIGNS), strict=True))
         f = np.concatenate(rare.simulated(self._run, asked, "edge"), axis=1)
         many = len(u) // DESIGNS
