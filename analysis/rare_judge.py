@@ -35,7 +35,7 @@ from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import student
 from hpcclear.statistics.random.tail import of_share
-from hpcclear.study import edge, rare, truth
+from hpcclear.study import edge, rare, tried, truth
 from hpcclear.study.optimisation import Choice
 
 REPEATS, SHARE, CORRELATION, LEVELS = 8, 0.1, 0.8, 9
@@ -173,7 +173,7 @@ def best_allowed(scene: Scene, choice: Choice, share: float, simulations: int) -
     choices = [Choice("", case.name, dict(zip(names, row.tolist(), strict=True))) for row in where]
     found = truth.sequences(run, choices, "search", "search", LENGTH, LENGTH * REPLICATES)
     values = found["goal"][:, : len(case.goals)]
-    bounds = edge._bounds(run, case)
+    bounds = tried.bounds(run, names)
     model = edge._steering(where, found["excess"], bounds, rng)
     objectives = edge._objectives(run, case, where, values, rng)
     met = {goal.most >= share: (float(objectives[0](where[:1])[0]), where[0])}
