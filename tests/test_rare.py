@@ -345,9 +345,9 @@ def test_few_simulations_still_show_a_design_at_the_edge(carried_out):
 
 def test_what_simulations_can_show_is_lower_the_more_they_scatter():
     study = scene_of(FEW).required_study
-    shown = [edge.shown(study, error) for error in (0.0, 0.15, 0.2, 10.0)]
+    shown = [edge.shown(study, error) for error in (0.0, 0.2, 0.25, 10.0)]
     assert shown[0] == edge.LAST[1] > shown[1] > shown[2] > shown[3] == edge.LAST[0]
-    upper = reach(0.15, verdicts.level(study.verification, 6, 1024)) * shown[1]
+    upper = reach(0.2, verdicts.level(study.verification, 6, 1024)) * shown[1]
     assert upper < 1.0 < 2.5 * upper  # of the allowed probability
 
 
