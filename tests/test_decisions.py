@@ -85,6 +85,15 @@ def test_what_the_tolerance_leaves_open_no_simulations_decide():
     assert verdicts.of_interval(goal, near, 2048, 0.95, 0.002) == (Standing.UNDECIDED, np.inf)
     assert verdicts.of_interval(goal, far, 2048, 0.95, 0.002).price == 8192.0
     case = SimpleNamespace(goals=[], kept=[goal])
+    run = SimpleNamespace(
+        study=SimpleNamespace(case=lambda name: case, verification=Verification())
+    )
+    one = [np.array([[x]]) for x in (0.0085, 0.0045, 0.0125, 2048.0)]
+    true = dict(zip(("goal", "sure_lower", "sure_upper", "counted"), one, strict=True))
+    for taken, price in ((0.0, 16384.0), (0.002, np.inf)):
+        true["taken"] = np.array([[taken]])
+        found = verdicts.decided(run, [Choice("", "made", {})], true)
+        assert found["price"][0, 0] == price
     values = [np.array([one]) for one in (0.0085, 0.0045, 0.0125)]
     text = verdicts.words(
         case, "N", values, np.array([float(Standing.UNDECIDED)]), np.array([np.inf])

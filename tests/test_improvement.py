@@ -1,5 +1,7 @@
 """Expected improvement: closed forms against draws, noisy functions, constraints, catalogues, and when a study uses it."""
 
+from types import SimpleNamespace
+
 import moocore
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from hpcclear.results import dataset
 from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known, Space
-from hpcclear.study import by_statistics, extent
+from hpcclear.study import by_statistics, extent, tried
 
 BOUNDS = np.array([[0.0, 1.0], [-2.0, 2.0]])
 
@@ -107,6 +109,19 @@ def test_what_may_be_won_shrinks_with_what_is_known():
     assert abs(least[0]) < 0.01
 
 
+def test_designs_that_only_may_be_the_best_are_verified_too():
+    """Beside the best one of those evaluated and of all two others, apart from these and in doubt."""
+    rng = np.random.default_rng(12)
+    designs = BOUNDS[:, 0] + rng.random((30, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
+    values = bowl(designs)[:, None] + 0.05 * rng.standard_normal((30, 1))
+    known = Known(designs, values, np.full((30, 1), 0.05))
+    space = Space(BOUNDS, np.eye(1), np.ones(1), (None,))
+    ends = improvement.finalists(known, space, 6, rng)
+    fresh = [one for one in ends if not (one == designs).all(axis=1).any()]
+    assert len(fresh) == 3
+    assert bowl(np.array(fresh)).max() < np.median(bowl(designs))
+
+
 def test_constraints_are_kept():
     rng = np.random.default_rng(5)
     known = searched(space_of(), 5, rng, excess=lambda x: 0.6 - x[:, 0])
@@ -175,6 +190,26 @@ def test_statistics_are_searched_by_name_or_where_f_is_rough():
     for of, r2, expected in (("f", 0.1, False), (None, 0.5, True), (None, 0.95, False), (None, np.nan, True)):  # fmt: skip
         scene = study().with_({"study.surrogate.of": of})
         assert by_statistics.applies(scene.required_study, r2) is expected
+
+
+def test_a_search_by_statistics_says_what_another_design_may_win():
+    """Few designs with large errors leave much to be won; those of a known function, its least among them, nothing."""
+    scene = study()
+    run = SimpleNamespace(scene=scene, study=scene.required_study)
+    run.rng = lambda *words: np.random.default_rng(13)
+    region = tried.bounds(run, ("m2", "m3"))
+    hoped = "another design is expected to lower the least 90th percentile by"
+    for count, error, text in ((24, 0.3, hoped), (120, 1e-6, "")):
+        unit = np.random.default_rng(14).random((count, 2))
+        unit[:4] = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]
+        where = region[:, 0] + unit * np.ptp(region, axis=1)
+        noise = error * np.random.default_rng(15).standard_normal(count)
+        values = np.column_stack([1.0 + unit[:, 0] + noise, -where.sum(axis=1)])
+        one = tried.Tried(
+            ("m2", "m3"), where, values, np.full(count, -np.inf), np.full((count, 2), error)
+        )
+        assert by_statistics.left(run, "robust", [one]).startswith(text)
+        assert bool(by_statistics.left(run, "robust", [one])) is bool(text)
 
 
 def test_a_search_by_statistics_ends_at_the_front(done):

@@ -5,6 +5,7 @@ Models of mean and standard deviation, or whatever else is made small, on two sc
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -86,11 +87,7 @@ def further(run: StudyRun, name: str, one: Tried, count: int, rng: np.random.Gen
         Too few designs that did not fail for a model.
     """
     broken = one.excess if run.study.case(name).kept else None
-
-    def snap(designs: Array) -> Array:
-        return snapped(run.study, one.names, designs)
-
-    region = bounds(run, one.names)
+    region, snap = bounds(run, one.names), partial(snapped, run.study, one.names)
     return infill.proposals(one.coordinates, one.values, region, count, rng, broken, snap)
 
 
