@@ -2,16 +2,19 @@
 
     python analysis/benchmark_kernel.py                  # about 3 minutes, most of it compiling
     python analysis/benchmark_kernel.py --samples 64     # shorter
+    python analysis/benchmark_kernel.py --lanes 8 16     # other numbers of lanes
 
-Lanes of W = 1, 16 and 32 beside the plain loop of `plain_loop.py`, all on one core and in one run: Latin
-hypercube of the paper's Table 3, Lankarani-Nikravesh, rtol 1e-6, 10 revolutions. Paired rounds in changing
-order; medians of the ratios within a round. Writes benchmark_kernel.nc.
+Lanes of W = 1, 16, 32 and the number that the package chooses beside the plain loop of `plain_loop.py`, all on one core and
+in one run: Latin hypercube of the paper's Table 3, Lankarani-Nikravesh, rtol 1e-6, 10 revolutions. Paired rounds in
+changing order; medians of the ratios within a round. Writes benchmark_kernel.nc. A step that lasts longer than `LONGEST`
+ends the run with a traceback.
 """
 
 import argparse
+import faulthandler
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +28,21 @@ from scenes import Setup, ensemble, scene
 
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.provenance import provenance
 
-WIDTHS = (1, 16, 32)
+WIDTHS = tuple(sorted({1, 16, 32, DEFAULT_LANES}))
+LONGEST = 600.0  # s, of one task or one compilation
 YARDSTICK = "plain loop"
 REVOLUTIONS = (5, 5)  # transient, averaged
+
+
+def guarded() -> None:
+    """Let the process end with a traceback if what follows takes longer than `LONGEST`."""
+    faulthandler.dump_traceback_later(LONGEST, exit=True)
 
 
 def run_lanes(setup: Setup, width: int) -> Outcome:
@@ -62,6 +72,7 @@ def paired_rounds(tasks: Mapping[str, Callable[[], Any]], rounds: int) -> dict[s
     for round_number in range(rounds):
         shift = round_number % len(names)
         for name in names[shift:] + names[:shift]:
+            guarded()
             started = time.process_time()  # one core's, whatever else runs
             tasks[name]()
             seconds[name].append(time.process_time() - started)
@@ -91,12 +102,13 @@ def _plain_force_loop(y, p, latched, count):
     return gaps
 
 
-def force_tasks(setup: Setup, count: int) -> dict[str, Callable[[], Any]]:
+def force_tasks(setup: Setup, widths: Sequence[int], count: int) -> dict[str, Callable[[], Any]]:
     """Force evaluations in contact, `count` a lane, compiled already."""
     tasks: dict[str, Callable[[], Any]] = {}
     q, v = setup.start[0].coordinates(4).copy(), setup.start[0].velocities(4)
     q[3] += 4e-4  # O23 well in contact
-    for width in WIDTHS:
+    for width in widths:
+        guarded()
         repeat = _force_loop(width)
         work = np.zeros((at.BANK, width))
         rows = setup.par.shape[1]  # only those that the scene has
@@ -184,24 +196,27 @@ def floor_of(arithmetic: Arithmetic, speed: Mapping[str, float]) -> tuple[float,
     return divider, plain * speed["product"]
 
 
-def measure(samples: int, rounds: int) -> xr.Dataset:
+def measure(samples: int, widths: Sequence[int], rounds: int) -> xr.Dataset:
     """All measurements of this benchmark."""
     setup = ensemble(scene("lankarani-nikravesh", 1e-6, *REVOLUTIONS), samples)
     tasks: dict[str, Callable[[], Any]] = {
-        f"W = {width}": lambda width=width: run_lanes(setup, width) for width in WIDTHS
+        f"W = {width}": lambda width=width: run_lanes(setup, width) for width in widths
     }
     tasks[YARDSTICK] = lambda: run_plain(setup)
-    results = {name: task() for name, task in tasks.items()}  # compiles as well
+    results = {}
+    for name, task in tasks.items():  # compiles as well
+        guarded()
+        results[name] = task()
     seconds = paired_rounds(tasks, rounds)
     count = 200_000
-    force = paired_rounds(force_tasks(setup, count), rounds)
-    lanes = [*WIDTHS, 1]
-    found = [assembly_of(setup, width) for width in WIDTHS]
-    agreement = np.abs(results[YARDSTICK][:, 0] / results["W = 1"].objective - 1.0)
+    force = paired_rounds(force_tasks(setup, widths, count), rounds)
+    lanes = [*widths, 1]
+    found = [assembly_of(setup, width) for width in widths]
+    agreement = np.abs(results[YARDSTICK][:, 0] / results[f"W = {widths[0]}"].objective - 1.0)
     table = np.array([seconds[name] for name in tasks])
     ns = np.array([force[name] for name in tasks]) / (np.array(lanes)[:, None] * count) * 1e9
     plain_evaluations = results[YARDSTICK][:, 3].sum()
-    evaluations = [results[f"W = {w}"].evaluations.sum() for w in WIDTHS]
+    evaluations = [results[f"W = {w}"].evaluations.sum() for w in widths]
     divider, multipliers = floor_of(found[-1], throughput())
     unit = {"units": "1"}
     return xr.Dataset(
@@ -220,7 +235,7 @@ def measure(samples: int, rounds: int) -> xr.Dataset:
             "floor_multipliers": ((), multipliers, {"units": "ns"}),
             "disagreement": ((), float(np.median(agreement)), unit),
         },
-        coords={"code": list(tasks), "width": list(WIDTHS)},
+        coords={"code": list(tasks), "width": list(widths)},
         attrs={
             "samples": samples,
             **provenance("", ""),
@@ -246,7 +261,7 @@ def report(data: xr.Dataset) -> str:
         for w, s in zip(data["width"], data["packed_share"], strict=True)
     )
     lines.append(f"packed arithmetic in the force evaluation: {shares}")
-    lines.append(f"W = 32 emits {data.attrs['packed_kinds']}")
+    lines.append(f"W = {int(data['width'][-1])} emits {data.attrs['packed_kinds']}")
     floors = float(data["floor_divider"]), float(data["floor_multipliers"])
     lines.append(
         f"floor of a force evaluation: {max(floors):.1f} ns a lane"
@@ -263,9 +278,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, default=256)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument(
+        "--lanes", type=int, nargs="+", default=list(WIDTHS), help="numbers of lanes"
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("benchmark_kernel.nc"))
     options = parser.parse_args()
-    data = measure(options.samples, options.rounds)
+    data = measure(options.samples, options.lanes, options.rounds)
     print(report(data))
     data.to_netcdf(options.output, engine="h5netcdf")
 

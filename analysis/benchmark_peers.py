@@ -2,20 +2,29 @@
 
     python analysis/benchmark_peers.py            # about 15 minutes on a quiet machine
     python analysis/benchmark_peers.py --quick    # one round, fewer tolerances
+    python analysis/benchmark_peers.py --record   # also writes the rows of this processor to docs/performance.md
 
 Peers: pip install 'hpcclear[bench]'; numbalsoda is built from source and needs gfortran
 (apt-get install gfortran). One that does not load is listed as missing.
 
-Single response: the paper's mechanism, clearance 0.3 mm, first revolution; time against error of the slider's
+Single response: the paper's mechanism, clearance 0.3 mm, one revolution and ten; time against error of the slider's
 position, the error measured from one reference (scipy's DOP853 at its tightest, from event to event where the
 law has memory). For every decade of error the fastest run of each code that is at least as good.
 Ensemble: the box of the paper's Table 3, first revolution; every code at the loosest tolerance whose median
-error is at most the one asked for. All on one core, in processor time, everything in one run: paired rounds,
+error is at most the required one. All on one core, in processor time, everything in one run: paired rounds,
 each a pass over all codes; medians of the ratios within a round. Writes benchmark_peers.nc and .png.
+
+Before anything is timed, every code must solve the same equations: a code whose error does not fall with its
+tolerance, or that reaches the required error of an ensemble at no tolerance, ends the run with exit code 1.
 """
 
 import argparse
+import csv
+import datetime
 import importlib
+import os
+import re
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -26,13 +35,17 @@ import numpy as np
 import xarray as xr
 from drawing import by_code, error_panels
 from matplotlib.axes import Axes
-from scenes import LAWS, Setup, ensemble, scene, single
+from scenes import LAWS, ROOT, Setup, ensemble, scene, single
 
+from hpcclear.base import host
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.results.provenance import provenance
 
 MODULES = ("own", "numbalsoda", "cyrk", "heyoka", "scipy", "sundae", "exudyn")
 OWN = "hpcclear"
 OWN_SINGLE = "hpcclear prince-dormand"  # numerics.method for one response
+REVOLUTIONS = {"hunt-crossley": (1, 10), "frictionless": (1, 10), "lankarani-nikravesh": (1,)}
+"""Of a single response. Over ten, Lankarani and Nikravesh's law has no error: the motion depends on the tolerance."""
 DECADES = 10.0 ** -np.arange(5.0, 13.0)
 ENSEMBLES = {"lankarani-nikravesh": 1e-5, "frictionless": 1e-7}  # m, median error asked for
 TOLERANCES = 10.0 ** -np.arange(
@@ -40,7 +53,9 @@ TOLERANCES = 10.0 ** -np.arange(
 )  # tried from the loosest on, until the error is small enough
 SHORTEST = 5e-3  # s, calls are repeated to last as long
 FEW = 16  # samples for codes that take them one by one
-SLOWEST = 0.3  # s, tighter tolerances are left out beyond
+SLOWEST = 0.3  # s a revolution, tighter tolerances are left out beyond
+LONGEST = 6.0  # s of all tolerances of a code
+FALL = 0.1  # to which part of the largest error at loose tolerances the error must fall
 
 
 class Solver(NamedTuple):
@@ -72,16 +87,30 @@ def solvers_of(modules: list[Any], law: str) -> list[Solver]:
     ]
 
 
-def setup_of(law: str, rtol: float) -> Setup:
-    """One revolution of the paper's mechanism."""
-    return single(scene(law, rtol, 0, 1, clearance=3e-4))
+def setup_of(law: str, rtol: float, revolutions: int = 1) -> Setup:
+    """Some revolutions of the paper's mechanism."""
+    return single(scene(law, rtol, 0, revolutions, clearance=3e-4))
 
 
-def reference(law: str) -> float:
+def reference(law: str, revolutions: int) -> float:
     """Slider position by a code that is nobody's own here, at its tightest."""
     from peers.scipy_peer import SOLVERS
 
-    return SOLVERS["scipy DOP853"](setup_of(law, 3e-14), 0)
+    return SOLVERS["scipy DOP853"](setup_of(law, 3e-14, revolutions), 0)
+
+
+def distrust(name: str, errors: np.ndarray) -> str:
+    """Why a code does not solve the reference's equations, "" if it does: its errors (m), loosest tolerance first, must fall.
+
+    A failed run (NaN) and a tolerance that was left out count as no error.
+    """
+    known = errors[np.isfinite(errors)]
+    if len(known) < 4:
+        return f"{name}: results at {len(known)} tolerances only"
+    most, least = known[: len(known) // 3].max(), known[len(known) // 2 :].min()
+    if least > FALL * most:
+        return f"{name}: error {most:.1e} m at loose tolerances, {least:.1e} m at tight ones"
+    return ""
 
 
 # ---- single response --------------------------------------------------------------------------
@@ -95,33 +124,43 @@ def seconds_of(call: Callable[[], Any], repeats: int) -> float:
     return (time.process_time() - started) / repeats
 
 
-def work_precision(solvers: list[Solver], law: str, rtols: np.ndarray, rounds: int) -> xr.Dataset:
-    """Error, and seconds in every round, of every code at every tolerance."""
-    exact = reference(law)
-    setups = [setup_of(law, float(rtol)) for rtol in rtols]
+def errors_of(solvers: list[Solver], law: str, revolutions: int, rtols: np.ndarray) -> xr.Dataset:
+    """Error of every code at every tolerance, and how often it is repeated to be timed, 0 where it is too slow."""
+    exact = reference(law, revolutions)
+    setups = [setup_of(law, float(rtol), revolutions) for rtol in rtols]
     shape = (len(solvers), len(rtols))
-    error, seconds = np.full(shape, np.nan), np.full((*shape, rounds), np.nan)
-    repeats = np.zeros(shape, int)
+    error, repeats = np.full(shape, np.nan), np.zeros(shape, int)
     for i, solver in enumerate(solvers):
+        spent = 0.0
         for j, setup in enumerate(setups):
             error[i, j] = abs(solver.solve(setup, 0) - exact)  # compiles as well
             first = seconds_of(lambda solver=solver, setup=setup: solver.solve(setup, 0), 1)
             repeats[i, j] = max(1, int(SHORTEST / max(first, 1e-6)))
-            if first > SLOWEST:
+            spent += first
+            if first > SLOWEST * revolutions or spent > LONGEST:
                 break
+    return xr.Dataset(
+        {
+            "error": (("code", "rtol"), error, {"units": "m"}),
+            "repeats": (("code", "rtol"), repeats, {"units": "1"}),
+        },
+        coords={"code": [solver.name for solver in solvers], "rtol": rtols},
+        attrs={"law": law, "revolutions": revolutions, "reference": exact},
+    )
+
+
+def timed(runs: xr.Dataset, solvers: list[Solver], rounds: int) -> xr.Dataset:
+    """The same with processor seconds a revolution in every round."""
+    law, revolutions = runs.attrs["law"], runs.attrs["revolutions"]
+    setups = [setup_of(law, float(rtol), revolutions) for rtol in runs["rtol"].values]
+    repeats = runs["repeats"].values
+    seconds = np.full((*repeats.shape, rounds), np.nan)
     for k in range(rounds):
         for i in np.roll(np.arange(len(solvers)), k):
             for j in np.flatnonzero(repeats[i]):
                 call = lambda i=i, j=j: solvers[i].solve(setups[j], 0)  # noqa: E731
-                seconds[i, j, k] = seconds_of(call, int(repeats[i, j]))
-    return xr.Dataset(
-        {
-            "error": (("code", "rtol"), error, {"units": "m"}),
-            "seconds": (("code", "rtol", "round"), seconds, {"units": "s"}),
-        },
-        coords={"code": [solver.name for solver in solvers], "rtol": rtols},
-        attrs={"law": law, "reference": exact},
-    )
+                seconds[i, j, k] = seconds_of(call, int(repeats[i, j])) / revolutions
+    return runs.assign(seconds=(("code", "rtol", "round"), seconds, {"units": "s"}))
 
 
 def fastest(runs: xr.Dataset) -> xr.DataArray:
@@ -161,7 +200,7 @@ def batches_of(modules: list[Any], law: str) -> dict[str, tuple[Callable, int]]:
 def well_posed(law: str, samples: int) -> tuple[np.ndarray, np.ndarray]:
     """Slider positions of an ensemble by the plain loop, and on which samples two tight tolerances agree.
 
-    A latched impact speed makes some designs depend on the tolerance itself: no error can be told there.
+    A latched impact speed makes some designs depend on the tolerance itself: they have no defined error.
     """
     from peers.own_peer import plain_positions
 
@@ -171,13 +210,21 @@ def well_posed(law: str, samples: int) -> tuple[np.ndarray, np.ndarray]:
     return tighter, np.abs(tight - tighter) < 1e-2 * ENSEMBLES[law]
 
 
-def run_ensemble(
-    modules: list[Any], law: str, wanted: float, samples: int, rounds: int
-) -> xr.Dataset:
-    """Milliseconds a trajectory and revolution at equal error."""
+class Chosen(NamedTuple):
+    """A code at the loosest tolerance with which it reaches the required median error."""
+
+    batch: Callable[[Setup], np.ndarray]
+    setup: Setup
+    error: float
+
+
+def chosen_of(
+    modules: list[Any], law: str, wanted: float, samples: int
+) -> tuple[dict[str, Chosen], list[str], int]:
+    """Every code as it is to be timed, why others are not to be trusted, and how many samples have an error."""
     exact, agreed = well_posed(law, samples)
     setups = [ensemble(scene(law, float(rtol), 0, 1), samples) for rtol in TOLERANCES]
-    chosen, errors = {}, {}
+    chosen, faults = {}, []
     for name, (batch, most) in batches_of(modules, law).items():
         for setup in setups:
             part = first_of(setup, most)
@@ -185,28 +232,35 @@ def run_ensemble(
             misses = np.abs(batch(part) - exact[:count])[agreed[:count]]
             error = float(np.median(np.nan_to_num(misses, nan=np.inf)))  # a failure is no success
             if error <= wanted:
-                chosen[name], errors[name] = (batch, part), error
+                chosen[name] = Chosen(batch, part, error)
                 break
+        else:
+            faults.append(f"{name}: no tolerance brings the median error to {wanted:.0e} m")
+    return chosen, faults, int(agreed.sum())
+
+
+def run_ensemble(chosen: dict[str, Chosen], rounds: int, attrs: dict[str, Any]) -> xr.Dataset:
+    """Milliseconds a trajectory and revolution at equal error."""
     seconds = np.full((len(chosen), rounds), np.nan)
-    names = list(chosen)
+    runs = list(chosen.values())
     for k in range(rounds):
-        for i in np.roll(np.arange(len(names)), k):
-            batch, setup = chosen[names[i]]
-            seconds[i, k] = seconds_of(lambda batch=batch, setup=setup: batch(setup), 1)
-    counts = np.array([len(chosen[name][1].par) for name in names])
+        for i in np.roll(np.arange(len(runs)), k):
+            call = lambda run=runs[i]: run.batch(run.setup)  # noqa: E731
+            seconds[i, k] = seconds_of(call, 1)
+    counts = np.array([len(run.setup.par) for run in runs])
+    rtols = [run.setup.problem.rtol for run in runs]
     return xr.Dataset(
         {
             "each": (("code", "round"), seconds / counts[:, None] * 1e3, {"units": "ms"}),
-            "agreed": ((), int(agreed.sum()), {"units": "1"}),
-            "error": (("code",), [errors[name] for name in names], {"units": "m"}),
-            "rtol": (("code",), [chosen[name][1].problem.rtol for name in names], {"units": "1"}),
+            "error": (("code",), [run.error for run in runs], {"units": "m"}),
+            "rtol": (("code",), rtols, {"units": "1"}),
         },
-        coords={"code": names},
-        attrs={"law": law, "wanted": wanted, "samples": samples},
+        coords={"code": list(chosen)},
+        attrs=attrs,
     )
 
 
-# ---- what is told ----------------------------------------------------------------------------------
+# ---- what is printed ----------------------------------------------------------------------------------
 
 
 def single_table(runs: xr.Dataset) -> list[str]:
@@ -216,7 +270,8 @@ def single_table(runs: xr.Dataset) -> list[str]:
     tables = {"ms a revolution": best.median("round") * 1e3, "times ours": ratio}
     lines = []
     for title, table in tables.items():
-        lines += ["", f"single response, {runs.attrs['law']}: {title}, error up to ... m"]
+        of = f"{runs.attrs['law']}, {runs.attrs['revolutions']} revolutions"
+        lines += ["", f"single response, {of}: {title}, error up to ... m"]
         lines.append(f"{'':<24}" + "".join(f"{f'{decade:.0e}':>7}" for decade in DECADES))
         for code in runs["code"].values:
             values = table.sel(code=code).transpose("decade").values
@@ -230,7 +285,7 @@ def ensemble_table(runs: xr.Dataset) -> list[str]:
     lines = ["", f"ensemble, {runs.attrs['law']}: median error up to {runs.attrs['wanted']:.0e} m"]
     lines.append(f"{'':<24}{'ms a revolution':>16}{'times ours':>12}{'error m':>10}{'rtol':>8}")
     lines.append(
-        f"({int(runs['agreed'])} of {runs.attrs['samples']} samples have an error to tell)"
+        f"({runs.attrs['agreed']} of {runs.attrs['samples']} samples have a defined error)"
     )
     own = runs["each"].sel(code=f"{OWN} lanes")
     for code, row in by_code(runs):
@@ -261,10 +316,66 @@ def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
     figure.savefig(path, dpi=200)
 
 
+RESULTS = ROOT / "analysis" / "results" / "peers.csv"
+PAGE = ROOT / "docs" / "performance.md"
+FIRST, LAST = "<!-- peers.csv: first -->", "<!-- peers.csv: last -->"
+RECORDED = 1e-8  # m, error of the single responses that are recorded
+
+
+def summary(runs: dict[str, xr.Dataset], ensembles: dict[str, xr.Dataset]) -> list[dict[str, str]]:
+    """A row for each comparison: the fastest of the other codes, and the plain loop, in times of this package's run time."""
+    rows = []
+    for name, found in runs.items():
+        ratio = fastest(found) / fastest(found).sel(code=OWN_SINGLE)
+        near = ratio.sel(decade=RECORDED, method="nearest").median("round")
+        rows.append({"comparison": f"response, {name}", **_row(near, f"{RECORDED:.0e} m")})
+    for law, found in ensembles.items():
+        ratio = (found["each"] / found["each"].sel(code=f"{OWN} lanes")).median("round")
+        rows.append({"comparison": f"ensemble, {law}", **_row(ratio, f"{ENSEMBLES[law]:.0e} m")})
+    return rows
+
+
+def _row(ratio: xr.DataArray, error: str) -> dict[str, str]:
+    others = ratio.sel(code=[str(c) for c in ratio["code"].values if OWN not in str(c)])
+    peers = others.sel(code=others["code"] != "plain loop").dropna("code")
+    best = str(peers["code"].values[int(peers.argmin())])
+    return {
+        "error": error,
+        "plain loop": f"{float(ratio.sel(code='plain loop')):.2g}",
+        "fastest other code": best,
+        "times ours": f"{float(peers.min()):.2g}",
+    }
+
+
+def record(rows: list[dict[str, str]]) -> None:
+    """Write this processor's rows into the table of results, in place of its earlier ones, and the table into the page."""
+    same = {
+        "processor": host.processor(), "lanes": str(DEFAULT_LANES),
+        "bits": os.environ.get("HPCCLEAR_VECTOR_BITS", "widest"),
+    }  # fmt: skip
+    kept = []
+    if RESULTS.exists():
+        with RESULTS.open(newline="", encoding="utf-8") as file:
+            kept = [row for row in csv.DictReader(file) if any(row[k] != same[k] for k in same)]
+    today = datetime.date.today().isoformat()
+    kept += [{**same, "date": today, **row} for row in rows]
+    with RESULTS.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(kept[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(kept)
+    table = [f"| {' | '.join(kept[0])} |", "| --- " * len(kept[0]) + "|"]
+    table += [f"| {' | '.join(row.values())} |" for row in kept]
+    text = PAGE.read_text(encoding="utf-8")
+    between = "\n".join(["", "", *table, "", ""])
+    pattern = re.compile(f"(?<={re.escape(FIRST)}).*(?={re.escape(LAST)})", re.DOTALL)
+    PAGE.write_text(pattern.sub(lambda _: between, text), encoding="utf-8")
+
+
 def main() -> None:
-    """Load, measure, print, write."""
+    """Load, compare with the reference, measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--record", action="store_true")
     parser.add_argument("--samples", type=int, default=512)
     parser.add_argument("-o", "--output", type=Path, default=Path("benchmark_peers.nc"))
     options = parser.parse_args()
@@ -273,18 +384,39 @@ def main() -> None:
     modules, missing = load()
     for name, reason in missing.items():
         print(f"missing: {name} ({reason})")
+    solvers = {law: solvers_of(modules, law) for law in LAWS}
+    runs = {
+        f"{law}, {count} revolutions": errors_of(solvers[law], law, count, rtols)
+        for law, counts in REVOLUTIONS.items()
+        for count in counts
+    }
+    chosen = {
+        law: chosen_of(modules, law, wanted, options.samples) for law, wanted in ENSEMBLES.items()
+    }
+    faults = [
+        f"{name}: {fault}"
+        for name, found in runs.items()
+        for code in found["code"].values
+        if (fault := distrust(str(code), found["error"].sel(code=code).values))
+    ]
+    faults += [f"ensemble, {law}: {fault}" for law, (_, why, _) in chosen.items() for fault in why]
+    if faults:
+        sys.exit("\n".join(["not timed, these codes solve other equations:", *faults]))
     tree = xr.DataTree(xr.Dataset(attrs={**provenance("", ""), "missing": str(missing)}))
-    runs = {}
-    for law in LAWS:
-        runs[law] = work_precision(solvers_of(modules, law), law, rtols, rounds)
-        tree[f"single/{law}"] = xr.DataTree(runs[law])
-        print("\n".join(single_table(runs[law])), flush=True)
-    for law, wanted in ENSEMBLES.items():
-        found = run_ensemble(modules, law, wanted, options.samples, rounds)
-        tree[f"ensemble/{law}"] = xr.DataTree(found)
-        print("\n".join(ensemble_table(found)), flush=True)
+    for name, found in runs.items():
+        runs[name] = timed(found, solvers[found.attrs["law"]], rounds)
+        tree[f"single/{name}"] = xr.DataTree(runs[name])
+        print("\n".join(single_table(runs[name])), flush=True)
+    ensembles = {}
+    for law, (codes, _, agreed) in chosen.items():
+        attrs = {"law": law, "wanted": ENSEMBLES[law], "samples": options.samples, "agreed": agreed}
+        ensembles[law] = run_ensemble(codes, rounds, attrs)
+        tree[f"ensemble/{law}"] = xr.DataTree(ensembles[law])
+        print("\n".join(ensemble_table(ensembles[law])), flush=True)
     tree.to_netcdf(options.output, engine="h5netcdf")
     draw(runs, options.output.with_suffix(".png"))
+    if options.record:
+        record(summary(runs, ensembles))
 
 
 if __name__ == "__main__":

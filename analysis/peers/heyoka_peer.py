@@ -9,7 +9,17 @@ from functools import cache
 
 import heyoka as hy
 import numpy as np
-from plain_loop import CRANK, FAR, FIRST, NEAR, ROD_INERTIA, ROD_MASS, SECOND, SLIDER_MASS
+from plain_loop import (
+    CRANK,
+    FAR,
+    FIRST,
+    NEAR,
+    ROD_INERTIA,
+    ROD_MASS,
+    SECOND,
+    SLIDER_MASS,
+    STIFFNESS,
+)
 from scenes import Setup
 
 from hpcclear.dynamics import layout as at
@@ -25,7 +35,7 @@ _USED = (
     ROD_MASS,
     ROD_INERTIA,
     SLIDER_MASS,
-    *(base + k for base in (FIRST, SECOND) for k in range(3)),
+    *(base + row for base in (FIRST, SECOND) for row in (at.CLEARANCE, STIFFNESS, at.DAMPING)),
 )
 
 

@@ -7,12 +7,11 @@ from functools import cache
 import plain_loop
 from scenes import Setup
 
+from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
 from peers.system import SLIDER, Array
-
-WIDTH = 32
 
 
 def lanes_positions(setup: Setup, width: int) -> Array:
@@ -26,7 +25,8 @@ def _collected(lanes: Lanes, setup: Setup) -> Array:
 
 def _lanes_of(problem: Problem, name: str, width: int) -> Lanes:
     """Lanes that are kept between calls, as other codes keep what they have compiled."""
-    key = (problem.effects, name, problem.rtol, problem.atol, width)
+    revolutions = (problem.transient, problem.averaged)
+    key = (problem.effects, name, problem.rtol, problem.atol, revolutions, width)
     _PROBLEMS.setdefault(key, problem)
     return _kept(key)
 
@@ -77,7 +77,7 @@ SOLVERS = {f"hpcclear {name}": _solver(name) for name in ("auto", *TABLEAUS)} | 
     "plain loop": plain
 }
 BATCH = {
-    "hpcclear lanes": lambda setup: lanes_positions(setup, WIDTH),
+    "hpcclear lanes": lambda setup: lanes_positions(setup, DEFAULT_LANES),
     "plain loop": plain_positions,
 }
 LAWS = ("hunt-crossley", "frictionless", "lankarani-nikravesh")

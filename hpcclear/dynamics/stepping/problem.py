@@ -107,11 +107,13 @@ class Problem:
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
         """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at
         their starts (m), or were penetrated too deep."""
-        p, failed = Parameters(par), start.failed
-        outcome.status[failed != Status.OK] = failed[failed != Status.OK]
-        torn = (outcome.deepest > TORN * p.bearing_radius).any(axis=-1)
-        valid = np.isin(outcome.status, [status for status in Status if status.valid])
-        outcome.status[valid & torn] = Status.TORN_THROUGH
+        if not np.isfinite(start.moving).all():
+            failed = start.failed
+            outcome.status[failed != Status.OK] = failed[failed != Status.OK]
+        torn = (outcome.deepest > TORN * Parameters(par).bearing_radius).any(axis=-1)
+        if torn.any():
+            valid = np.isin(outcome.status, [status for status in Status if status.valid])
+            outcome.status[valid & torn] = Status.TORN_THROUGH
         return outcome
 
     @property
