@@ -15,7 +15,7 @@ error is at most the required one. All on one core, in processor time, everythin
 each a pass over all codes; medians of the ratios within a round. Writes benchmark_peers.nc and .png.
 
 Before anything is timed, every code must solve the same equations: a code whose error does not fall with its
-tolerance, or that reaches the required error of an ensemble at no tolerance, ends the run with exit code 1.
+tolerance, or stays tenfold above the required error of an ensemble, ends the run with exit code 1.
 """
 
 import argparse
@@ -221,21 +221,29 @@ class Chosen(NamedTuple):
 def chosen_of(
     modules: list[Any], law: str, wanted: float, samples: int
 ) -> tuple[dict[str, Chosen], list[str], int]:
-    """Every code as it is to be timed, why others are not to be trusted, and how many samples have an error."""
+    """Every code as it is to be timed, why others are not to be trusted, and how many samples have an error.
+
+    A code that comes close to the required error is left out with a line; one that does not solves other equations.
+    """
     exact, agreed = well_posed(law, samples)
     setups = [ensemble(scene(law, float(rtol), 0, 1), samples) for rtol in TOLERANCES]
     chosen, faults = {}, []
     for name, (batch, most) in batches_of(modules, law).items():
+        best = np.inf
         for setup in setups:
             part = first_of(setup, most)
             count = len(part.par)
             misses = np.abs(batch(part) - exact[:count])[agreed[:count]]
             error = float(np.median(np.nan_to_num(misses, nan=np.inf)))  # a failure is no success
+            best = min(best, error)
             if error <= wanted:
                 chosen[name] = Chosen(batch, part, error)
                 break
         else:
-            faults.append(f"{name}: no tolerance brings the median error to {wanted:.0e} m")
+            fault = f"{name}: median error {best:.1e} m at best, required {wanted:.0e} m"
+            if best > wanted / FALL:
+                faults.append(fault)
+            print(f"ensemble, {law}: not timed, {fault}")
     return chosen, faults, int(agreed.sum())
 
 
