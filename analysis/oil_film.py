@@ -57,7 +57,7 @@ def orbit(speed: float) -> np.ndarray:
     effects = {"gravity": LOAD / MASS, "contact": {"law": "hunt-crossley", "damping": 0.4}}
     scene = load_scene(
         {
-            "format_version": 2,
+            "format_version": 1,
             "mechanism": mechanism,
             "effects": effects,
             "numerics": {"transient_revolutions": 0, "averaged_revolutions": 30},

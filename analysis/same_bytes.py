@@ -52,8 +52,6 @@ INTENDED = {
     "objective_spread": "below the tolerance of the integration",
     "lyapunov_exponent": "an estimate with a half-width of its own",
     "lyapunov_exponent_limit": "a half-width",
-    "kick_growth": "an estimate with a half-width of its own",
-    "kick_growth_limit": "a half-width",
     "objective_limit": "a half-width",
     "clearance_limit": "a half-width",
     "clearance_error": "an error, not a result",

@@ -12,10 +12,12 @@ import argparse
 import ast
 import graphlib
 import io
+import re
 import statistics
 import subprocess
 import tarfile
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,6 +28,7 @@ from scipy.sparse.csgraph import connected_components
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "hpcclear"
 MANY_ARGUMENTS = 8
+LONG_MODULE = 400
 
 
 def modules(root: Path) -> dict[str, Path]:
@@ -107,6 +110,36 @@ def functions(root: Path) -> list[tuple[int, int, str]]:
     return found
 
 
+def _repeated(root: Path, texts: dict[str, str]) -> list[tuple[str, str]]:
+    """What grows where one thing is done in several ways: sizes, shared names, `Any`, imports at run time."""
+    trees = [ast.parse(text) for text in texts.values()]
+    classes = Counter(
+        node.name
+        for tree in trees
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    shared = [f"{name} {count}" for name, count in classes.most_common() if count > 1]
+    large = sum(len(text.splitlines()) > LONG_MODULE for text in texts.values())
+    loose = sum(len(re.findall(r"\bAny\b", text)) for text in texts.values())
+    upwards = sum(len(re.findall(r"import_module\(", text)) for text in texts.values())
+    commands = sum(
+        len(re.findall(r"^@(?:click\.)?command\(", text, re.M))
+        for name, text in texts.items()
+        if name.startswith(f"{PACKAGE}.cli")
+    )
+    tests = sum(len(p.read_text().splitlines()) for p in (root / "tests").rglob("*.py"))
+    return [
+        ("lines of the tests", f"{tests}"),
+        ("commands", f"{commands}"),
+        ("Any", f"{loose}"),
+        ("calls of import_module", f"{upwards}"),
+        (f"modules over {LONG_MODULE} lines", f"{large}"),
+        ("names that several public classes have", f"{len(shared)}"),
+        *[("", words) for words in shared],
+    ]
+
+
 def measure(root: Path) -> list[tuple[str, str]]:
     """What is counted, and the count in words."""
     known, edges = modules(root), arrows_of(root)
@@ -124,7 +157,9 @@ def measure(root: Path) -> list[tuple[str, str]]:
     largest = max(sizes, key=lambda name: sizes[name])
     found = functions(root)
     longest, many = max(found), sorted((n, where) for _, n, where in found if n > MANY_ARGUMENTS)
+    texts = {name: path.read_text(encoding="utf-8") for name, path in known.items()}
     return [
+        *_repeated(root, texts),
         ("entries at the top", f"{len(rooms)} folders, {len(loose)} loose modules"),
         ("import arrows between them", f"{len(arrows)}"),
         ("import circles of modules", f"{len(circles)}"),
@@ -150,9 +185,9 @@ def measure(root: Path) -> list[tuple[str, str]]:
 
 
 def checkout(commit: str, place: Path) -> Path:
-    """The package as it was at a commit, below `place`."""
+    """The package and its tests as they were at a commit, below `place`."""
     packed = subprocess.run(
-        ["git", "archive", commit, PACKAGE], cwd=ROOT, check=True, capture_output=True
+        ["git", "archive", commit, PACKAGE, "tests"], cwd=ROOT, check=True, capture_output=True
     ).stdout
     with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
         archive.extractall(place, filter="data")

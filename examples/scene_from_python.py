@@ -19,7 +19,7 @@ def four_bar(coupler: float) -> dict:
     }
     bar = {"mass": "250 g", "inertia": 2e-4}
     return {
-        "format_version": 2,
+        "format_version": 1,
         "mechanism": {
             "kind": "planar",
             "ground": {"points": {"o": [0.0, 0.0], "p": ["130 mm", 0.0]}},

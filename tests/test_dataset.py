@@ -695,11 +695,3 @@ def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, k
         assert sorted(flags) == sorted(codes)
         if "status" in found:
             np.testing.assert_array_equal(found["status"].cf == "ok", found["status"] == Status.OK)
-
-
-def test_former_names_of_variables_are_in_files_and_are_read(tmp_path):
-    found = example("effects")
-    np.testing.assert_array_equal(found["told"], found["finding"])
-    assert "deprecated" in found["told"].attrs["long_name"]
-    dataset.write(found.drop_vars("finding"), tmp_path / "older.nc")
-    assert "finding" in dataset.read(tmp_path / "older.nc")

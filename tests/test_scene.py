@@ -192,7 +192,6 @@ def test_number_and_unit(scene: Scene) -> None:
         ('joints.crank_rod.clearance="0.5 mm"', "joints.crank_rod.clearance", 5e-4),
         ("drive.speed = 600 rpm", "drive.speed", 20 * math.pi),
         ('effects.contact={law="hunt-crossley", damping=0.5}', "effects.contact.damping", 0.5),
-        ("numerics.averaged_revolutions=auto", "numerics.target_error", 2e-3),
         ("numerics.energy=true", "numerics.energy", True),
         ("joints.rod_slider.kind=ideal", "joints.rod_slider.kind", "ideal"),
         (
@@ -670,47 +669,3 @@ def test_schema_refuses_wrong_keys_and_values(name: str) -> None:
     path = next(path for path in BROKEN if path.stem == name)
     content = tomllib.loads(path.read_text())
     assert list(Draft202012Validator(scene_schema()).iter_errors(content))
-
-
-def with_numerics(**entries: object) -> Scene:
-    return load_scene(JOBS[0], [f"numerics.{name}={value}" for name, value in entries.items()])
-
-
-@pytest.mark.parametrize(
-    ("old", "expected"),
-    [
-        ({"averaged_revolutions": "auto"}, 2e-3),
-        ({"averaged_revolutions": "auto", "objective_tolerance": 2e-3}, 4e-3),
-        ({"averaged_revolutions": "auto", "objective_tolerance": "0.2 %"}, 4e-3),
-        ({"averaged_revolutions": "auto", "objective_tolerance": 0.4}, 0.5),
-        ({"averaged_revolutions": "auto", "target_error": 0.1}, 0.1),  # which it took before
-        ({"uncertainty": "true"}, None),
-    ],
-)
-def test_averages_to_a_standard_error_are_read_as_a_target_error(old, expected) -> None:
-    scene = with_numerics(**old, objective="mean-gap")
-    assert scene.numerics.target_error == expected
-    assert "target_error" in scene.readings[0]
-    again = load_scene(tomllib.loads(scene.to_toml()))
-    assert again == scene
-    assert not again.readings
-
-
-def test_averages_that_no_target_error_can_replace_take_all_revolutions_that_they_might() -> None:
-    old = {"averaged_revolutions": "auto", "objective_joints": '["crank_rod"]'}
-    scene = with_numerics(**old, max_averaged_revolutions=70)
-    assert (scene.numerics.target_error, scene.numerics.averaged_revolutions) == (None, 70)
-    peak = with_numerics(averaged_revolutions="auto", objective="peak-contact-force")
-    assert peak.numerics.target_error is None
-
-
-def test_entries_of_automatic_averages_alone_are_left_out_as_they_were_unused() -> None:
-    scene = with_numerics(objective_tolerance=0.1, uncertainty="false")
-    assert scene == with_numerics()
-    assert scene.readings == with_numerics().readings
-
-
-@pytest.mark.parametrize("value", [0.0, 1.0, '"some"', "nan", "[1]"])
-def test_a_standard_error_that_is_no_share_is_refused(value) -> None:
-    with pytest.raises(InputError, match=r"numerics\.objective_tolerance"):
-        with_numerics(averaged_revolutions="auto", objective="mean-gap", objective_tolerance=value)

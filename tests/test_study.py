@@ -400,9 +400,6 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
     run_study(scene, place, alone(), progress_style="quiet", notify=told.append)
     assert calls[0] == again  # nothing is done twice
     assert "finished" in told[0]
-    with pytest.warns(DeprecationWarning, match="notify"):
-        run_study(scene, place, alone(), progress_style="quiet", tell=told.append)
-    assert "finished" in told[-1]
 
 
 @pytest.mark.mpi

@@ -39,7 +39,6 @@ class Status(IntEnum):
     STEP_TOO_SMALL = 2
     NOT_FINITE = 3
     STALLED = 4
-    AVERAGE_CAP = 5
     NEAR_SINGULAR = 6
     WORN_THROUGH = 7
     JUMP_TOO_SHORT = 8
@@ -49,7 +48,7 @@ class Status(IntEnum):
     @property
     def valid(self) -> bool:
         """Whether the simulation ran to its end, so that its numbers mean something."""
-        return self in (Status.OK, Status.AVERAGE_CAP)
+        return self is Status.OK
 
     @property
     def message(self) -> str:
@@ -80,10 +79,6 @@ _TEXT = {
     Status.STALLED: (
         "the crank stopped before the requested revolutions were complete",
         "raise the drive torque, the initial speed or the flywheel inertia",
-    ),
-    Status.AVERAGE_CAP: (
-        "an automatic average of an earlier version was still above its target at the last revolution allowed",
-        "set numerics.target_error; see objective_spread",
     ),
     Status.NEAR_SINGULAR: (
         "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "

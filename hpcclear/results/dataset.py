@@ -34,7 +34,6 @@ from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.faults import fault_of
 from hpcclear.results.names import (
     DESIGN_VARIABLES,
-    FORMER,
     FURTHER,
     FURTHER_DIMS,
     KINDS,
@@ -106,7 +105,6 @@ def filled(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
-    data = {**data, **{FORMER[name]: values for name, values in data.items() if name in FORMER}}
     least = set(table.coords) - FURTHER_DIMS if whole else set()
     if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
@@ -392,9 +390,6 @@ def content_in(
     """Read a result file as `read` does, without xarray; raises InputError as it does."""
     place = _path(path)
     content = netcdf.load(place)
-    now = {old: new for new, old in FORMER.items() if new not in content}
-    if now.keys() & content.variables.keys():
-        content = Content({now.get(k, k): v for k, v in content.variables.items()}, content.attrs)
     fault = fault_of(content, kind)
     if fault is not None:
         raise InputError("file", str(place), fault, "Name a file that hpcclear wrote")

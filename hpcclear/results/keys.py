@@ -10,8 +10,6 @@ from hpcclear.results.content import Results
 KEY = "run_key"
 """Global attribute with the key of a run, in part, stage and final files."""
 
-_WITHOUT_EFFECT = ("lanes", "ranks")  # in keys of earlier versions; results do not depend on them
-
 
 def key_attribute(key: Mapping[str, str]) -> dict[str, str]:
     """The key of a run as a global attribute, for files that `check_key` is to recognise."""
@@ -57,9 +55,7 @@ def key_of(content: Results) -> dict[str, object]:
         found = json.loads(str(content.attrs.get(KEY, "{}")))
     except (ValueError, RecursionError):
         return {}
-    if not isinstance(found, dict):
-        return {}
-    return {name: value for name, value in found.items() if name not in _WITHOUT_EFFECT}
+    return found if isinstance(found, dict) else {}
 
 
 def _short(value: object) -> str:

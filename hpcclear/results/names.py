@@ -43,13 +43,6 @@ SECONDS_PER_SAMPLE = "seconds_per_sample"
 ALL_ON = "all on"
 """Name of the whole scene there."""
 
-FORMER = {
-    "lyapunov_exponent": "kick_growth",
-    "lyapunov_exponent_limit": "kick_growth_limit",
-    "finding": "told",
-}
-"""Former names of variables. Files have them as well, deprecated, until the next minor version."""
-
 
 def _meanings(*words: str) -> dict[str, object]:
     """Codes from 0 on, and what they mean."""
@@ -89,7 +82,6 @@ FURTHER: dict[str, dict[str, object]] = {
     "explained": _meanings("not_explained", "explained"),
     "dominated": _meanings("not_significantly", "dominated"),
 }
-FURTHER |= {FORMER[name]: FURTHER[name] for name in FORMER if name in FURTHER}
 """CF attributes beyond units and long name: what the codes mean."""
 
 
@@ -102,13 +94,10 @@ def _kind(
     whole: bool = False,
 ) -> Kind:
     """A kind of file; of a `whole` one only what is made on request may be missing."""
-    for name in (name for name in FORMER if name in table):
-        row = table[name]._replace(long_name=f"deprecated: now {name}", required=False)
-        table = {**table, FORMER[name]: row}
     coords = {name: row for name, row in table.items() if row.dims == (name,)}
     data = {name: row for name, row in table.items() if name not in coords}
     required = (
-        set(data) - {*ON_REQUEST, *JUDGED, *FORMER.values(), "label"}
+        set(data) - {*ON_REQUEST, *JUDGED, "label"}
         if whole
         else {n for n in data if data[n].required}
     )

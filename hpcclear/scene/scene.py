@@ -32,7 +32,7 @@ class Scene(ConsistentTables):
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """Texts whose unit left open what is meant, entries of an earlier version, and how each was read, a sentence each."""
+        """Texts whose unit left open what is meant, and how each was read, a sentence each."""
         return self._readings
 
     @property

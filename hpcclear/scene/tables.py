@@ -41,7 +41,7 @@ class SceneTables(Table):
     """The tables of a scene file, each valid by itself; SI numbers, frozen."""
 
     format_version: Literal[1, 2] = 1
-    """Version of the format: 2 for a planar linkage, 1 for a slider-crank."""
+    """Version of the format; 2 is read as 1."""
     mechanism: Annotated[Mechanism | Planar, Field(discriminator="kind")]
     """A slider-crank, or any planar linkage."""
     # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.

@@ -11,7 +11,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import Table, invalid, nearest
-from hpcclear.scene.former import renewed
 from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
@@ -71,7 +70,6 @@ def scene_of(kind: type[Whole], content: Mapping[str, object]) -> Whole:
 
     Source text that it carries is run: `hpcclear.scene.load_scene` sees to it that it may be.
     """
-    content, former = renewed(content)
     read: dict[str, str] = {}
     with noting(read.__setitem__), using(texts_of(content)) as packages:
         scene = validated(kind, content)
@@ -83,7 +81,7 @@ def scene_of(kind: type[Whole], content: Mapping[str, object]) -> Whole:
                 _check_study(scene, scene.study)
             except PydanticCustomError as error:
                 raise _told(error.context or {}, (), content) from None
-    scene._readings = (*former, *(_placed(content, read) if read else ()))
+    scene._readings = tuple(_placed(content, read)) if read else ()
     return scene
 
 

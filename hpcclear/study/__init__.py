@@ -17,7 +17,6 @@ command resumes from them and ends with the same bytes.
 """
 
 import sys
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -53,7 +52,6 @@ def run_study(
     fresh: bool = False,
     progress_style: Style = "auto",
     notify: Callable[[str], object] = lambda text: None,
-    tell: Callable[[str], object] | None = None,
 ) -> Path:
     """Run a complete study: sensitivity analysis, surrogates, robust optimisation, verification of the designs.
 
@@ -72,8 +70,6 @@ def run_study(
     progress_style : {"auto", "bar", "log", "quiet"}
     notify : callable
         Gets messages to the user, a sentence at a time.
-    tell : callable, optional
-        Former name of `notify`; deprecated, removed in the next minor version.
 
     Returns
     -------
@@ -88,9 +84,6 @@ def run_study(
     Stopped
         If requested to end early; everything finished is on disk.
     """
-    if tell is not None:
-        warnings.warn("use notify instead of tell", DeprecationWarning, stacklevel=2)
-        notify = tell
     if isinstance(ranks, int) and ranks > 1:
         return launched.launch(
             scene, Path(directory), ranks, fresh=fresh, progress_style=progress_style

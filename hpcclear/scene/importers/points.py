@@ -79,7 +79,7 @@ def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
         one for one in points if GROUND in (*one.bodies, one.guide if one.slide is not None else "")
     ]
     return {
-        "format_version": 2,
+        "format_version": 1,
         "mechanism": {
             "kind": "planar",
             "bodies": {name: _body(name, points, frames[name], size) for name in names},
