@@ -52,8 +52,8 @@ def source_key() -> str:
     seen = hashlib.sha256(repr((str(root), versions, _listing(root))).encode()).hexdigest()
     kept = _place()[0] / "sources"
     with contextlib.suppress(OSError, ValueError):
-        before, key = kept.read_text().split()
-        if before == seen:
+        before, key, check = kept.read_text().split()
+        if before == seen and check == _check(seen, key):
             return key
     digest = hashlib.sha256()
     for path in _compiled_sources(root):
@@ -65,9 +65,14 @@ def source_key() -> str:
     key = digest.hexdigest()[:16]
     with contextlib.suppress(OSError):  # another process reads the old file or the new one
         part = kept.with_name(f"sources.{os.getpid()}.part")
-        part.write_text(f"{seen} {key}\n")
+        part.write_text(f"{seen} {key} {_check(seen, key)}\n")
         os.replace(part, kept)
     return key
+
+
+def _check(*words: str) -> str:
+    """A digest by which a damaged file is known."""
+    return hashlib.sha256(" ".join(words).encode()).hexdigest()[:16]
 
 
 def _listing(root: Path) -> list[tuple[str, int, int, int, int]]:
