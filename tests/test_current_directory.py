@@ -3,7 +3,6 @@
 import ast
 import functools
 import importlib.metadata
-import json
 import os
 import re
 import shutil
@@ -94,7 +93,7 @@ def test_a_process_keeps_pythonpath_and_the_package_of_who_started_it(tmp_path):
     words = isolated.python("beside_it:named", "a b", "'; x")
     done = start(tmp_path, *words, PYTHONPATH=str(tmp_path))
     assert (done.returncode, done.stdout) == (0, "a b '; x\n"), done.stderr
-    words = isolated.python("hpcclear.base.host:is_running", str("x"))
+    words = isolated.python("hpcclear.base.host:is_running", "x")
     done = start(tmp_path, *words, PYTHONPATH=str(tmp_path))
     assert str(ROOT / "hpcclear" / "base" / "host.py") in done.stderr
 
@@ -102,7 +101,9 @@ def test_a_process_keeps_pythonpath_and_the_package_of_who_started_it(tmp_path):
 def test_python_m_drops_the_directory_that_python_put_first(theirs):
     for name in BEFORE:
         (theirs / f"{name}.py").unlink(missing_ok=True)
-    done = start(theirs, sys.executable, "-m", "hpcclear", "check", "slider_crank.toml", "--no-cost")
+    done = start(
+        theirs, sys.executable, "-m", "hpcclear", "check", "slider_crank.toml", "--no-cost"
+    )
     assert done.returncode == 0, done.stderr
     assert "scene hash" in done.stdout
 

@@ -16,7 +16,7 @@ import llvmlite
 import numba
 import numpy as np
 
-from hpcclear.base.private import private_folder, unwritable
+from hpcclear.base.private import private_folder, refusal
 from hpcclear.base.remarks import remark
 
 
@@ -91,19 +91,17 @@ def _listing(root: Path) -> list[tuple[str, int, int, int, int]]:
 
 @cache
 def _place() -> tuple[Path, bool]:
-    """The user's ``NUMBA_CACHE_DIR`` and True, or where that cannot be written to this package's own folder.
+    """The user's ``NUMBA_CACHE_DIR`` and True, or where that is not the user's alone this package's own folder.
 
     Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
     """
     named = os.environ.get("NUMBA_CACHE_DIR")
-    why = unwritable(Path(named)) if named else ""
+    why = refusal(Path(named).resolve()) if named else ""
     if named and not why:
         return Path(named), True
     folder = private_folder("HPCCLEAR_CACHE")
     if named:
-        remark(
-            f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}"
-        )
+        remark(f"Warning: NUMBA_CACHE_DIR {named} {why}. Compiled code is kept in {folder}")
     return folder, False
 
 
