@@ -134,8 +134,8 @@ def _compile(compiled: Any, *signature: Any) -> Any:
 
 def _keep(compiled: Any) -> None:
     """Give one function a cache, with this way of loading; Numba's own stays where a version of it has other names."""
-    with _set("CACHE_DIR", chosen_folder()):  # read where the function's own cache is made, here
-        compiled.enable_caching()
+    with _set("CACHE_DIR", chosen_folder()), suppress(RuntimeError):  # no place can be written to
+        compiled.enable_caching()  # reads the folder
     found = compiled._cache
     known = hasattr(Cache, "_load_overload") and _usual_environment is not None
     if known and isinstance(found, Cache):
