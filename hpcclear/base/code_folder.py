@@ -95,10 +95,11 @@ def _place() -> tuple[Path, bool]:
 
     Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
     """
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    why = refusal(Path(named).resolve()) if named else ""
+    named = os.environ.get("NUMBA_CACHE_DIR", "")
+    own = Path(named).resolve()
+    why = refusal(own) if named else ""
     if named and not why:
-        return Path(named), True
+        return own, True
     folder = private_folder("HPCCLEAR_CACHE")
     if named:
         remark(f"Warning: NUMBA_CACHE_DIR {named} {why}. Compiled code is kept in {folder}")

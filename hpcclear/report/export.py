@@ -160,7 +160,7 @@ Written = tuple[bytes, bytes]
 """Bytes of a file, and a part of them near one of its ends by which it is known as ours."""
 
 
-_FORMULA = re.compile(r"^(?=\s*[=+\-@＝＋－＠]|[\t\r])|(?<=[;\t\r\n])(?=[=+\-@＝＋－＠])")
+_FORMULA = re.compile(r"^(?=\s*[=+\-@＝＋－＠]|[\t\n])|(?<=[;\t\n])(?=[=+\-@＝＋－＠])")
 """Where a spreadsheet would begin to read a formula: at the start of a cell, or where its own separator makes one."""
 
 
@@ -171,7 +171,7 @@ def as_text(cell: object) -> object:
     try:
         float(cell)
     except ValueError:
-        return _FORMULA.sub("'", cell)
+        return _FORMULA.sub("'", cell.replace("\r\n", "\n").replace("\r", "\n"))
     return cell
 
 
