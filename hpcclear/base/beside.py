@@ -10,7 +10,7 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from hpcclear.base import isolated
+from hpcclear.base import isolated, kept
 from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.cores import own_cores
 from hpcclear.base.remarks import remark
@@ -37,10 +37,27 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
     if not (wanted and wanted[0] == parts[0] and own_cores() > 1):
         yield
         return
+    first = _mark(wanted[0])
+    lock = kept.lock(first, wait=False)
+    try:
+        if lock is None and kept.is_locked(
+            first
+        ):  # another process has it compiled: this one will load it
+            yield
+        else:
+            with _other(wanted):
+                yield
+    finally:
+        kept.unlock(first, lock)
+
+
+@contextlib.contextmanager
+def _other(parts: Sequence[str]) -> Iterator[None]:
+    """Have parts compiled by a process of their own; at the end of the block they are, or are this one's to compile."""
     quiet = subprocess.DEVNULL
     try:
         other = subprocess.Popen(
-            isolated.python("hpcclear.base.beside:compile_parts", *wanted),
+            isolated.python("hpcclear.base.beside:compile_parts", *parts),
             stdin=quiet, stdout=quiet, stderr=subprocess.PIPE, text=True, errors="replace",
             env={**os.environ, "NUMBA_CACHE_DIR": chosen_folder()},  # also where that is a folder of this process alone
         )  # fmt: skip

@@ -95,11 +95,12 @@ def _place() -> tuple[Path, bool]:
 
     Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
     """
-    named = os.environ.get("NUMBA_CACHE_DIR", "")
-    own = Path(named).resolve()
-    why = refusal(own) if named else ""
-    if named and not why:
-        return own, True
+    named, why = os.environ.get("NUMBA_CACHE_DIR"), ""
+    if named:
+        own = Path(named).resolve()
+        why = refusal(own)
+        if not why:
+            return own, True
     folder = private_folder("HPCCLEAR_CACHE")
     if named:
         remark(f"Warning: NUMBA_CACHE_DIR {named} {why}. Compiled code is kept in {folder}")
