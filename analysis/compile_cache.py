@@ -1,6 +1,6 @@
 """What the compile cache withstands: damaged files, many cold processes at once, kills, two versions of the package.
 
-    python analysis/compile_cache.py                # all, some 15 minutes; results/compile_cache.csv beside this file
+    python analysis/compile_cache.py --keep         # all, some 15 minutes; writes results/compile_cache.csv beside this file
     python analysis/compile_cache.py --only together --processes 4
 
 Every trial runs commands of the `hpcclear` beside this Python in processes of their own, and compares what they
@@ -228,6 +228,18 @@ def versions(place: Place) -> Iterator[Count]:
         yield Count(f"two versions, one {name}", 8, good, 0, place.most(), place.left())
 
 
+def keep(rows: list[Count]) -> None:
+    """Write rows to the results, in place of former ones of the same name."""
+    known = {}
+    if RESULTS.exists():
+        with RESULTS.open(newline="") as file:
+            known = {row[0]: row for row in list(csv.reader(file))[1:]}
+    known |= {row.what: [str(cell) for cell in row] for row in rows}
+    with RESULTS.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerows([Count._fields, *known.values()])
+
+
 def main() -> None:
     """Measure, print, and write the results."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -236,6 +248,7 @@ def main() -> None:
     parser.add_argument("--files", type=int, default=8, help="damaged files of each kind")
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", action="store_true", help="write results/compile_cache.csv")
     given = parser.parse_args()
     rng = random.Random(given.seed)
     parts: dict[str, Callable[[Place], Iterator[Count]]] = {
@@ -255,11 +268,8 @@ def main() -> None:
                 rows.append(count)
                 numbers = (*count[1:], round(time.perf_counter() - began))
                 print(f"{count.what:<48}" + "".join(f"{n:>8}" for n in numbers), flush=True)
-    if given.only is None:
-        with RESULTS.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(Count._fields)
-            writer.writerows(rows)
+    if given.keep:
+        keep(rows)
 
 
 if __name__ == "__main__":
