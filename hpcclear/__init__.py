@@ -15,6 +15,11 @@ Public names are loaded when they are first used, so that importing the package 
 - `Objective`: what an objective of one's own declares
 """
 
+import sys
+
+if sys.argv[:1] == ["-m"] and "hpcclear" in sys.orig_argv and not sys.flags.safe_path:
+    del sys.path[0]  # `python -m hpcclear`: the current directory, where any file may lie
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

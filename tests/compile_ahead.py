@@ -1,4 +1,4 @@
-"""Compile what most tests need before they begin: else each of pytest's workers compiles the same at the same time.
+"""Compile what most tests need before they begin: else pytest's workers wait for the one that compiles.
 
 `compile_ahead.py [LANES]`, by default as many as ensembles have. Steppers, steps of both orders, implicit steps and the motion
 of the quickstart; a second run finds all of it on disk.

@@ -151,6 +151,28 @@ def test_text_of_a_cell_is_never_a_formula_nor_markup(tmp_path):
     assert (cell.value, cell.data_type) == ("=1+1 <b>& ", "s")
 
 
+MARKS = ("=", "+", "-", "@", "\t", "\r", " =", "\t=", "＝", "＋", "－", "＠")
+"""What a cell begins with that a spreadsheet reads as a formula; full-width signs too."""
+
+
+def test_no_text_of_a_csv_file_is_read_as_a_formula(tmp_path):
+    """In cells and headings, also where a spreadsheet of another country separates cells at semicolons; numbers stay."""
+    labels = [f"{mark}cmd|' /C calc'!A0" for mark in MARKS]
+    labels += [f"a;{mark}SUM(1)" for mark in "=+-@"] + ["-1.5", "+3e-7", "-inf", "a, -b", "x-1"]
+    made = pd.DataFrame({"label": labels, "=signed": -1.5 - np.arange(len(labels))})
+    (tmp_path / "s.csv").write_bytes(FORMATS[".csv"](made)[0])
+    found = pd.read_csv(tmp_path / "s.csv", dtype=str, keep_default_na=False)
+    for before, after in zip(labels, found["label"], strict=True):
+        assert after.replace("'", "") == before.replace("'", "").replace("\r", "\n")
+        for cell in re.split("[;\t\r\n]", after):
+            try:
+                float(cell)
+            except ValueError:
+                assert not cell.strip().startswith(MARKS), after
+    assert list(found["label"][-5:]) == labels[-5:]
+    assert list(found["'=signed"].astype(float)) == list(made["=signed"])
+
+
 def test_what_somebody_else_wrote_is_not_replaced(tmp_path):
     dataset.write(data.samples(), tmp_path / "s.nc")
     for ending in FORMATS:

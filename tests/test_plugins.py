@@ -7,10 +7,19 @@ import sys
 from pathlib import Path
 
 import pytest
+import report_data
+import test_own_objectives as goals
+import tomli_w
+from click.testing import CliRunner
+from commands import warm_command
+from test_own_objectives import GOALS
 
 from hpcclear.base.errors import InputError
+from hpcclear.cli import cli
+from hpcclear.cli.options import remarked
 from hpcclear.ensemble.identity import run_key
 from hpcclear.plugins import KINDS, Registry, run_source, trusting, using
+from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.plugged import UntrustedSource, modules_named
@@ -158,6 +167,49 @@ def test_a_text_of_a_result_file_is_run_only_when_trusted():
         scene_of_text(scene.text, "samples.nc")
     with trusting():
         assert scene_of_text(scene.text, "samples.nc") == scene
+
+
+READING = {
+    "report": ("s.nc", "-o", "p.html"),
+    "plot": ("s.nc", "-o", "s.png"),
+    "reproduce": ("s.nc",),
+    "export": ("s.nc", "-o", "s.csv"),
+    "compare": ("s.nc", "measured.csv"),
+    "crate": (".",),
+    "merge": ("s.nc", "-o", "m.nc"),
+}
+"""Commands that read results, and the words behind them."""
+
+
+def test_a_result_runs_no_code_in_any_command_unless_trusted(tmp_path, monkeypatch):
+    """Its scene names a file, carries the text of that, and the file lies beside it as well."""
+    ran = tmp_path / "ran"
+    source = f"open({str(ran)!r}, 'a').write('ran')\n" + GOALS.read_text()
+    (tmp_path / "mygoals.py").write_text(source)
+    (tmp_path / "measured.csv").write_text("time [s],slider_position [mm]\n0,1\n0.001,2\n")
+    content = load_scene(QUICKSTART).resolved()
+    content["study"] |= {"objective": "mygoals:RmsForce"}
+    content["plugins"] = {"files": {"mygoals": {"source": source}}}
+    made = report_data.samples().assign_attrs(scene=tomli_w.dumps(content))
+    monkeypatch.chdir(tmp_path)
+    for command, words in READING.items():
+        dataset.write(made, tmp_path / "s.nc")
+        CliRunner().invoke(cli, [command, *words])
+        assert not ran.exists(), command
+    CliRunner().invoke(cli, ["reproduce", "s.nc", "--trust"])
+    assert ran.exists()
+
+
+def test_commands_name_the_file_that_a_scene_runs(tmp_path, capsys):
+    path = goals.file_with(tmp_path, "mygoals:RmsForce")
+    note = "Note: the scene names mygoals.py: its Python code runs"
+    code, output = warm_command("check", path, "--no-cost")
+    assert code == 0, output
+    assert note in " ".join(output.split())
+    remarked(load_scene(path))  # what the commands that simulate do with a scene
+    assert note in capsys.readouterr().err
+    code, output = warm_command("check", QUICKSTART, "--no-cost")
+    assert "Python code" not in output
 
 
 def test_a_note_of_a_change_smuggles_no_source_in():

@@ -221,6 +221,21 @@ def test_no_list_names_a_registry_or_a_path():
         assert not re.search(r"https?:|file:|--index|--find-links|/tmp|/opt", "\n".join(rows)), path
 
 
+@pytest.mark.parametrize("recipe", ["Dockerfile", "hpcclear.def"])
+def test_a_container_installs_tested_files_by_their_hashes(recipe):
+    """Every installation is of a list with hashes that is there for the image's Python, or takes nothing from the registry."""
+    text = (ROOT / "packaging" / recipe).read_text()
+    python = re.search(r"python:(\d+\.\d+)", text).group(1)
+    installs = re.findall(r"pip install [^&\n]*", text)
+    assert len(installs) == 2
+    listed, own = installs
+    assert "--require-hashes" in listed
+    path = re.search(r"-r '/opt/hpcclear/([^']*)'", listed).group(1)
+    assert path == f"jobs/locks/{python}/mpich,analysis.txt"
+    assert "--hash=sha256:" in (ROOT / path).read_text()
+    assert {"--no-deps", "--no-build-isolation"} <= set(own.split())
+
+
 def test_what_is_installed_fits_together():
     done = subprocess.run(
         [sys.executable, "-m", "pip", "check"], capture_output=True, text=True, check=False

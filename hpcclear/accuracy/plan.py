@@ -1,16 +1,22 @@
 """Error against core-hours, measured on some of the samples: what the `plan` command knows."""
 
-import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
 from hpcclear.accuracy.parallel import process_age_at_start
-from hpcclear.base import host, markup
+from hpcclear.base import host, isolated, markup
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
@@ -260,41 +266,48 @@ def _company(
 ) -> Iterator[None]:
     """Keep other cores busy with the same work, as the ranks of the job will."""
     others = max(min(workers, len(host.cores())) - 1, 0)
-    context = multiprocessing.get_context("spawn")
-    stop, ready = context.Event(), context.Semaphore(0)
     content = {k: v for k, v in scene.resolved().items() if k != "study"}
-    processes = [
-        context.Process(target=_keep_busy, args=(content, points, stop, ready), daemon=True)
-        for _ in range(others)
-    ]
-    if processes:
+    if others:
         notify(
             f"starting {others} more processes, to measure on cores that are as busy as those of the job"
         )
-    for process in processes:
-        process.start()
-    try:
-        for process in processes:
-            while not ready.acquire(timeout=1.0) and process.is_alive():
-                pass
+    with tempfile.NamedTemporaryFile() as work, ExitStack() as stack:
+        work.write(pickle.dumps((content, points)))
+        work.flush()
+        words = isolated.python("hpcclear.accuracy.plan:keep_busy", work.name)
+        started = [
+            stack.enter_context(
+                subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            )
+            for _ in range(others)
+        ]
+        for process in started:
+            if process.stdout is not None:
+                process.stdout.readline()  # it has begun, or has ended
         yield
-    finally:
-        stop.set()
-        for process in processes:
-            process.join()
 
 
-def _keep_busy(content: dict[str, Any], points: Points, stop: Any, ready: Any) -> None:
-    """Simulate points over and over until stopped."""
+def keep_busy(work: str) -> None:
+    """Simulate points over and over, until nobody can write to the standard input; `work`: file of scene and points."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the process that started this one
+    content, points = pickle.loads(Path(work).read_bytes())
+    threading.Thread(target=_end_with_input, daemon=True).start()
     evaluator = Evaluator(
         load_scene(content, trust=True).with_({"numerics.target_error": None}), points
     )
     evaluator.advance(0.0)
-    ready.release()
-    while not stop.is_set():
+    sys.stdout.write("busy\n")
+    sys.stdout.flush()
+    while True:
         if evaluator.pending < 2 * DEFAULT_LANES:
             evaluator.submit(np.arange(len(points)), points.values)
         evaluator.advance(0.2)
+
+
+def _end_with_input() -> None:
+    """End this process as soon as nobody can write to it any more."""
+    sys.stdin.buffer.read()
+    os._exit(0)
 
 
 def ladder(scene: Scene, error: float | None) -> tuple[float, ...]:

@@ -7,12 +7,13 @@ import contextlib
 import importlib
 import os
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from hpcclear.base import isolated, kept
 from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.cores import own_cores
+from hpcclear.base.remarks import remark
 
 PATIENCE = 120.0  # s, after which it is given up
 
@@ -36,12 +37,28 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
     if not (wanted and wanted[0] == parts[0] and own_cores() > 1):
         yield
         return
-    code = "import sys; from hpcclear.base.beside import compile_parts; compile_parts(sys.argv[1:])"
+    first = _mark(wanted[0])
+    lock = kept.lock(first, wait=False)
+    try:
+        if lock is None and kept.is_locked(
+            first
+        ):  # another process has it compiled: this one will load it
+            yield
+        else:
+            with _other(wanted):
+                yield
+    finally:
+        kept.unlock(first, lock)
+
+
+@contextlib.contextmanager
+def _other(parts: Sequence[str]) -> Iterator[None]:
+    """Have parts compiled by a process of their own; at the end of the block they are, or are this one's to compile."""
     quiet = subprocess.DEVNULL
     try:
         other = subprocess.Popen(
-            [sys.executable, "-c", code, *wanted],
-            stdin=quiet, stdout=quiet, stderr=quiet,
+            isolated.python("hpcclear.base.beside:compile_parts", *parts),
+            stdin=quiet, stdout=quiet, stderr=subprocess.PIPE, text=True, errors="replace",
             env={**os.environ, "NUMBA_CACHE_DIR": chosen_folder()},  # also where that is a folder of this process alone
         )  # fmt: skip
     except OSError:  # no room for another process
@@ -50,14 +67,17 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
     try:
         yield
         with contextlib.suppress(subprocess.TimeoutExpired):
-            other.wait(PATIENCE)
+            said = other.communicate(timeout=PATIENCE)[1]
+            for line in said.splitlines():
+                if line.startswith("Warning:"):  # a damaged file; errors are this process's to find
+                    remark(line)
     finally:
         if other.poll() is None:
             other.kill()
-            other.wait()
+        other.communicate()
 
 
-def compile_parts(parts: Sequence[str]) -> None:
+def compile_parts(*parts: str) -> None:
     """Compile parts, as `compiled_beside` names them, and note it."""
     for part in parts:
         module, function, *words = part.split(":")

@@ -7,21 +7,25 @@ algebra; and with code in which a function of that library is written out, the m
 start of a command, and code that is compiled already calls nothing of it. Numba imports it itself where it compiles.
 """
 
+import pickle
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import MethodType
 from typing import Any
 
 from numba import config, njit
 from numba.core import environment
-from numba.core.caching import Cache
+from numba.core.caching import Cache, NullCache
 from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import Signature
 
-from hpcclear.base.code_folder import chosen_folder
+from hpcclear.base import kept
+from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.width import asked_width, features
 
 
@@ -77,18 +81,76 @@ def _load_overload(cache: Any, signature: Any, context: Any) -> Any:
         return cache._load_overload(signature, context)
 
 
-def _lightly(compiled: Any) -> Any:
-    """Give one function this way of loading; Numba's own stays where a version of it has other names."""
+class _Files:
+    """Machine code of one function on disk, a file for each signature. In place of Numba's `IndexDataCacheFile`.
+
+    That has an index beside the code: a process that is killed between the two, or one that writes at the same time, leaves an
+    index that names the code of another signature.
+    """
+
+    def __init__(self, usual: Any) -> None:
+        self._start = Path(usual._cache_path) / str(usual._index_name).removesuffix(".nbi")
+        self._of = source_key(), usual._version, usual._source_stamp
+        self._locks: dict[Path, int | None] = {}
+
+    def _path(self, key: Any) -> Path:
+        name = kept.digest(repr((self._of, key)).encode()).hex()[:32]
+        return self._start.with_name(f"{self._start.name}.{name}.code")
+
+    def load(self, key: Any) -> Any:
+        """What is kept for a key; where that is nothing, None, and this process alone compiles it until `release`."""
+        path = self._path(key)
+        content = kept.read(path)
+        if content is None and path not in self._locks:
+            with suppress(OSError):  # nothing is kept then
+                path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._locks[path] = kept.lock(path)
+            content = kept.read(path)  # by whoever had the lock before
+        return None if content is None else pickle.loads(content)
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled for a key."""
+        kept.write(self._path(key), dumps(data))
+
+    def flush(self) -> None:
+        """Forget nothing: what is compiled anew replaces it."""
+
+    def release(self) -> None:
+        """Let others compile, or load what was compiled."""
+        while self._locks:
+            kept.unlock(*self._locks.popitem())
+
+
+def _compile(compiled: Any, *signature: Any) -> Any:
+    """Compile a function, or load it from this package's cache. In place of its own `compile`."""
+    if isinstance(compiled._cache, NullCache):
+        _keep(compiled)
+    try:
+        return type(compiled).compile(compiled, *signature)
+    finally:
+        if isinstance(compiled._cache, Cache) and isinstance(compiled._cache._cache_file, _Files):
+            compiled._cache._cache_file.release()
+
+
+def _keep(compiled: Any) -> None:
+    """Give one function a cache, with this way of loading; Numba's own stays where a version of it has other names."""
+    with _set("CACHE_DIR", chosen_folder()), suppress(RuntimeError):  # no place can be written to
+        compiled.enable_caching()  # reads the folder
+    found = compiled._cache
     known = hasattr(Cache, "_load_overload") and _usual_environment is not None
-    if known and isinstance(compiled._cache, Cache):
-        compiled._cache.load_overload = MethodType(_load_overload, compiled._cache)
-    return compiled
+    if known and isinstance(found, Cache):
+        found.load_overload = MethodType(_load_overload, found)
+        found._cache_file = _Files(found._cache_file)
+        found._impl.locator.ensure_cache_path = lambda: None  # `_Files` makes it
 
 
 def cached(function: object, **options: object) -> Any:
     """Compile a function for Python at its first call, or load it; `options` as those of `numba.njit`."""
-    with _set("CACHE_DIR", chosen_folder()):  # read where the function's own cache is made, here
-        return _lightly(njit(cache=True, error_model="numpy", **options)(function))
+    compiled = njit(error_model="numpy", **options)(function)
+    compiled.compile = MethodType(
+        _compile, compiled
+    )  # most functions of a program are never called
+    return compiled
 
 
 def c_function(signature: Signature, function: Any, **options: Any) -> CFunc:
@@ -99,9 +161,7 @@ def c_function(signature: Signature, function: Any, **options: Any) -> CFunc:
         locals={},
         options={"error_model": "numpy", **options},
     )
-    with _set("CACHE_DIR", chosen_folder()):
-        compiled.enable_caching()
-    _lightly(compiled).compile()
+    _compile(compiled)
     return compiled
 
 

@@ -16,7 +16,7 @@ import llvmlite
 import numba
 import numpy as np
 
-from hpcclear.base.private import private_folder, unwritable
+from hpcclear.base.private import private_folder, refusal
 from hpcclear.base.remarks import remark
 
 
@@ -52,8 +52,8 @@ def source_key() -> str:
     seen = hashlib.sha256(repr((str(root), versions, _listing(root))).encode()).hexdigest()
     kept = _place()[0] / "sources"
     with contextlib.suppress(OSError, ValueError):
-        before, key = kept.read_text().split()
-        if before == seen:
+        before, key, check = kept.read_text().split()
+        if before == seen and check == _check(seen, key):
             return key
     digest = hashlib.sha256()
     for path in _compiled_sources(root):
@@ -65,9 +65,14 @@ def source_key() -> str:
     key = digest.hexdigest()[:16]
     with contextlib.suppress(OSError):  # another process reads the old file or the new one
         part = kept.with_name(f"sources.{os.getpid()}.part")
-        part.write_text(f"{seen} {key}\n")
+        part.write_text(f"{seen} {key} {_check(seen, key)}\n")
         os.replace(part, kept)
     return key
+
+
+def _check(*words: str) -> str:
+    """A digest by which a damaged file is known."""
+    return hashlib.sha256(" ".join(words).encode()).hexdigest()[:16]
 
 
 def _listing(root: Path) -> list[tuple[str, int, int, int, int]]:
@@ -86,19 +91,19 @@ def _listing(root: Path) -> list[tuple[str, int, int, int, int]]:
 
 @cache
 def _place() -> tuple[Path, bool]:
-    """The user's ``NUMBA_CACHE_DIR`` and True, or where that cannot be written to this package's own folder.
+    """The user's ``NUMBA_CACHE_DIR`` and True, or where that is not the user's alone this package's own folder.
 
     Node-local disk by default; ``HPCCLEAR_CACHE`` names another parent. See `hpcclear.base.private.private_folder`.
     """
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    why = unwritable(Path(named)) if named else ""
-    if named and not why:
-        return Path(named), True
+    named, why = os.environ.get("NUMBA_CACHE_DIR"), ""
+    if named:
+        own = Path(named).resolve()
+        why = refusal(own)
+        if not why:
+            return own, True
     folder = private_folder("HPCCLEAR_CACHE")
     if named:
-        remark(
-            f"Warning: NUMBA_CACHE_DIR {named} cannot be written to ({why}). Compiled code is kept in {folder}"
-        )
+        remark(f"Warning: NUMBA_CACHE_DIR {named} {why}. Compiled code is kept in {folder}")
     return folder, False
 
 

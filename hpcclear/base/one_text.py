@@ -10,16 +10,19 @@ are compiled with different rules of arithmetic.
 """
 
 import ast
+import contextlib
 import hashlib
 import importlib
 import os
 import sys
 import tempfile
 from collections.abc import Callable
+from importlib.machinery import SOURCE_SUFFIXES, FileFinder, SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hpcclear.base import kept
 from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.jit import written_kind
 from hpcclear.base.text.alike import written_once
@@ -90,8 +93,10 @@ def module_of(name: str, write: Callable[[], str]) -> ModuleType:
     if loaded is not None:
         return loaded
     path = _folder() / f"{name}.py"
-    if not path.exists():
-        _keep(path, write())
+    if not _is_whole(path):
+        with kept.alone(path):
+            if not _is_whole(path):
+                _keep(path, _signed(write().encode()))
     return text_named(name)
 
 
@@ -99,7 +104,9 @@ def text_named(name: str) -> ModuleType:
     """The module of a text that is there."""
     if _TEXTS not in sys.modules:  # a package, so that one text can import from another
         package = ModuleType(_TEXTS)
-        package.__path__ = [str(_folder())]
+        folder = str(_folder())
+        package.__path__ = [folder]
+        sys.path_importer_cache[folder] = FileFinder(folder, (_Loader, SOURCE_SUFFIXES))
         sys.modules[_TEXTS] = package
     importlib.invalidate_caches()  # the folder may have changed within its date's resolution
     return importlib.import_module(f"{_TEXTS}.{name}")
@@ -108,9 +115,9 @@ def text_named(name: str) -> ModuleType:
 _TEXTS = "hpcclear_texts"
 
 
-def _keep(path: Path, text: str) -> None:
+def _keep(path: Path, text: bytes) -> None:
     """Write a file whole or not at all, and never a second time: Numba's cache goes by its date."""
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".part", delete=False) as part:
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
         part.write(text)
     try:
         os.link(part.name, path)
@@ -118,3 +125,42 @@ def _keep(path: Path, text: str) -> None:
         pass  # another rank was faster
     finally:
         os.unlink(part.name)
+
+
+class _Loader(SourceFileLoader):
+    """Takes the byte code of a text only if it is whole."""
+
+    def get_data(self, path: str) -> bytes:
+        """Return the content of a file: of the text, or of its byte code."""
+        if path == self.path:
+            return super().get_data(path)
+        content = kept.read(Path(path))
+        if content is None:
+            raise FileNotFoundError(path)
+        return content
+
+    def set_data(self, path: str, data: Any, *, _mode: int = 0o600) -> None:
+        """Keep byte code."""
+        with contextlib.suppress(OSError):
+            Path(path).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            kept.replace(Path(path), kept.digest(bytes(data)) + bytes(data))
+
+
+_SIGNED = b"# SHA-256 of the lines above: "
+
+
+def _signed(text: bytes) -> bytes:
+    """A text with its digest in a comment at its end."""
+    return text + _SIGNED + kept.digest(text).hex().encode() + b"\n"
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a text is there; one that is damaged is dropped."""
+    try:
+        stored = path.read_bytes()
+    except OSError:
+        return False
+    if stored == _signed(stored[: stored.rfind(_SIGNED)]):
+        return True
+    kept.drop(path)
+    return False

@@ -39,7 +39,7 @@ def private_folder(variable: str) -> Path:
     """
     refusals: list[str] = []
     for candidate in _candidates(variable):
-        why = _refusal(candidate)
+        why = refusal(candidate)
         if not why:
             if refusals:
                 remark(f"Warning: {'; '.join(refusals)}. Compiled code is kept in {candidate}")
@@ -70,8 +70,8 @@ def _candidates(variable: str) -> Iterator[Path]:
         yield home.absolute() / "hpcclear"
 
 
-def _refusal(folder: Path) -> str:
-    """Make a folder; return why it cannot be used, or nothing."""
+def refusal(folder: Path) -> str:
+    """Make a folder; return why code that is loaded unchecked cannot be kept in it, or nothing."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         about = folder.lstat()
@@ -79,7 +79,7 @@ def _refusal(folder: Path) -> str:
         if not stat.S_ISDIR(about.st_mode) or user not in (None, about.st_uid):
             return "is not a directory of yours"
         if user is None:  # native Windows: the directory of temporary files is the user's own
-            why = unwritable(folder)
+            why = _unwritable(folder)
             return f"cannot be written to ({why})" if why else ""
         if about.st_mode & 0o077:
             return "is open to others (chmod 700 mends that)"
@@ -88,7 +88,7 @@ def _refusal(folder: Path) -> str:
                 return f"can be exchanged by whoever may write to {parent}"
     except OSError as error:
         return f"cannot be made ({error.strerror})"
-    why = unwritable(folder)
+    why = _unwritable(folder)
     return f"cannot be written to ({why})" if why else ""
 
 
@@ -121,7 +121,7 @@ def _own_group(about: os.stat_result) -> bool:
     return name == user_name() and members <= {user_name()}
 
 
-def unwritable(folder: Path) -> str:
+def _unwritable(folder: Path) -> str:
     """Return why no file can be written into a folder, made if need be; nothing if one can."""
     try:
         folder.mkdir(parents=True, exist_ok=True)

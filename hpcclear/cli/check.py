@@ -11,6 +11,7 @@ from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.scene import Scene
+from hpcclear.scene.plugged import files_run
 
 if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
@@ -49,7 +50,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         ("MPI", _mpi(ranks)),
     ]
     out.print(table("Model", rows))
-    for text in scene.readings:
+    for text in (*files_run(scene.plugins), *scene.readings):
         out.print(remark("Note", text))
     for warning in (*locked, *_cautions(scene), *scene.warnings):
         out.print(remark("Warning", warning))

@@ -115,10 +115,11 @@ class Written(NamedTuple):
 
 
 def remarked(scene: "Scene") -> "Scene":
-    """The scene; readings of units and likely slips of units are printed."""
+    """The scene; Python files that it runs, readings of units and likely slips of units are printed."""
     from hpcclear.scene.plausibility import implausible
+    from hpcclear.scene.plugged import files_run
 
-    for text in scene.readings:
+    for text in (*files_run(scene.plugins), *scene.readings):
         say(f"Note: {text}")
     for text in implausible(scene):
         say(f"Warning: {text}")

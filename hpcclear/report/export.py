@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -159,8 +160,25 @@ Written = tuple[bytes, bytes]
 """Bytes of a file, and a part of them near one of its ends by which it is known as ours."""
 
 
+_FORMULA = re.compile(r"^(?=\s*[=+\-@＝＋－＠]|[\t\n])|(?<=[;\t\n])(?=[=+\-@＝＋－＠])")
+"""Where a spreadsheet would begin to read a formula: at the start of a cell, or where its own separator makes one."""
+
+
+def as_text(cell: object) -> object:
+    """A cell that no spreadsheet reads as a formula: text that begins like one is marked by an apostrophe; numbers stay."""
+    if not isinstance(cell, str):
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return _FORMULA.sub("'", cell.replace("\r\n", "\n").replace("\r", "\n"))
+    return cell
+
+
 def _csv(table: "DataFrame") -> Written:
-    text = table.to_csv(index=False, lineterminator="\n").encode()
+    texts = {h: table[h].map(as_text) for h in table if table[h].dtype.kind not in "biuf"}
+    safe = table.assign(**texts).rename(columns=as_text)
+    text = safe.to_csv(index=False, lineterminator="\n").encode()
     return text, text[: min(text.find(b"\n"), 1000)]  # its own headings
 
 

@@ -108,6 +108,12 @@ def with_texts(
     return {**content, **({"plugins": {"files": rows}} if rows else {})}
 
 
+def files_run(plugins: Plugins | None) -> tuple[str, ...]:
+    """Return a sentence for each Python file that was run with a scene."""
+    files = () if plugins is None else plugins.files
+    return tuple(f"the scene names {one.name}.py: its Python code runs" for one in files)
+
+
 def check_trust(content: Mapping[str, object], name: str) -> None:
     """InputError if the content carries Python text and nobody has said that it may be run; `name`: where it stands."""
     texts = texts_of(content)

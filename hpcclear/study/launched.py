@@ -7,6 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from hpcclear.base import isolated
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
 from hpcclear.ranks.stopping import Exit, Stopped
@@ -50,7 +51,8 @@ def launch(
     with tempfile.TemporaryDirectory() as folder:
         job = Path(folder) / "job.json"
         job.write_text(json.dumps(content), encoding="utf-8")
-        words = [program, "-n", str(ranks), sys.executable, "-m", "hpcclear.study", str(job)]
+        rank = isolated.python("hpcclear.study.on_ranks:main", str(job))
+        words = [program, "-n", str(ranks), *rank]
         process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True, errors="replace",

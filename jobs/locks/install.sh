@@ -39,7 +39,8 @@ locked | latest | lowest) ;;
 *) give_up "VERSIONS is locked, latest or lowest, not $versions" ;;
 esac
 
-version_of() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null; }
+# -I: no file of the current directory is taken for a module.
+version_of() { "$1" -I -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null; }
 made=$(version_of "$venv/bin/python")
 found=${made:-}
 if [ -z "$made" ] || [ -n "${PYTHON:-}" ]; then
@@ -86,10 +87,10 @@ if [ -f "$venv/.place" ] && [ "$(cat "$venv/.place")" != "$root" ]; then
 fi
 if [ -z "$made" ]; then
     python=${PYTHON:-python3}
-    "$python" -c 'import ensurepip, venv' 2>/dev/null ||
+    "$python" -I -c 'import ensurepip, venv' 2>/dev/null ||
         give_up "$python comes without venv or ensurepip; on Debian and Ubuntu: apt-get install python3-venv"
     echo "making $venv"
-    said=$("$python" -m venv "${clear[@]}" "$venv" 2>&1) || {
+    said=$("$python" -I -m venv "${clear[@]}" "$venv" 2>&1) || {
         rm -rf "$venv" # half an environment would be taken for a whole one
         explain "making $venv" "$said"
     }
@@ -97,7 +98,7 @@ if [ -z "$made" ]; then
 fi
 pip() {
     # pip would compile every module of every package, which takes longer than all else; few of them are ever loaded
-    said=$("$venv/bin/python" -m pip --quiet --disable-pip-version-check install --no-compile "$@" 2>&1) ||
+    said=$("$venv/bin/python" -I -m pip --quiet --disable-pip-version-check install --no-compile "$@" 2>&1) ||
         explain "installing hpcclear[$extras]" "$said"
 }
 echo "installing hpcclear[$extras] ($versions versions, Python $found); the first time takes a minute or two"
@@ -108,5 +109,5 @@ else
     pip --upgrade --upgrade-strategy eager -e "${root}[$extras]"
 fi
 # Loading what commands load compiles it, once and for all ranks, and for those who may only read; what is wrong with it they say.
-(cd "$root" && env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -c "import hpcclear.study, hpcclear.report") >/dev/null 2>&1
+(cd "$root" && env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -P -c "import hpcclear.study, hpcclear.report") >/dev/null 2>&1
 printf '%s\n' "$wanted" >"$stamp" || give_up "$stamp cannot be written: is the disk full?"

@@ -28,7 +28,3 @@ def main(job: str) -> int:
 
     with trusting(True):  # the scene was loaded by who started this
         return run_on_ranks(program)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))

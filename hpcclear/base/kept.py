@@ -1,0 +1,161 @@
+"""Files of the compile cache: each is whole or is made again, by one process while others wait.
+
+A file may be cut off or hold anything after a full disk, a fault of the storage or a power failure, and machine code that is
+damaged ends a process, or computes something else. So each has a digest of its content.
+"""
+
+import contextlib
+import glob
+import hashlib
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from hpcclear.base import host
+from hpcclear.base.plain import plain
+from hpcclear.base.remarks import remark
+
+PATIENCE = 300.0
+"""Seconds a process waits for one that compiles the same, once: one that was stopped keeps its lock."""
+
+SILENT = 10.0
+"""Seconds of waiting after which that is said."""
+
+_given_up = False
+
+
+def digest(content: bytes) -> bytes:
+    """SHA-256 of a content."""
+    return hashlib.sha256(content).digest()
+
+
+def read(path: Path) -> bytes | None:
+    """Return the content of a file that `write` made; None if there is none, also where it was damaged and is dropped."""
+    try:
+        stored = path.read_bytes()
+    except OSError:
+        return None
+    content = stored[32:]
+    if digest(content) == stored[:32]:
+        return content
+    drop(path)
+    return None
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all; where none can be written, nothing is kept, and that is said."""
+    try:
+        replace(path, digest(content) + content)
+    except OSError as error:
+        remark(f"Warning: compiled code is not kept: {path.parent}: {error.strerror or error}")
+
+
+def replace(path: Path, stored: bytes) -> None:
+    """Put a file in place, whole or not at all; raises OSError."""
+    with tempfile.NamedTemporaryFile(
+        dir=path.parent, prefix=f"{path.name}.", suffix=".part", delete=False
+    ) as part:
+        try:
+            part.write(stored)
+            part.flush()
+            os.replace(part.name, path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.unlink(part.name)
+            raise
+
+
+def drop(path: Path) -> None:
+    """Remove a damaged file; whoever removes it says so, on whatever rank: one line in a process."""
+    try:
+        path.unlink()
+    except FileNotFoundError:
+        return
+    except OSError:
+        pass  # somebody else's, or a directory: compiled anew every time
+    _say(f"Warning: the cache of compiled code in {path.parent} was damaged: compiling again")
+
+
+_said: list[str] = []
+
+
+def _say(text: str) -> None:
+    if not _said:
+        sys.stderr.write(f"{plain(text)}\n")
+    _said.append(text)
+
+
+@contextlib.contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """In the block no other process makes this file; where there are no locks, or one is held too long, others may."""
+    descriptor = lock(path)
+    try:
+        yield
+    finally:
+        unlock(path, descriptor)
+
+
+def lock(path: Path, wait: bool = True) -> int | None:
+    """Take the lock of a file that is to be made; return what `unlock` takes, None where it cannot be had.
+
+    It ends with the process that holds it. The lock file goes first, then the lock: one who has waited looks for the
+    file that was made before making it.
+    """
+    global _given_up
+    try:
+        descriptor = os.open(_lock_of(path), os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError:
+        return None
+    began, said = time.monotonic(), False
+    try:
+        while not _given_up:
+            try:
+                host.lock_file(descriptor)
+            except BlockingIOError:
+                pass
+            else:
+                for left in path.parent.glob(f"{glob.escape(path.name)}.*.part"):
+                    left.unlink(missing_ok=True)  # by one that was killed while writing
+                return descriptor
+            if not wait:
+                break
+            waited = time.monotonic() - began
+            if waited > SILENT and not said:
+                remark("Note: another process compiles the same code: waiting for it")
+                said = True
+            _given_up = waited > PATIENCE
+            time.sleep(0.05)
+    except OSError:  # a file system without locks
+        pass
+    except BaseException:
+        os.close(descriptor)
+        raise
+    os.close(descriptor)
+    return None
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process makes a file at this moment."""
+    try:
+        with _lock_of(path).open("rb") as file:
+            host.lock_file(file.fileno())
+    except BlockingIOError:
+        return True
+    except OSError:  # no such file, or no locks
+        pass
+    return False
+
+
+def unlock(path: Path, descriptor: int | None) -> None:
+    """Give back what `lock` returned."""
+    if descriptor is not None:
+        with contextlib.suppress(OSError):
+            os.unlink(_lock_of(path))
+        os.close(descriptor)
+
+
+def _lock_of(path: Path) -> Path:
+    return path.with_name(f"{path.name}.lock")

@@ -1,0 +1,212 @@
+"""The compile cache: a damaged file is compiled again, one process compiles while others wait, and no wait is for ever."""
+
+import errno
+import importlib
+import inspect
+import random
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from patience import crowded
+
+from hpcclear.base import cached, code_folder, host, kept, one_text
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "analysis"))
+from compile_cache import KINDS, damaged
+
+
+@pytest.fixture
+def said(monkeypatch, capsys):
+    """What is said of damaged files."""
+    monkeypatch.setattr(kept, "_said", [])
+    return lambda: [line for line in capsys.readouterr().err.splitlines() if "damaged" in line]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_whatever_a_file_holds_it_is_whole_or_dropped(tmp_path, said, kind):
+    """60 damages of a content each: cut anywhere, emptied, one bit, random bytes."""
+    rng, path, content = random.Random(KINDS.index(kind)), tmp_path / "code", bytes(range(256)) * 9
+    for _ in range(60):
+        kept.write(path, content)
+        assert kept.read(path) == content
+        path.write_bytes(damaged(path.read_bytes(), kind, rng))
+        assert kept.read(path) is None
+        assert not path.exists()
+    assert len(said()) == 1  # one line a process, however many files
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def compiled(tmp_path, monkeypatch):
+    """A function from a generated text and one of a module, each loaded or compiled anew: their values, and the loaded ones."""
+    monkeypatch.setattr(cached, "chosen_folder", lambda: str(tmp_path / "cache"))
+    monkeypatch.setattr(one_text, "_folder", lambda: tmp_path / "cache" / "texts")
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    monkeypatch.setattr(sys, "pycache_prefix", None)
+    (tmp_path / "cache" / "texts").mkdir(parents=True)
+    (tmp_path / "module.py").write_text("def twice(x):\n    return 2.0 * x\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    plain = importlib.import_module("module").twice
+
+    def load():
+        for name in [name for name in sys.modules if name.startswith("hpcclear_texts")]:
+            monkeypatch.delitem(sys.modules, name)
+        text = one_text.module_of("text", lambda: "def thrice(x):\n    return 3.0 * x\n")
+        functions = [cached.cached(one) for one in (plain, text.thrice)]
+        values = [function(1.0) for function in functions]
+        return values, sum(sum(one.stats.cache_hits.values()) for one in functions)
+
+    yield load
+    sys.modules.pop("module")
+    for name in [name for name in sys.modules if name.startswith("hpcclear_texts")]:
+        sys.modules.pop(name)
+
+
+def test_a_damaged_file_of_any_sort_is_made_again_and_that_is_said(tmp_path, compiled, said):
+    """Machine code, generated source and its byte code."""
+    assert compiled() == ([2.0, 3.0], 0)
+    assert compiled() == ([2.0, 3.0], 2)
+    files = sorted(path for path in (tmp_path / "cache").rglob("*") if path.is_file())
+    assert sorted(path.suffix for path in files) == [".code", ".code", ".py", ".pyc"]
+    rng = random.Random(4)
+    for path in files:
+        for kind in KINDS:
+            path.write_bytes(damaged(path.read_bytes(), kind, rng))
+            kept._said.clear()
+            values, loaded = compiled()
+            assert values == [2.0, 3.0]
+            assert loaded >= 1  # what was not damaged
+            assert len(said()) == 1, (path, kind)
+        assert compiled() == ([2.0, 3.0], 2)
+        assert not said()
+
+
+def test_a_damaged_note_of_the_sources_changes_no_key(tmp_path, monkeypatch):
+    """It names the folder of compiled code: a key with one wrong letter would compile all again, in another folder."""
+    monkeypatch.setattr(code_folder, "_place", lambda: (tmp_path, False))
+    right, rng = code_folder.source_key.__wrapped__(), random.Random(1)
+    whole = (tmp_path / "sources").read_bytes()
+    assert code_folder.source_key.__wrapped__() == right
+    for k in range(20):
+        (tmp_path / "sources").write_bytes(damaged(whole, KINDS[k % 4], rng))
+        assert code_folder.source_key.__wrapped__() == right
+        assert (tmp_path / "sources").read_bytes() == whole
+
+
+def test_one_of_many_makes_a_file_and_the_others_wait(tmp_path):
+    """A lock is of an open file: threads exclude each other as processes do."""
+    path, made = tmp_path / "code", []
+
+    def make(number):
+        with kept.alone(path):
+            if kept.read(path) is None:
+                time.sleep(0.02)
+                made.append(number)
+                kept.write(path, b"code")
+
+    threads = [threading.Thread(target=make, args=(number,)) for number in range(20)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) == 1
+    assert [one.name for one in tmp_path.iterdir()] == ["code"]
+
+
+HOLD = """
+import fcntl, sys, time
+file = open(sys.argv[1], "w")
+fcntl.flock(file, fcntl.LOCK_EX)
+print("held", flush=True)
+time.sleep(1000)
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """A process that holds the lock of a file, and compiles for ever."""
+    words = [sys.executable, "-I", "-S", "-c", HOLD, str(tmp_path / "code.lock")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "held\n"
+        yield process
+        process.kill()
+
+
+def test_the_lock_of_a_killed_process_is_free(tmp_path, holder, monkeypatch):
+    threading.Timer(0.2, holder.kill).start()
+    left = tmp_path / "code.abc.part"  # what it was writing
+    left.touch()
+    descriptor = kept.lock(tmp_path / "code")
+    assert descriptor is not None
+    kept.unlock(tmp_path / "code", descriptor)
+    assert holder.wait() != 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nobody_waits_for_ever_and_only_once(tmp_path, holder, monkeypatch):
+    """For a process that was stopped, or hangs: this one compiles for itself, and waits for no other source either."""
+    monkeypatch.setattr(kept, "PATIENCE", 0.2)
+    monkeypatch.setattr(kept, "_given_up", False)
+    assert kept.lock(tmp_path / "code") is None
+    monkeypatch.setattr(kept, "PATIENCE", 1000.0)
+    began = time.monotonic()
+    assert kept.lock(tmp_path / "code") is None
+    assert time.monotonic() - began < crowded(10.0)
+    assert holder.poll() is None
+
+
+@pytest.mark.parametrize("fault", ["no locks", "read-only", "full"])
+def test_where_nothing_can_be_locked_or_kept_everyone_compiles(tmp_path, compiled, monkeypatch, fault):  # fmt: skip
+    """As on some network file systems, and where a place has become read-only since the process began."""
+
+    def refuse(*words, **more):
+        raise OSError(errno.EROFS if fault == "read-only" else errno.ENOLCK, "refused")
+
+    if fault == "no locks":
+        monkeypatch.setattr(host, "lock_file", refuse)
+    else:
+        compiled()
+        for path in (tmp_path / "cache").rglob("*.code"):
+            path.unlink()
+        monkeypatch.setattr(kept, "replace", refuse)
+    if fault == "read-only":
+        monkeypatch.setattr(kept.os, "open", refuse)
+    assert compiled() == ([2.0, 3.0], 0)
+    assert compiled() == ([2.0, 3.0], 2 if fault == "no locks" else 0)
+
+
+def test_an_error_while_compiling_gives_the_lock_back(tmp_path, monkeypatch):
+    monkeypatch.setattr(cached, "chosen_folder", lambda: str(tmp_path))
+
+    def wrong(x):
+        return x.nothing
+
+    for _ in range(2):
+        with pytest.raises(Exception, match="nothing"):
+            cached.cached(wrong)(1.0)
+        assert not list(tmp_path.rglob("*.lock"))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("part", ["damage", "together", "kills", "versions"])
+def test_commands_with_such_a_cache(part):
+    """`analysis/compile_cache.py` in small: exit codes, bytes, lines and counts of compilations of real commands and ranks."""
+    import compile_cache
+
+    program = Path(inspect.getfile(compile_cache))
+    few = ["--only", part, "--processes", "6", "--files", "2", "--kills", "6", "--seed", "2"]
+    done = subprocess.run(
+        [sys.executable, str(program), *few], capture_output=True, text=True, timeout=crowded(900.0)
+    )
+    assert done.returncode == 0, done.stderr
+    for line in done.stdout.splitlines()[1:]:
+        trials, right, said, most, left = map(int, line.split()[-6:-1])
+        assert right == trials, done.stdout
+        assert left == 0
+        assert most <= (2 if part == "versions" else 1), done.stdout
+        assert said == (trials if part == "damage" else 0), done.stdout
+        assert "errors" not in line or "(0 errors)" in line
