@@ -1,6 +1,5 @@
 """Linkages without clearance whose drives prescribe everything: time series and extremes, nothing integrated."""
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -59,11 +58,8 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
 
 def _curves(scene: Scene) -> dict[str, Any]:
     """Tabulated loads by name, each as a function of the angle or time that it goes by."""
-    interpolation = scene.numerics.interpolation
-    return {
-        name: partial(curve.at, interpolation=interpolation)
-        for name, curve in curves_of(scene.linkage).items()
-    }
+    curves = curves_of(scene.linkage, scene.numerics.interpolation)
+    return {name: curve.at for name, curve in curves.items()}
 
 
 def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
