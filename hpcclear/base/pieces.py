@@ -123,6 +123,7 @@ def _moved(cubics: Array, by: float) -> Array:
 
 
 # ---- where steps of an integration end ---------------------------------------------------------
+_INSIDE = np.linspace(0.0, 1.0, 5)  # of each piece: what is compared with a cubic
 _CHEBYSHEV = 0.5 - 0.5 * np.cos(np.arange(5) * np.pi / 4)  # on [0, 1]; differences there are
 _WEIGHTS = np.array([1.0, -2.0, 2.0, -2.0, 1.0]) / 8.0  # what no cubic can follow
 
@@ -135,9 +136,9 @@ def breaks(curve: Pieces, tolerance: float) -> Array:
     starts, cubics = curve.starts, curve.cubics
     ends = np.append(starts[1:], 1.0)
     h = ends - starts
-    middle = _values(cubics, 0.5 * h)
-    ordinates = np.concatenate([cubics[:, 0], middle, _values(cubics[-1:], h[-1:])])
-    size = tolerance * (ordinates.max() - ordinates.min())
+    places = starts[:, None] + h[:, None] * _INSIDE
+    inside = np.column_stack([_values(cubics, h * one) for one in _INSIDE])
+    size = tolerance * float(np.ptp(np.append(inside, _values(cubics[-1:], h[-1:]))))
     if not size > 0.0:
         return np.zeros(0)
     forced = _bends(curve, starts, ends) > size
@@ -146,7 +147,7 @@ def breaks(curve: Pieces, tolerance: float) -> Array:
     for first, last in pairwise(edges):
         if first:
             found.append(starts[first])
-        while (end := _followed(starts, ends, cubics, middle, first, last, size)) < last:
+        while (end := _followed(places, inside, first, last, size)) < last:
             found.append(starts[end])
             first = end
     if curve.repeats:
@@ -173,16 +174,11 @@ def _bends(curve: Pieces, starts: Array, ends: Array) -> Array:
     return np.abs(total)
 
 
-def _followed(
-    starts: Array, ends: Array, cubics: Array, middle: Array, first: int, last: int, size: float
-) -> int:
+def _followed(places: Array, values: Array, first: int, last: int, size: float) -> int:
     """The last piece (not included) up to which one cubic follows those from `first` on within a size."""
 
     def follows(end: int) -> bool:
-        part = slice(first, end)
-        x = np.concatenate([starts[part], 0.5 * (starts[part] + ends[part]), ends[end - 1 : end]])
-        final = _values(cubics[end - 1 : end], ends[end - 1 : end] - starts[end - 1 : end])
-        y = np.concatenate([cubics[part, 0], middle[part], final])
+        x, y = places[first:end].ravel(), values[first:end].ravel()
         s = (x - x[0]) * (2.0 / (x[-1] - x[0])) - 1.0
         basis = np.polynomial.chebyshev.chebvander(s, 3)
         left = y - basis @ np.linalg.lstsq(basis, y, rcond=None)[0]

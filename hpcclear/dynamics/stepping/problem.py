@@ -27,6 +27,9 @@ THROWN_BACK = 0.0873
 """How far (5 degrees) from its start a body that a torque drives may turn back, rad, in its first revolution from rest:
 the first impacts in its joints throw it."""
 
+FOLLOWED = 0.1
+"""Times the root of the relative tolerance: what part of a table's range may escape a step between two rows that end steps."""
+
 IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 """When lanes take implicit steps: never, where their motion is stiff, always."""
 
@@ -121,4 +124,4 @@ class Problem:
     @cached_property
     def tables(self) -> Array:
         """The tabulated curves as the kernel reads them (`layout.curves.packed`)."""
-        return packed(self.curves, math.sqrt(self.rtol))
+        return packed(self.curves, FOLLOWED * math.sqrt(self.rtol))
