@@ -48,7 +48,7 @@ def choose_step(rules, work, par, W):
             work[at.STEP * W + i] = h
 
 
-ROW_REACH = 1e-5
+ROW_REACH = 1e-7
 """Part of a step that a row of a table may stand from its end: a corner of the load there does no harm."""
 
 
