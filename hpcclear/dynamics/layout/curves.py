@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.pieces import Pieces, breaks
+from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics import layout as at
 
 (
@@ -28,20 +28,19 @@ HEAD = 9
 MOST_INTERVALS = 1 << 16
 
 
-def packed(curves: Sequence[Pieces], tolerance: float) -> Array:
-    """All curves in one array; `tolerance`: as of `base.pieces.breaks`."""
+def packed(curves: Sequence[Pieces], stops: Sequence[Array]) -> Array:
+    """All curves in one array; `stops`: where steps end, of each, shares of its length."""
     head = np.zeros((at.MAX_CURVES, HEAD))
     parts, free = [], head.size
-    for k, curve in enumerate(curves):
+    for k, (curve, ends) in enumerate(zip(curves, stops, strict=True)):
         grid, halvings = _grid(curve.starts)
-        stops = breaks(curve, tolerance)
         places = []
-        for part in (grid, curve.starts, curve.cubics.ravel(), stops):
+        for part in (grid, curve.starts, curve.cubics.ravel(), ends):
             places.append(free)
             parts.append(part)
             free += len(part)
         head[k] = (
-            places[0], len(grid) - 1, places[1], len(curve.starts) - 1, halvings, places[2], places[3], len(stops),
+            places[0], len(grid) - 1, places[1], len(curve.starts) - 1, halvings, places[2], places[3], len(ends),
             curve.repeats,
         )  # fmt: skip
     return np.concatenate([head.ravel(), *parts])

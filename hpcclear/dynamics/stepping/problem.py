@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
-from hpcclear.base.pieces import Pieces
+from hpcclear.base.pieces import Pieces, breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.layout.settings import STRICT
@@ -124,4 +124,10 @@ class Problem:
     @cached_property
     def tables(self) -> Array:
         """The tabulated curves as the kernel reads them (`layout.curves.packed`)."""
-        return packed(self.curves, FOLLOWED * math.sqrt(self.rtol))
+        return packed(self.curves, self.stops)
+
+    @cached_property
+    def stops(self) -> tuple[Array, ...]:
+        """Where steps end in each curve, shares of its length: at rows around which it bends (`base.pieces.breaks`)."""
+        tolerance = FOLLOWED * math.sqrt(self.rtol)
+        return tuple(breaks(curve, tolerance) for curve in self.curves)
