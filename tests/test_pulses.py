@@ -229,3 +229,54 @@ def test_steps_end_where_no_cubic_follows():
     assert len(breaks(periodic(((0.0, 2.0), (1.0, 2.0)), TURN), 1e-4)) == 0
     cam = tuple((float(t), float(np.sin(TURN * t))) for t in np.linspace(0, 1, 73))
     assert len(breaks(angle_pieces(cam)[2], 1e-4)) < 60
+
+
+# ---- other variables and other steppers --------------------------------------------------------------
+
+
+def test_of_two_turns_a_pulse_stands_in_one():
+    """A table of 720 degrees whose pulse is in the second turn."""
+    motor = {
+        "kind": "torque", "body": "crank", "torque": 0.0, "initial_speed": "3000 rpm", "flywheel_inertia": INERTIA,
+        "turns": 2,
+    }  # fmt: skip
+    for width in WIDTHS[2:]:
+        rows = pulse("triangle", width, 5.0)
+        rows = [[0.0, 0.0], *([a + TURN, v] for a, v in rows[1:])]
+        found = simulate(engine(gas(rows), motor))
+        angle = found["crank_angle"].to_numpy()
+        assert angle[-1] - angle[0] == pytest.approx(2 * TURN)
+        right = integral(rows, angle[0], angle[-1], 2 * TURN, lever)
+        assert abs(right) > 1.0
+        assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-2)
+
+
+def test_a_pulse_over_another_body_s_angle():
+    """The rod's angle is -asin(CRANK sin(a)/ROD): it passes the pulse on its way up and on its way down."""
+    for width in WIDTHS[1:]:
+        rows = [
+            [float(np.radians(a)), v]
+            for a, v in ((0, 0), (2, 0), (2 + width / 2, 900.0 / width), (2 + width, 0))
+        ]
+        load = {"kind": "torque", "body": "rod", "angle_of": "rod", "torque": rows}
+        found = simulate(engine(load, rtol=1e-8))
+        rod = found["body_angle"].sel(body="rod").to_numpy()
+        right = np.array([integral(rows, rod[0], one, TURN) for one in rod[::40]])
+        work = found["load_work"].to_numpy()[::40]
+        largest = np.abs(right).max()
+        assert largest > 1.0
+        np.testing.assert_allclose(work, right, rtol=0, atol=1e-4 * largest)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "numerics", [{"formulation": "baumgarte"}, {"method": "radau"}], ids=["baumgarte", "radau"]
+)
+def test_other_steppers_feel_them_too(numerics):
+    for kind in KINDS:
+        for width in (10.0, 1.0):
+            rows = pulse(kind, width, 5.0)
+            found = simulate(engine(gas(rows), **numerics))
+            angle = found["crank_angle"].to_numpy()
+            right = integral(rows, angle[0], angle[-1], TURN, lever)
+            assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-2), (kind, width)
