@@ -52,6 +52,10 @@ ROW_REACH = 1e-7
 """Part of a step that a row of a table may stand from its end: a corner of the load there does no harm."""
 
 
+ROUNDED = 1e-15
+"""Of a place, which is a number of lengths before whole ones are taken off."""
+
+
 @lane_function
 def shorten_to_rows(rules, work, W):
     """End steps at the next row of each table where a step ends, as far off as the rate of its place says."""
@@ -80,13 +84,21 @@ def moved_on(work, c, i, W):
 
 
 @lane_function
+def row_reach(work, c, moved, i, W):
+    """How near the end of a step a row is taken to be there: no nearer than places are rounded."""
+    rate = abs(work[(at.RATE_NOW + at.PLACE_RATES + c) * W + i])
+    lengths = (work[at.BEGAN * W + i] + work[at.TIME * W + i]) * rate
+    return ROW_REACH * abs(moved) + ROUNDED * (lengths + 100.0)
+
+
+@lane_function
 def flag_rows(rules, work, W):
     """Mark accepted lanes whose step ends at or beyond such a row."""
     for curve in range(rules.curves):
         c = curve & at.CURVE_MASK
         for i in range(W):
             moved = moved_on(work, c, i, W)
-            reach = ROW_REACH * abs(moved)
+            reach = row_reach(work, c, moved, i, W)
             on = 1.0 if moved >= work[(at.AHEAD + c) * W + i] - reach else 0.0
             left = work[(at.BEHIND + c) * W + i] - reach
             back = 1.0 if (moved < 0.0) & (-moved >= left) else 0.0

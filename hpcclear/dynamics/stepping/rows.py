@@ -9,7 +9,7 @@ import math
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.curves import BREAK_COUNT, BREAKS, HEAD, REPEATS
-from hpcclear.dynamics.stepping.control import ROW_REACH, moved_on
+from hpcclear.dynamics.stepping.control import moved_on, row_reach
 from hpcclear.dynamics.stepping.events import impact_fraction
 from hpcclear.dynamics.stepping.stops import cut
 
@@ -22,7 +22,7 @@ def before_row(lane, W, work, c):
     moved = moved_on(work, c, lane, W)
     way = 1.0 if moved > 0.0 else -1.0
     left = work[((at.AHEAD if moved > 0.0 else at.BEHIND) + c) * W + lane]
-    reach = ROW_REACH * abs(moved)
+    reach = row_reach(work, c, moved, lane, W)
     if abs(moved) <= left + reach or left <= reach:
         return 2.0
     h = way * work[at.STEP * W + lane]
@@ -86,7 +86,7 @@ def next_rows(lane, W, work, tables, c):
     place = work[(at.RATE_NOW + at.PLACES + c) * W + lane]
     ahead = work[(at.AHEAD + c) * W + lane] - moved
     behind = work[(at.BEHIND + c) * W + lane] + moved
-    reach = ROW_REACH * abs(moved)
+    reach = row_reach(work, c, moved, lane, W)
     if count == 0:
         ahead, behind = FAR, FAR
     elif ahead + behind <= 0.0:
