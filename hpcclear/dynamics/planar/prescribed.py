@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
@@ -123,9 +123,9 @@ def _crossed(stops: Array, angle: Array, spin: Array, times: Array, length: floa
     return np.asarray(times[k] + h * s) if len(k) else np.zeros(0)
 
 
-def _within(count: Array) -> Array:
+def _within(count: Integers) -> Integers:
     """0, 1, ... for each of groups of so many."""
-    return np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return np.asarray(np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count))
 
 
 def _between(d0: Array, m0: Array, d1: Array, m1: Array, s: Array) -> Array:
