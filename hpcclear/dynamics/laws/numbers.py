@@ -61,7 +61,7 @@ def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> An
     with np.errstate(all="ignore"):
         try:
             return with_words(function, _ARRAYS, _BUILT_IN)(*values)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, ZeroDivisionError, OverflowError):
             return _one_by_one(function, values)
 
 
@@ -75,9 +75,10 @@ def _one_by_one(function: Callable[..., object], values: list[Any]) -> Any:
 
 
 def _safely(function: Callable[..., object], row: list[float]) -> Any:
-    """A value; NaN where Python's own arithmetic gives none."""
+    """A value; NaN where Python's own arithmetic gives no real one."""
     try:
-        return function(*row)
+        found = function(*row)
+        return math.nan if isinstance(found, complex) else found
     except (ZeroDivisionError, OverflowError, ValueError):
         return math.nan
 

@@ -16,6 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.arithmetic import FormulaError, check_count, fold
+
+LawError = FormulaError
+
 WORDS = {
     "sqrt": "math.sqrt", "exp": "powers.exponential", "log": "powers.logarithm", "tanh": "powers.tanh",
     "atan": "powers.arctan", "arctan": "powers.arctan", "abs": "abs", "fabs": "abs", "absolute": "abs",
@@ -25,14 +29,6 @@ WORDS = {
 """What a law may call, of Python, `math` or NumPy, and how that is written in the lanes."""
 
 MOST_POWER = 9.0
-
-
-class LawError(ValueError):
-    """A law's function has more in it than a law may have, or a fault; the message says what, and `remedy` what to do."""
-
-    def __init__(self, reason: str, remedy: str = "Write arithmetic of numbers alone") -> None:
-        self.reason, self.remedy = reason, remedy
-        super().__init__(reason)
 
 
 def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
@@ -66,7 +62,10 @@ def written(function: Callable[..., object], name: str, title: str) -> list[str]
     LawError
         If it has more in it than arithmetic.
     """
-    return _Writer(title).function(function, name)
+    try:
+        return _Writer(title).function(function, name)
+    except RecursionError:
+        raise LawError(f"{title} is nested too deeply", "Split it into parts") from None
 
 
 class _Writer:
@@ -254,7 +253,7 @@ class _Writer:
         if isinstance(number, ast.BinOp) and all(
             isinstance(one, ast.Constant) for one in (number.left, number.right)
         ):  # such as 3/2
-            number = ast.Constant(eval(compile(ast.Expression(number), "", "eval"), {}))
+            number = fold(number)
         if isinstance(number, ast.Constant):
             value = float(self.number(number.value))
             if value > MOST_POWER:
@@ -275,10 +274,7 @@ class _Writer:
         if name == "float" and known:
             return texts[0]
         if known and name in WORDS:
-            if WORDS[name] in ("no_more", "no_less") and len(texts) != 2:
-                raise LawError(
-                    f"{self.title} calls {name} with more or fewer than two numbers", "Nest it"
-                )
+            check_count(name, len(texts))
             return self.let(f"{WORDS[name]}({', '.join(texts)})")
         if isinstance(function, FunctionType):
             return self.let(f"{self.helper(function)}({', '.join(texts)})")
