@@ -12,7 +12,7 @@ from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import Table, invalid, nearest
 from hpcclear.scene.former import renewed
-from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables, plain
@@ -73,7 +73,7 @@ def scene_of(kind: type[Whole], content: Mapping[str, object]) -> Whole:
     """
     content, former = renewed(content)
     read: dict[str, str] = {}
-    with noting(read.__setitem__), using(texts_of(content)) as packages:
+    with noting(read.__setitem__), of_kinds(content), using(texts_of(content)) as packages:
         scene = validated(kind, content)
         rows = {name: {"version": version} for name, version in sorted(packages.items())}
         if rows != content.get("plugins", {}).get("packages", {}):
