@@ -116,7 +116,7 @@ class _Reader:
                 known = number_of(made)
                 return ast.UnaryOp(sign, made) if known is None else constant(-known)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _SIGNS:
-                return fold(ast.BinOp(self.number(left), op, self.number(right)))
+                return fold(ast.BinOp(self.number(left), op, self.number(right)), node)
             case ast.IfExp(test=test, body=yes, orelse=no) if self.words:
                 return ast.IfExp(self.condition(test), self.number(yes), self.number(no))
             case ast.Call(func=ast.Name(id=word), args=given, keywords=[]) if word in self.words:
@@ -153,13 +153,40 @@ class _Reader:
 
 
 def number_of(node: ast.expr) -> float | None:
-    """The value of a number as `constant` has it; None of anything else."""
+    """The value of a number, with its sign; None of anything else, infinite of one that no float holds."""
     match node:
-        case ast.Constant(value=float() as value):
-            return value
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=float() as value)):
-            return -value
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            try:
+                return float(value)
+            except OverflowError:
+                return math.inf
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as inner):
+            size = number_of(inner)
+            return None if size is None else -size
     return None
+
+
+def constant_of(node: ast.expr, named: Callable[[str], object]) -> float | None:
+    """The value of a part made of numbers, and of names that `named` knows a number for; None of any other.
+
+    Raises
+    ------
+    FormulaError
+        If it has no finite value.
+    """
+    match node:
+        case ast.BinOp(left=left, right=right) if type(node.op) in _SIGNS:
+            sides = [constant_of(one, named) for one in (left, right)]
+            if None in sides:
+                return None
+            first, second = (constant(one) for one in sides if one is not None)
+            return number_of(fold(ast.BinOp(first, node.op, second), node))
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=inner):
+            value = constant_of(inner, named)
+            return -value if value is not None and isinstance(sign, ast.USub) else value
+        case ast.Name(id=name):
+            return number_of(ast.Constant(named(name)))  # type: ignore[arg-type]
+    return number_of(node)
 
 
 def constant(value: float) -> ast.expr:
@@ -168,8 +195,10 @@ def constant(value: float) -> ast.expr:
     return ast.UnaryOp(ast.USub(), made) if math.copysign(1.0, value) < 0.0 else made
 
 
-def fold(node: ast.BinOp) -> ast.expr:
+def fold(node: ast.BinOp, written: ast.expr | None = None) -> ast.expr:
     """The number that an operation on two numbers gives; the operation itself where one of them is none.
+
+    `written`: the part as messages show it.
 
     Raises
     ------
@@ -179,11 +208,12 @@ def fold(node: ast.BinOp) -> ast.expr:
     if type(node.op) not in _SIGNS:
         raise FormulaError(f"contains more than arithmetic: {_shown(node)}")
     left, right = number_of(node.left), number_of(node.right)
+    written = node if written is None else written
     if isinstance(node.op, ast.Div) and right == 0.0:
-        raise FormulaError(f"divides by zero: {_shown(node)}", "Correct it")
+        raise FormulaError(f"divides by zero: {_shown(written)}", "Correct it")
     if left is None or right is None:
         return node
-    return folded(node, lambda: _SIGNS[type(node.op)](left, right))
+    return folded(written, lambda: _SIGNS[type(node.op)](left, right))
 
 
 def folded(node: ast.expr, made: Callable[[], float]) -> ast.expr:

@@ -77,7 +77,10 @@ def is_share(entry: object) -> bool:
 def note_share(share: str, unit: str, about: str) -> None:
     """Note how a percentage is read where the number itself has no unit, so that it might be one of its own."""
     if not unit:
-        note(share, f"{share.strip()} of {about}; for a width of that many hundredths write a plain number")
+        note(
+            share,
+            f"{share.strip()} of {about}; for a width of that many hundredths write a plain number",
+        )
 
 
 def _paths(name: str, row: Mapping[str, object], variable: object) -> tuple[str, ...]:

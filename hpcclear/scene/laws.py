@@ -199,6 +199,8 @@ class LawTable(Table):
             raise invalid(
                 f"is no {cls.kind} law", f"Make it a hpcclear.{what}, see docs/extending.md", "law"
             )
+        with as_mended("law"):
+            _module("checks").check_parameters(law)
         return law
 
     @classmethod
@@ -219,7 +221,10 @@ class LawTable(Table):
         ):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
         with as_mended(entry):
-            return _module("formula").law_of(cls.kind, text, units)
+            law = _module("formula").law_of(cls.kind, text, units)
+        with as_mended("units"):
+            _module("checks").check_parameters(law)
+        return law
 
     @classmethod
     def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
@@ -251,9 +256,6 @@ class LawTable(Table):
         """Values of the law's parameters, defaults filled in."""
         found = {}
         theirs = law.name not in our_laws(cls.kind)
-        if theirs:
-            with as_mended("law" if law.name != "expression" else "units"):
-                _module("checks").check_parameters(law)
         for parameter in law.parameters:
             if parameter.name in cls._own():
                 reason = f"{law.name} has a parameter {parameter.name!r}, which is an entry of every law's table"

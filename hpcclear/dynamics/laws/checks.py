@@ -93,6 +93,7 @@ def _check_declared(law: Law) -> None:
         )
 
 
+@lru_cache(maxsize=256)
 def check_parameters(law: Law) -> None:
     """LawError unless a law's parameters are parameters, of names that a function may have, in units that are known."""
     if len(law.parameters) > MOST_PARAMETERS:
@@ -189,7 +190,8 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
     def run(title: str, function: Callable[..., Any], unit: str) -> Any:
         asked = (given[name] for name in law.arguments(function))
         try:
-            return _in_unit(law, with_words(function, WORDS, {})(*asked), title, unit)
+            with np.errstate(all="ignore"):
+                return _in_unit(law, with_words(function, WORDS, {})(*asked), title, unit)
         except (ZeroDivisionError, OverflowError):
             reason = f"{title} is not finite"
             raise LawError(reason, "Correct the formula, or the parameters") from None
@@ -201,8 +203,12 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
         except LawError:
             raise
         except (TypeError, ValueError, ArithmeticError, LookupError, NameError) as error:
-            reason = f"{title} raised {type(error).__name__}: {error}"
-            raise LawError(reason, "Correct the function") from None
+            said = f"raised {type(error).__name__}: {error}"
+            if "Cannot compare" in str(error):  # of pint, whose classes nobody here knows
+                said = "does not fit its units: it compares a quantity with a plain number"
+            elif "complex" in str(error):
+                said = "has no real value"
+            raise LawError(f"{title} {said}", "Correct the formula") from None
 
     for made_once in law.worked_out():
         given |= run("once", made_once, "")
@@ -273,6 +279,8 @@ def _in_unit(law: Law, found: Any, title: str, unit: str) -> Any:
         }
     own = unit_of(unit, title).units
     if not hasattr(found, "magnitude"):
+        if isinstance(found, complex):
+            raise LawError(f"{title} has no real value", "Correct the formula")
         if isinstance(found, bool) or not isinstance(found, int | float):
             raise LawError(
                 f"{title} returns {type(found).__name__}, which is no number", "Correct it"

@@ -60,7 +60,8 @@ def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> An
     values = [given[name] for name in names]
     with np.errstate(all="ignore"):
         try:
-            return with_words(function, _ARRAYS, _BUILT_IN)(*values)
+            found = with_words(function, _ARRAYS, _BUILT_IN)(*values)
+            return _one_by_one(function, values) if _is_complex(found) else found
         except (TypeError, ValueError, ZeroDivisionError, OverflowError):
             return _one_by_one(function, values)
 
@@ -68,19 +69,27 @@ def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> An
 def _one_by_one(function: Callable[..., object], values: list[Any]) -> Any:
     shape = np.broadcast_shapes(*(np.shape(one) for one in values))
     flat = [np.broadcast_to(np.asarray(one, float), shape).ravel() for one in values]
-    rows = [_safely(function, [float(one) for one in row]) for row in zip(*flat, strict=True)]
+    rows = [_safely(function, list(row)) for row in zip(*flat, strict=True)]
     if rows and isinstance(rows[0], Mapping):
         return {name: np.array([row[name] for row in rows]).reshape(shape) for name in rows[0]}
     return np.array(rows, float).reshape(shape)
 
 
 def _safely(function: Callable[..., object], row: list[float]) -> Any:
-    """A value; NaN where Python's own arithmetic gives no real one."""
+    """A value; infinite or NaN where Python's own arithmetic gives no real one."""
+    numbers = [np.float64(one) for one in row]
     try:
-        found = function(*row)
-        return math.nan if isinstance(found, complex) else found
-    except (ZeroDivisionError, OverflowError, ValueError):
-        return math.nan
+        found = function(*numbers)
+    except (ZeroDivisionError, OverflowError, ValueError, TypeError):  # of Python's own floats
+        found = None
+    if found is None or _is_complex(found):
+        found = with_words(function, _ARRAYS, _BUILT_IN)(*numbers)
+    return found
+
+
+def _is_complex(found: object) -> bool:
+    parts = found.values() if isinstance(found, Mapping) else (found,)
+    return any(map(np.iscomplexobj, parts))
 
 
 def sample_numbers(law: Law, given: Mapping[str, object]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arithmetic import FormulaError, check_count, fold
+from hpcclear.base.arithmetic import FormulaError, check_count, constant_of
 
 LawError = FormulaError
 
@@ -222,9 +222,13 @@ class _Writer:
     def number(self, value: object) -> str:
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             raise LawError(f"{self.title} uses {value!r}, which is not a number")
+        try:
+            value = float(value)
+        except OverflowError:
+            value = math.inf
         if not math.isfinite(value):
             raise LawError(f"{self.title} has a number that is not finite")
-        return repr(float(value)) if value >= 0 else f"({float(value)!r})"
+        return repr(value) if value >= 0 else f"({value!r})"
 
     def constant(self, name: str) -> str:
         if name not in self.globals:
@@ -244,16 +248,21 @@ class _Writer:
                     return getattr(module, attribute)
         raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which is not defined")
 
+    def named(self, name: str) -> object:
+        """What a name of the module stands for; None of an argument or a value."""
+        return None if name in self.known else self.globals.get(name)
+
     def power(self, base: ast.expr, power: ast.expr) -> str:
         inside = self.text(base)
         negative = isinstance(power, ast.UnaryOp) and isinstance(power.op, ast.USub)
         number: object = power.operand if negative else power  # type: ignore[attr-defined]
         if isinstance(number, ast.Name) and number.id not in self.known:
             number = ast.Constant(self.globals.get(number.id))
-        if isinstance(number, ast.BinOp) and all(
-            isinstance(one, ast.Constant) for one in (number.left, number.right)
-        ):  # such as 3/2
-            number = fold(number)
+        if isinstance(number, ast.BinOp):  # such as 3/2
+            known = constant_of(number, self.named)
+            if known is not None:
+                negative, number = negative != (known < 0.0), ast.Constant(abs(known))
+        constant_of(ast.BinOp(base, ast.Pow(), power), self.named)  # has a finite value, if any
         if isinstance(number, ast.Constant):
             value = float(self.number(number.value))
             if value > MOST_POWER:
