@@ -13,7 +13,14 @@ _CALLS = {
     "sqrt": math.sqrt, "exp": math.exp, "log": math.log, "tanh": math.tanh, "atan": math.atan, "abs": abs, "fabs": abs,
     "arctan": math.atan, "absolute": abs,
 }  # fmt: skip
-_OF_TWO = {"min": min, "max": max, "minimum": min, "maximum": max, "pow": math.pow, "power": math.pow}
+_OF_TWO = {
+    "min": min,
+    "max": max,
+    "minimum": min,
+    "maximum": max,
+    "pow": math.pow,
+    "power": math.pow,
+}
 _SIZES = {
     "<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b,
 }  # fmt: skip
@@ -25,7 +32,8 @@ BEYOND = (
     "max(d, v, 1)", "sqrt(d, v)", "pow(d)", "sqrt(*d)", "min(a=1)", "d.real", "d[0]", "[d]", "(d, v)", "{d}", "{d: v}",
     "lambda: d", "(d := 3)", "[d for d in v]", "await d", "f'{d}'", "'d'*9999999999", "b'd'", "...", "None", "True", "d is v",
     "d in v", "__import__('os')", "open('x')", "d if v", "d +", "(((((d", "d)", "", " ", "\n", "d\n+ v", "d;v", "d=3",
-    "nan", "inf", "sqrt", "d*sqrt", "exp", "\x00", "dé", "ｄ", "d²", "1_000*d", "0x10*d", "0b11*d", "1" * 400, "(" * 120 + "d" + ")" * 120,
+    "nan", "inf", "sqrt", "d*sqrt", "exp", "\x00", "dé", "ｄ", "d²", "1_000*d", "0x10*d", "0b11*d",
+    "1" * 400, "(" * 120 + "d" + ")" * 120,
     "-" * 300 + "d", "+".join(["d"] * 200), "d**" * 40 + "d", "sqrt(" * 90 + "d" + ")" * 90, "not " * 80 + "d < v",
     "d" + "*d" * 90, "d if d < v else " * 20 + "d", "(d if " * 15 + "d<v" + " else v)" * 15, "a" * 450, "d**1e300",
     "d**-1e300", "d**(1e308*10)", "tanh(9**9**9)", "abs(-9**9**9)", "copysign(1, 0/0)", "0*(1/0)", "1 if 1 < 2 else 1/0",
@@ -34,7 +42,9 @@ BEYOND = (
 """Texts that are no formula, or one whose value must not be computed in just any way."""
 
 
-def formula(rng: random.Random, names: tuple[str, ...], depth: int, calls: bool) -> tuple[str, Value]:
+def formula(
+    rng: random.Random, names: tuple[str, ...], depth: int, calls: bool
+) -> tuple[str, Value]:
     """A formula of the grammar and its value, worked out beside any parser; arithmetic errors of Python's are its own."""
     if depth == 0 or rng.random() < 0.15:
         if rng.random() < 0.5:
@@ -42,7 +52,9 @@ def formula(rng: random.Random, names: tuple[str, ...], depth: int, calls: bool)
             return name, lambda given: given[name]
         shown = rng.choice(("0", "1", "2", "3", "0.5", "1.5", "1e-3", "2.5e3", "7", "1e200"))
         return shown, lambda given: float(shown)
-    kind = rng.choice(("two", "two", "two", "power", "sign", *(("call", "call2", "if") if calls else ())))
+    kind = rng.choice(
+        ("two", "two", "two", "power", "sign", *(("call", "call2", "if") if calls else ()))
+    )
     text, value = formula(rng, names, depth - 1, calls)
     if kind == "sign":
         return f"(-{text})", lambda given: -value(given)
@@ -67,12 +79,38 @@ def formula(rng: random.Random, names: tuple[str, ...], depth: int, calls: bool)
     return f"({text} {sign} {other})", lambda given: _TWO[sign](value(given), second(given))
 
 
+_PIECES = (*"*/()9.,<%-d²~^", "**", "e9", " if ", " else ", "", "")
+
+
 def mutated(rng: random.Random, text: str) -> str:
     """A text with some characters dropped, doubled or replaced."""
     made = list(text)
     for _ in range(rng.randint(1, 4)):
         place = rng.randrange(len(made) + 1)
-        what = rng.choice(("**", "*", "/", "(", ")", "9", ".", "e9", ",", "<", " if ", " else ", "%", "-", "d", "", "", "²", "~", "^"))
+        what = rng.choice(
+            (
+                "**",
+                "*",
+                "/",
+                "(",
+                ")",
+                "9",
+                ".",
+                "e9",
+                ",",
+                "<",
+                " if ",
+                " else ",
+                "%",
+                "-",
+                "d",
+                "",
+                "",
+                "²",
+                "~",
+                "^",
+            )
+        )
         made[place : place + rng.randint(0, 2)] = [what]
     return "".join(made)
 
@@ -87,9 +125,12 @@ def beyond(rng: random.Random, names: tuple[str, ...]) -> str:
 
 
 UNITS = (
-    "m**9**9**9", "m^9^9", "m**999999999", "m" * 90, "m*" * 2000 + "m", "(" * 60 + "m" + ")" * 60, "m/" * 30 + "m", "1/0", "m/0",
-    "9**9**9", "m**(9**9)", "m^-9", "m^(7/0)", "m^(1/3)", "Gm9 Gm9 Gm9 Gm9 Gm9 Gm9 Gm9 Gm9", "nm-9", "N*N*N*N*N*N", "__import__('os')",
-    "m if m else s", "", " " * 500, "%", "per", "m per s", "m per", "é", "m\x00", "m\n", "furlong", "ton", "m^1e9", "m^1.123456789",
-    "x" * 500, "m s" * 40, "°", '"', "''", "deg C", "degC", "K", "dB", "Np", "1", "1/s", "/s", "//s", "*", "m**", "^2", "m^^2", "s/m",
+    "m**9**9**9", "m^9^9", "m**999999999", "m" * 90, "m*" * 2000 + "m", "(" * 60 + "m" + ")" * 60, "m/" * 30 + "m",
+    "1/0", "m/0", "9**9**9", "m**(9**9)", "m^-9", "m^(7/0)", "m^(1/3)", "Gm9 Gm9 Gm9 Gm9 Gm9 Gm9 Gm9 Gm9", "nm-9",
+    "N*N*N*N*N*N", "__import__('os')", "m if m else s", "", " " * 500, "%", "per", "m per s", "m per", "é", "m\x00",
+    "m\n", "furlong", "ton", "m^1e9",
+    "m^1.123456789",
+    "x" * 500, "m s" * 40, "°", '"', "''", "deg C", "degC", "K", "dB", "Np", "1", "1/s", "/s", "//s", "*", "m**", "^2", "m^^2",
+    "s/m",
 )  # fmt: skip
 """Texts that stand for units, or do not."""

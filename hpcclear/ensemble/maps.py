@@ -47,10 +47,10 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
     try:
         low, high = (_number(part, unit) for part in parts[:2])
         count = int(parts[2])
+    except UnitError as error:
+        raise InputError("map", words, error.reason, error.remedy) from None
     except ValueError:
         raise wrong from None
-    except UnitError as error:
-        raise InputError("map", words, str(error), f"Give bounds in {unit or '1'}") from None
     if count < 1 or not np.isfinite([low, high]).all():
         raise wrong
     return name, paths, np.linspace(low, high, count)
