@@ -212,6 +212,14 @@ def _fitting(unit: str, target: str) -> Fraction | None:
     return None
 
 
+def fits(unit: str, target: str) -> bool:
+    """Whether a unit is one of the quantity of `target`."""
+    try:
+        return _fitting(unit, target) is not None
+    except ValueError:
+        return False
+
+
 def factor(unit: str, target: str) -> Fraction:
     """What one `unit` is in `target`, the unit of an entry; raises UnitError when they are of different quantities."""
     what = f"a quantity in {target}" if target else "a number without a unit"
@@ -231,19 +239,14 @@ def factor(unit: str, target: str) -> Fraction:
 
 def _remedy(unit: str, target: str) -> str:
     """What to write in place of a unit that does not fit."""
-
-    def fits(text: str) -> bool:
-        try:
-            return text != unit and _fitting(text, target) is not None
-        except ValueError:
-            return False
-
     if not target:
         return "Write a plain number"
     if target == "rad/s" and "hz" in unit.casefold():  # readings differ by 2 pi
         return "Hz is ambiguous for an angular speed: write rpm, rad/s or turn/s"
     with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", SPELLINGS.get(unit, unit))
-    near = _respelled(unit, fits) or ([with_force] if fits(with_force) else [])
+    near = _respelled(unit, lambda text: text != unit and fits(text, target))
+    if not near and with_force != unit and fits(with_force, target):
+        near = [with_force]
     if near:
         return f"Did you mean {' or '.join(map(repr, near[:3]))}?"
     return f"Write it in {target}, or as a plain number in {target}"
