@@ -153,7 +153,7 @@ class _Reader:
 
 
 def number_of(node: ast.expr) -> float | None:
-    """The value of a number, with its sign; None of anything else, infinite of one that no float holds."""
+    """The value of a number, with its sign: None for anything else, infinity where no float holds it."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             try:
@@ -167,7 +167,7 @@ def number_of(node: ast.expr) -> float | None:
 
 
 def constant_of(node: ast.expr, named: Callable[[str], object]) -> float | None:
-    """The value of a part made of numbers, and of names that `named` knows a number for; None of any other.
+    """The value of a part made of numbers, and of names that `named` knows a number for; None for any other.
 
     Raises
     ------

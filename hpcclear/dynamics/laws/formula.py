@@ -73,13 +73,13 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
 
 
 def _check_si(name: str, unit: str) -> None:
-    """LawError where a unit is known and none of the SI: a formula takes its numbers as they are."""
+    """LawError if a unit is known and not of the SI: a formula takes its numbers as they are."""
     try:
         size, powers = dimensions(unit)
     except ValueError:
         return  # said of all laws alike
     if size != Fraction(1000) ** powers.get("gram", Fraction(0)):
-        reason = f"the unit {unit!r} of {name} is none of the SI, in which a formula is computed"
+        reason = f"the unit {unit!r} of {name} is not an SI unit, and a formula is computed in SI units"
         raise LawError(reason, f'Write, say, "s/m"; the value of {name} may have any unit')
 
 

@@ -167,7 +167,10 @@ def _with_unit(function: Callable[..., object], given: Mapping[str, object], tit
 
 def _fits(found: Any, unit: str, what: str) -> None:
     """LawError unless a quantity is of a unit."""
-    expected = unit_of(unit, what).units
+    try:
+        expected = unit_of(unit, what).units
+    except LawError:
+        raise LawError(f"the unit {unit!r} is not known", "Write, say, N m") from None
     quantity = found if hasattr(found, "magnitude") else registry().Quantity(float(found), "")
     if not quantity.is_compatible_with(expected):
         raise LawError(

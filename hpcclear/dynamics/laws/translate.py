@@ -249,7 +249,7 @@ class _Writer:
         raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which is not defined")
 
     def named(self, name: str) -> object:
-        """What a name of the module stands for; None of an argument or a value."""
+        """What a name of the module stands for; None for an argument or a local value."""
         return None if name in self.known else self.globals.get(name)
 
     def power(self, base: ast.expr, power: ast.expr) -> str:
