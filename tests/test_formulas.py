@@ -16,7 +16,7 @@ from hpcclear.dynamics.laws.checks import check_shape, check_units
 from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.laws.formula import law_of
 from hpcclear.dynamics.laws.lanes import text_of
-from hpcclear.dynamics.laws.numbers import evaluate
+from hpcclear.dynamics.laws.numbers import _with_numpy, evaluate
 from hpcclear.scene import load_scene
 from hpcclear.scene.formula import names_in, value_of
 from hpcclear.scene.loading import scene_of_text
@@ -52,6 +52,7 @@ def in_lanes(law) -> np.ndarray:
         "math": types.SimpleNamespace(sqrt=np.sqrt, copysign=np.copysign),
     }  # fmt: skip
     exec("\n".join(lines), names)
+    own = _with_numpy(names["own_ratio"])  # lanes divide by 0 as NumPy does
     law = with_constants(law)
     given = {name: np.full(len(SPEEDS), one) for name, one in PARAMETERS.items()}
     given |= {"speed": SPEEDS, "force": FORCES}
@@ -59,10 +60,7 @@ def in_lanes(law) -> np.ndarray:
         given |= evaluate(once, given)
     asked = [np.broadcast_to(given[name], len(SPEEDS)) for name in law.arguments(law.ratio)]
     with np.errstate(all="ignore"):
-        return np.array(
-            [names["own_ratio"](*map(np.float64, row)) for row in zip(*asked, strict=True)]
-            or np.nan
-        )
+        return np.array([own(*map(np.float64, row)) for row in zip(*asked, strict=True)] or np.nan)
 
 
 @pytest.mark.parametrize("count", COUNTS)

@@ -164,7 +164,12 @@ def _size_and_sign(x: Any, y: Any) -> Any:
 
 
 def _of_pure(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: registry().Quantity(float(function(_pure(x))), "")
+    def of(x: Any) -> Any:
+        if np.iscomplexobj(pure := _pure(x)):
+            raise ValueError("complex number")
+        return registry().Quantity(float(function(pure)), "")
+
+    return of
 
 
 WORDS = {

@@ -13,6 +13,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Law
+from hpcclear.dynamics.laws.translate import LawError
 from hpcclear.dynamics.layout import LAW_NUMBERS
 
 _ARRAYS = {
@@ -80,11 +81,29 @@ def _safely(function: Callable[..., object], row: list[float]) -> Any:
     numbers = [np.float64(one) for one in row]
     try:
         found = function(*numbers)
-    except (ZeroDivisionError, OverflowError, ValueError, TypeError):  # of Python's own floats
+    except _UNREAL:  # of Python's own floats
         found = None
     if found is None or _is_complex(found):
-        found = with_words(function, _ARRAYS, _BUILT_IN)(*numbers)
+        try:
+            found = with_words(_with_numpy(function), _ARRAYS, _BUILT_IN)(*numbers)
+        except _UNREAL:
+            return math.nan
     return found
+
+
+_UNREAL = (ZeroDivisionError, OverflowError, ValueError, TypeError)
+
+
+def _with_numpy(function: Callable[..., object]) -> Any:
+    """The same function with NumPy's floats for its constants: dividing by 0 gives infinity, a root of -1 NaN."""
+    if not isinstance(function, FunctionType):
+        return function
+    code = function.__code__
+    constants = tuple(np.float64(one) if type(one) is float else one for one in code.co_consts)
+    changed = code.replace(co_consts=constants)
+    return FunctionType(
+        changed, function.__globals__, function.__name__, None, function.__closure__
+    )
 
 
 def _is_complex(found: object) -> bool:
@@ -96,7 +115,10 @@ def sample_numbers(law: Law, given: Mapping[str, object]) -> dict[str, Any]:
     """All numbers of samples, (m,) each: the joint's, the parameters, and what the law works out once."""
     found = dict(given)
     for one in law.worked_out():
-        found |= evaluate(one, found)
+        made = evaluate(one, found)
+        if not isinstance(made, Mapping):
+            raise LawError("once gives no numbers", "Correct once, or the parameters")
+        found |= made
     return found
 
 
