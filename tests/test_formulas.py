@@ -212,6 +212,11 @@ def test_a_formula_has_parameters_in_si_units(unit, said):
     assert said in read_or_refused(content)
 
 
+def test_a_formula_without_parameters_needs_no_units():
+    effects = {**CONTENT["effects"], "contact": {"law": "expression", "force": "K * d**1.5"}}
+    assert read_or_refused({**CONTENT, "effects": effects}) == ""
+
+
 def test_many_parameters_are_refused_in_a_time_that_grows_with_their_number():
     units = {"b": "s/m"} | {f"p{k}": "s/m" for k in range(20_000)}
     content = law_with("contact", force="K * d**1.5", units=units, **dict.fromkeys(units, 1.0))

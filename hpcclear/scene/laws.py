@@ -211,7 +211,7 @@ class LawTable(Table):
     @classmethod
     def _of_formula(cls, data: Mapping[str, object]) -> Any:
         entry = cls.formula
-        text, units = data.get(entry), data.get("units", {})
+        text, units = data.get(entry), data.get("units") or {}
         if not isinstance(text, str):
             raise invalid(
                 "the law 'expression' needs a formula", f'Add {entry} = "..."', entry, text
