@@ -359,6 +359,11 @@ FORGERIES = (
     ("samples", "scene", DEEPLY),
     ("samples", "scene", ".".join("x" * 20_000) + " = 1"),
     ("samples", "scene", "[" * 100_000),
+    (
+        "samples",
+        "scene",
+        '[effects]\ncontact = { law = "expression", force = "K*d**(9**999999999)" }',
+    ),
     ("samples", "C", 1e300),
     ("kriging", "prediction", np.inf),
     ("sensitivity", "uncertainty", np.nan),

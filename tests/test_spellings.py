@@ -19,7 +19,7 @@ READ = {
         "micron": 1e-6,
         "in": INCH, "in.": INCH, "inch": INCH, "inches": INCH, '"': INCH, "″": INCH, "''": INCH, "ft": 12 * INCH,
         "thou": INCH / 1e3,
-        "(mm)": 1e-3, "furlong": 201.168402336805,
+        "(mm)": 1e-3, "yd": 0.9144, "miles": 1609.344, "millimetres": 1e-3,
     },
     "kg": {"g": 1e-3, "Kg": 1.0, "KG": 1.0, "kgs": 1.0, "mg": 1e-6, "t": 1e3, "lb": POUND, "lbs": POUND, "lbm": POUND,
     "oz": POUND / 16,
@@ -77,7 +77,7 @@ READ = {
 """By the unit of an entry: spellings and their factors."""
 
 ANSWERED = {
-    "m": {"Mm": "mm", "MM": "mm", "CM": "cm", "mil": "thou", "mm2": "Write it in m", "UM": "um"},
+    "m": {"Mm": "mm", "MM": "mm", "CM": "cm", "mil": "thou", "mm2": "Write it in m", "UM": "um", "furlong": "survey foot"},
     "kg": {"gr": "Write g", "N": "Write it in kg"},
     "N": {"kg": "kgf", "lb": "lbf", "kn": "kN", "n": "'N'", "Nm": "Write it in N"},
     "N*m": {"NM": "N\\*m", "nm": "N\\*m", "ft-lb": "ft-lbf", "lb*in": "lbf\\*in", "Knm": "kN\\*m", "Nm/rad": "Write it in N"},

@@ -17,7 +17,6 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
 from hpcclear.scene.units import UnitError, note, to_si
@@ -44,14 +43,14 @@ def axis(scene: Scene, words: str) -> tuple[str, tuple[str, ...], np.ndarray]:
     if len(parts) != 3 or not name:
         raise wrong
     paths = paths_of(scene, name)
-    unit = quantities()[paths[0]].unit
+    unit = scene.unit(paths[0])
     try:
         low, high = (_number(part, unit) for part in parts[:2])
         count = int(parts[2])
+    except UnitError as error:
+        raise InputError("map", words, error.reason, error.remedy) from None
     except ValueError:
         raise wrong from None
-    except UnitError as error:
-        raise InputError("map", words, str(error), f"Give bounds in {unit or '1'}") from None
     if count < 1 or not np.isfinite([low, high]).all():
         raise wrong
     return name, paths, np.linspace(low, high, count)

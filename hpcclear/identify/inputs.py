@@ -43,7 +43,7 @@ class Unknown:
             remedy = "For example joints.crank_rod.clearance=10um:150um"
             raise InputError("--unknown", words, "is not PATH=LO:HI", remedy)
         paths = paths_of(scene, name)
-        unit = quantities()[paths[0]].unit
+        unit = scene.unit(paths[0])
         lower, upper = (number_of("--unknown", end, unit) for end in ends)
         if not lower < upper:
             raise InputError("--unknown", words, "its bounds do not rise", "Swap them")

@@ -6,7 +6,7 @@ This is what leaves the program for spreadsheets, MATLAB and pandas; `hpcclear.r
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import product
+from itertools import islice, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
 from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
-from hpcclear.scene.units import UnitError, factor
+from hpcclear.scene.units import factor, fits, is_unit
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -43,6 +43,8 @@ ROWS: dict[str, tuple[str, ...]] = {
 }
 """Dimensions along which the rows of a table go, by the kind of a result."""
 
+MOST_UNITS = 64
+"""Units of a scene's text that its table is written in, at most: a forged text may have any number of them."""
 MOST_COLUMNS = 128
 """Columns that one variable may fill: profiles around a bearing have thousands, and stay in the result file."""
 
@@ -174,10 +176,11 @@ class Units:
         self._asked = [] if self._si else list(asked)
         strings = {} if self._si else _strings(str(content.attrs.get("scene", "")))
         self._by_path = strings
-        self._usual = [unit for unit, _ in Counter(strings.values()).most_common()]
+        usual = (unit for unit, _ in Counter(strings.values()).most_common() if is_unit(unit))
+        self._usual = list(islice(usual, MOST_UNITS))
         known = {str(v.attrs.get("units", "")) for v in content.variables.values()}
         for unit in self._asked:
-            if not any(_fits(unit, one) for one in known if one not in ("", "1")):
+            if not any(fits(unit, one) for one in known if one not in ("", "1")):
                 listed = ", ".join(sorted(map(labels.plain, known - {"", "1"})))
                 reason = "it fits no quantity of this result"
                 raise InputError("--unit", unit, reason, f"Units of its quantities: {listed}")
@@ -198,7 +201,7 @@ class Units:
 
     def chosen(self, unit: str, own: Sequence[str] = ()) -> str:
         """The unit that shows quantities of a unit of SI, before which come those of a variable's own entry; "" for SI."""
-        return next((u for u in (*self._asked, *own, *self._usual) if _fits(u, unit)), "")
+        return next((u for u in (*self._asked, *own, *self._usual) if fits(u, unit)), "")
 
     def _own(self, variable: xr.DataArray) -> list[str]:
         """Units of the scene's own entry of a design variable."""
@@ -207,15 +210,6 @@ class Units:
         return [
             u for p, u in self._by_path.items() if path and (p == path or p.startswith(places[1]))
         ]
-
-
-def _fits(unit: str, si: str) -> bool:
-    """Whether a unit measures what another, of the result file, does."""
-    try:
-        factor(unit, si)
-    except UnitError:
-        return False
-    return True
 
 
 def _strings(text: str) -> dict[str, str]:

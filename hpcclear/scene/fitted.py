@@ -9,6 +9,7 @@ from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
 from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
+from hpcclear.scene.units import note
 
 
 def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, Any]:
@@ -33,22 +34,24 @@ def with_shares(content: Mapping[str, object]) -> Mapping[str, Any]:
     """
     rows = _at(content, "study.random")
     for name, row in rows.items() if isinstance(rows, Mapping) else ():
+        if not isinstance(row, Mapping):
+            continue
+        variable = _at(content, f"study.variables.{name}")
+        path = next(iter(_paths(name, row, variable)), "")
         for key in ("half_width", "deviation"):
-            share = row.get(key) if isinstance(row, Mapping) else None
-            if not isinstance(share, str) or not share.rstrip().endswith("%"):
+            share = row.get(key)
+            if not is_share(share) or path not in quantities():
                 continue
-            where = f"study.random.{name}.{key}"
-            path = next(iter(paths_of(name, row)), "")
-            if path not in quantities() or not quantities()[path].unit:
-                continue  # a percentage is a number of its own there
-            if isinstance(_at(content, f"study.variables.{name}"), Mapping) and "mean" not in row:
+            where, unit = f"study.random.{name}.{key}", quantities()[path].unit
+            if isinstance(variable, Mapping) and "mean" not in row:
                 others = [row[k] for k in ("half_width", "deviation") if k in row]
-                if not all(isinstance(one, str) and one.rstrip().endswith("%") for one in others):
+                if not all(map(is_share, others)):
                     raise invalid(
                         "is a share of the design's value, and what stands beside it is none",
-                        f"Write both in % or both in {quantities()[path].unit}", where, share,
+                        f"Write both in % or {f'both in {unit}' if unit else 'none of them'}", where, share,
                     )  # fmt: skip
                 content = replace(content, f"study.random.{name}.relative", True)
+                note_share(str(share), unit, "the value that each design has")
                 continue
             middle = row["mean"] if "mean" in row else _number(content, path)
             if middle is None:
@@ -56,13 +59,35 @@ def with_shares(content: Mapping[str, object]) -> Mapping[str, Any]:
                     f"there is no number at {path}", "Give that entry first", where, share
                 )
             try:
-                about = Quantity(quantities()[path].unit).number(middle)
+                about = Quantity(unit).number(middle)
                 value = abs(about) * Quantity("").number(share)
             except PydanticCustomError as error:
                 context = error.context or {}
                 raise invalid(context["reason"], context["remedy"], where, share) from None
+            note_share(str(share), unit, f"{about:g}")
             content = replace(content, f"study.random.{name}.{key}", value)
     return content
+
+
+def is_share(entry: object) -> bool:
+    """Whether an entry is a text in percent."""
+    return isinstance(entry, str) and entry.rstrip().lower().endswith(("%", "‰", "percent", "pct"))
+
+
+def note_share(share: str, unit: str, about: str) -> None:
+    """Note how a percentage is read where the number itself has no unit, so that it might be one of its own."""
+    if not unit:
+        note(
+            share,
+            f"{share.strip()} of {about}; for a width of that many hundredths write a plain number",
+        )
+
+
+def _paths(name: str, row: Mapping[str, object], variable: object) -> tuple[str, ...]:
+    """Entries that a random input drives, those of the study variable of its name if it has no path of its own."""
+    if "path" in row or "paths" in row or not isinstance(variable, Mapping):
+        return paths_of(name, row)
+    return paths_of(name, variable)
 
 
 def _number(content: Mapping[str, object], path: str) -> Any:

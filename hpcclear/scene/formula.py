@@ -1,4 +1,4 @@
-"""Formulas of design variables, such as "m2 + m3": read by Python's own parser, of which only arithmetic is let through."""
+"""Formulas of design variables, such as "m2 + m3"."""
 
 import ast
 import operator
@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.arithmetic import FormulaError as FormulaError
+from hpcclear.base.arithmetic import number_of, read
 from hpcclear.base.arrays import Array
 
 LONGEST = 200
@@ -22,53 +24,23 @@ _TWO: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
 }
 
 
-class FormulaError(ValueError):
-    """A text that is no formula; the message says why."""
-
-
 @lru_cache(maxsize=64)
 def _parsed(text: str) -> ast.expr:
-    if len(text) > LONGEST:
-        raise FormulaError(f"has more than {LONGEST} characters")
-    try:
-        return ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise FormulaError("cannot be read as a formula") from None
+    tree = read(text, LONGEST)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            power = number_of(node.right)
+            if power is None or not 0 <= power <= MOST_POWER:
+                reason = f"has a power that is not a number from 0 to {MOST_POWER:g}"
+                raise FormulaError(reason)
+    return tree
 
 
 def names_in(text: str) -> tuple[str, ...]:
     """Variables of a formula, in the order in which they come; raises FormulaError."""
-    found: list[str] = []
-
-    def walk(node: ast.expr) -> None:
-        match node:
-            case ast.Name():
-                found.append(node.id)
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                if not np.isfinite(float(number)):
-                    raise FormulaError("has a number that is not finite")
-            case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
-                walk(node.operand)
-            case ast.BinOp(op=ast.Pow()):
-                power = node.right
-                if not (
-                    isinstance(power, ast.Constant)
-                    and isinstance(power.value, int | float)
-                    and 0 <= power.value <= MOST_POWER
-                ):
-                    raise FormulaError(f"has a power that is not a number from 0 to {MOST_POWER:g}")
-                walk(node.left)
-            case ast.BinOp() if type(node.op) in _TWO:
-                walk(node.left)
-                walk(node.right)
-            case _:
-                raise FormulaError("contains more than numbers, variables and + - * / **")
-
-    try:
-        walk(_parsed(text))
-    except (OverflowError, RecursionError):
-        raise FormulaError("has a number that is too large or is nested too deeply") from None
-    return tuple(dict.fromkeys(found))
+    nodes = [node for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)]
+    nodes.sort(key=lambda one: (one.lineno, one.col_offset))
+    return tuple(dict.fromkeys(one.id for one in nodes))
 
 
 def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
@@ -79,9 +51,9 @@ def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
             case ast.Name():
                 return variables[node.id]
             case ast.Constant():
-                return float(node.value)  # type: ignore[arg-type]
+                return node.value
             case ast.UnaryOp():
-                return -made(node.operand) if isinstance(node.op, ast.USub) else made(node.operand)
+                return -made(node.operand)
             case ast.BinOp():
                 return _TWO[type(node.op)](made(node.left), made(node.right))
         raise FormulaError("was not checked")

@@ -59,9 +59,7 @@ class Goal(Table):
             try:
                 names_in(self.formula)
             except FormulaError as error:
-                raise invalid(
-                    str(error), "Write, say, m2 + m3", "formula", self.formula[:80]
-                ) from None
+                raise invalid(error.reason, error.remedy, "formula", self.formula[:80]) from None
         if self.statistic == "exceedance" and self.limit is None:
             raise invalid(
                 "the threshold is missing", "Add limit, the threshold of f", "limit", None

@@ -199,6 +199,8 @@ class LawTable(Table):
             raise invalid(
                 f"is no {cls.kind} law", f"Make it a hpcclear.{what}, see docs/extending.md", "law"
             )
+        with as_mended("law"):
+            _module("checks").check_parameters(law)
         return law
 
     @classmethod
@@ -209,7 +211,7 @@ class LawTable(Table):
     @classmethod
     def _of_formula(cls, data: Mapping[str, object]) -> Any:
         entry = cls.formula
-        text, units = data.get(entry), data.get("units", {})
+        text, units = data.get(entry), data.get("units") or {}
         if not isinstance(text, str):
             raise invalid(
                 "the law 'expression' needs a formula", f'Add {entry} = "..."', entry, text
@@ -219,12 +221,15 @@ class LawTable(Table):
         ):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
         with as_mended(entry):
-            return _module("formula").law_of(cls.kind, text, units)
+            law = _module("formula").law_of(cls.kind, text, units)
+        with as_mended("units"):
+            _module("checks").check_parameters(law)
+        return law
 
     @classmethod
     def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
         others = {p.name: p for one in _with_entries(cls.kind) for p in one.parameters}
-        entries = () if law is None else tuple(p.name for p in law.parameters)
+        entries = {} if law is None else {p.name: p for p in law.parameters}
         for key in data:
             if key in cls._own() or key in entries or (law is None and key in others):
                 continue
@@ -250,6 +255,7 @@ class LawTable(Table):
     def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
         """Values of the law's parameters, defaults filled in."""
         found = {}
+        theirs = law.name not in our_laws(cls.kind)
         for parameter in law.parameters:
             if parameter.name in cls._own():
                 reason = f"{law.name} has a parameter {parameter.name!r}, which is an entry of every law's table"
@@ -262,12 +268,12 @@ class LawTable(Table):
                     f"Add {parameter.name} = {example} or so", parameter.name, None,
                 )  # fmt: skip
             found[parameter.name] = _value(parameter, value)
-            if law.name not in our_laws(cls.kind) and parameter.count == 1:
+            if theirs and parameter.count == 1:
                 _declare(cls.kind, parameter)
         wrong = None if law.check is None else law.check(found)
         if wrong is not None:
             raise invalid(*wrong)
-        if law.name not in our_laws(cls.kind):
+        if theirs:
             with as_mended("law"):
                 _module("checks").check(law, found)
         return found

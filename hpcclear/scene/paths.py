@@ -2,6 +2,8 @@
 replace one."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
 from typing import Any, get_args
 
@@ -43,20 +45,61 @@ def _named(field: FieldInfo) -> bool:
     return any(isinstance(part, NamedRows) for part in field.metadata)
 
 
+_kinds: ContextVar[Mapping[str, str]] = ContextVar("kinds", default={})  # noqa: B039 - nobody writes into it
+_SEEN: dict[str, str] = {}
+"""Kinds of rows that this process has read, by their paths: those of the scene read last."""
+
+
+@contextmanager
+def of_kinds(content: Mapping[str, Any]) -> Iterator[None]:
+    """Within it, `quantities` knows the kinds of the loads of a scene's content, on which units of their entries depend."""
+    mechanism = content.get("mechanism")
+    rows = mechanism.get("loads") if isinstance(mechanism, Mapping) else None
+    found = {
+        f"mechanism.loads.{name}": str(row.get("kind"))
+        for name, row in (rows.items() if isinstance(rows, Mapping) else ())
+        if isinstance(row, Mapping)
+    }
+    _SEEN.update(found)
+    token = _kinds.set(found)
+    try:
+        yield
+    finally:
+        _kinds.reset(token)
+
+
+def _kinds_of(model: type[BaseModel]) -> tuple[str, ...]:
+    """What the entry ``kind`` of a table may say."""
+    field = model.model_fields.get("kind")
+    return () if field is None else tuple(map(str, get_args(field.annotation)))
+
+
 def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, Quantity]]:
+    for path, quantity, _ in _entries_of_kinds(annotation, prefix):
+        yield path, quantity
+
+
+def _entries_of_kinds(
+    annotation: object, prefix: str
+) -> Iterator[tuple[str, Quantity, tuple[str, ...]]]:
+    """Paths, quantities, and the kinds of table that have them."""
     for model in _parts(annotation):
         if not (isinstance(model, type) and issubclass(model, BaseModel)):
             continue
         for name, field in model.model_fields.items():
             path, quantity = f"{prefix}.{name}", _quantity(field)
             if quantity is not None:
-                yield path, quantity
+                yield path, quantity, _kinds_of(model)
             else:
-                yield from _entries(field.annotation, f"{path}.*" if _named(field) else path)
+                inner = f"{path}.*" if _named(field) else path
+                yield from _entries_of_kinds(field.annotation, inner)
 
 
 class Quantities(dict[str, Quantity]):
     """By path; the rows of a linkage have names of their own, so theirs are kept by "mechanism.bodies.*.mass"."""
+
+    of_kind: dict[str, dict[str, Quantity]]
+    """Those that differ from kind to kind of a row, by path and kind."""
 
     def _general(self, path: object) -> str:
         parts: list[str] = []
@@ -88,6 +131,10 @@ class Quantities(dict[str, Quantity]):
         general = self._general(path)
         if general == path:
             raise KeyError(path)
+        if general in self.of_kind:
+            row = path.rpartition(".")[0]
+            kind = _kinds.get().get(row) or _SEEN.get(row, "")
+            return self.of_kind[general].get(kind) or dict.__getitem__(self, general)
         return dict.__getitem__(self, general)
 
     def get(self, path: str, default: object = None) -> Any:
@@ -102,9 +149,12 @@ _NAMED = ("bodies", "joints", "drives", "loads", "points")
 def quantities() -> Mapping[str, Quantity]:
     """Every path of a physical number that some scene may have, with its unit and bounds."""
     tables = [*PHYSICAL.items(), ("mechanism", Planar)]
-    found = Quantities(
-        (path, quantity) for top, model in tables for path, quantity in _entries(model, top)
-    )
+    found, of_kind = Quantities(), dict[str, dict[str, Quantity]]()
+    for top, model in tables:
+        for path, quantity, kinds in _entries_of_kinds(model, top):
+            found[path] = quantity
+            of_kind.setdefault(path, {}).update(dict.fromkeys(kinds, quantity))
+    found.of_kind = {path: rows for path, rows in of_kind.items() if len(set(rows.values())) > 1}
     for kind in ("contact", "friction"):
         found |= dict(law_entries(kind))
     return found

@@ -39,11 +39,12 @@ class RandomInput(NamedInput):
     """Centre of "uniform", "normal", "truncated-normal" and "beta", SI; default: the value of the design. For
     "lognormal": mean before truncation."""
     half_width: float | None = None
-    """Half-width of "uniform", "truncated-normal" and "beta", SI, or a percentage such as "3 %" of the nominal value if
-    the study does not vary it. For "wear": half-width of the uniform distribution of new clearances around the value of
-    the scene."""
+    """Half-width of "uniform", "truncated-normal" and "beta", SI, or a percentage such as "3 %": of the value that each
+    design has if the study varies it, else of the nominal value. For "wear": half-width of the uniform distribution of
+    new clearances around the value of the scene."""
     deviation: float | None = None
-    """Standard deviation of "normal", SI; of "truncated-normal" and "lognormal" before truncation."""
+    """Standard deviation of "normal", SI, or a percentage as of `half_width`; of "truncated-normal" and "lognormal" before
+    truncation."""
     shapes: tuple[float, float] | None = None
     """For "beta": a and b of the density x^(a-1) (1-x)^(b-1), with x from 0 to 1 over the range."""
     shape: float | None = None

@@ -13,7 +13,14 @@ from functools import cached_property
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, nearest
-from hpcclear.scene.units import UnitError, is_unit, to_si
+from hpcclear.scene.units import (
+    UnitError,
+    check_thousands,
+    is_unit,
+    may_be_thousands,
+    mended,
+    to_si,
+)
 from hpcclear.scene.workbook import cells_of
 
 LARGEST_FILE = 200_000_000
@@ -37,7 +44,6 @@ _SAVE = "Save it as CSV (UTF-8) or .xlsx"
 _POINT = re.compile(r"[+-]?(?:\d+\.\d*|\.\d+|\d{1,3}(?:[,'’\s]\d{3})+\.\d*)(?:[eEdD][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?(?:\d+,\d*|,\d+|\d{1,3}(?:[.'’\s]\d{3})+,\d*)(?:[eEdD][+-]?\d+)?")
 _WHOLE = re.compile(r"[+-]?\d+(?:[eEdD][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+")
 _HEADING = re.compile(
     r"(.*?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\]|\(\s*([^()]{0,40}?)\s*\)|\s[/,]\s*(\S.{0,39}))?\s*",
     re.DOTALL,
@@ -93,7 +99,7 @@ class Sheet:
         of_unit = text[:1] in _SIGNS and text[-1:] not in tuple("0123456789.")
         if unit is not None and not column.unit and of_unit:
             try:
-                return to_si(text.replace(",", ".") if self.comma else text, unit)
+                return to_si(text.replace(",", ".") if self.comma else text, unit, self.comma)
             except UnitError as error:
                 raise InputError(where, cell, error.reason, error.remedy) from None
         reason, remedy = "is not a finite decimal number", "Write a number such as 0.21"
@@ -101,9 +107,12 @@ class Sheet:
             reason, remedy = f"the cell is empty: it {reason}", "Give each column a value"
         elif text.startswith("#"):
             reason, remedy = "is an error of the spreadsheet", "Mend its formula"
-        elif _THOUSANDS.fullmatch(text):
-            reason = f"may be {text.replace(',', '.')} or {re.sub('[.,]', '', text)}"
-            remedy = "Write it without a sign for thousands"
+        else:
+            remedy = mended(text) or remedy
+            try:
+                check_thousands(text)
+            except UnitError as error:
+                reason, remedy = error.reason, error.remedy
         raise InputError(where, cell, reason, remedy)
 
     def column(self, name: str, key: str) -> Column:
@@ -440,7 +449,7 @@ def _has_commas(path: Path, columns: list[Column], lines: list[int], separator: 
             for comma, pattern in ((False, _POINT), (True, _COMMA)):
                 if pattern.fullmatch(text):
                     shown = f"{cell!r} in line {line}, column {column.name}"
-                    if _THOUSANDS.fullmatch(text) and (comma or separator not in (",", "")):
+                    if may_be_thousands(text) and (comma or separator not in (",", "")):
                         doubtful = doubtful or shown
                     else:
                         seen.setdefault(comma, shown)

@@ -14,7 +14,7 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.sheets import Column, Sheet, read
-from hpcclear.scene.units import UnitError, factor, note_turns, noting, to_si
+from hpcclear.scene.units import UnitError, factor, note_turns, of_unit
 
 LABELS = (
     "design",
@@ -103,8 +103,7 @@ class _Driven:
         quantity = quantities()[self.paths[0]]
         value = sheet.number(self.column, row, quantity.unit)
         if self.unit:
-            with noting(lambda *_: None):  # noted once, of the heading
-                value = to_si(f"{value!r} {self.unit}", quantity.unit)
+            value = of_unit(repr(value), self.unit, quantity.unit)
         for path in self.paths:
             if not quantities()[path].holds(value):
                 reason = f"must be {quantities()[path].bounds()}"

@@ -20,7 +20,7 @@ from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
-from hpcclear.scene.paths import PHYSICAL, flatten, quantities
+from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.slots import PlanarSlot
@@ -370,7 +370,11 @@ class SceneTables(Table):
         """The SI unit of the physical number at a dotted path, "" for none; errors as `number`."""
         self.number(path)
         own = self.effects.law_unit(path)
-        return quantities()[path].unit if own is None else own
+        if own is not None:
+            return own
+        loads = {one.name: {"kind": one.kind} for one in getattr(self.mechanism, "loads", ())}
+        with of_kinds({"mechanism": {"loads": loads}}):
+            return quantities()[path].unit
 
     def _numbers(self) -> Mapping[str, float]:
         if self._known_numbers is None:  # a scene never changes, and a swarm asks often

@@ -1,13 +1,15 @@
 """Names of units as engineers write them: one table of those that are read, one of those that are refused with a remedy.
 
-Sources: BIPM, "The International System of Units" (9th edition, 2019); NIST SP 811 (2008), appendix B, for pounds, inches, kgf.
+Every factor stands here: registries of units differ by version in what a furlong, a drachm or a quarter is.
+
+Sources: BIPM, "The International System of Units" (9th edition, 2019); NIST SP 811 (2008), appendix B, for others.
 """
 
 from fractions import Fraction
 from math import pi
 
 Dimensions = dict[str, Fraction]
-"""Exponents of metre, gram, second and radian, by pint's names of them."""
+"""Exponents of metre, gram, second and radian."""
 Unit = tuple[Fraction, Dimensions]
 """Factor to metre, gram, second and radian, and the exponents of these."""
 
@@ -52,7 +54,59 @@ UNITS: dict[str, Unit] = _SINGLE | {
     for prefix, exponent in _PREFIXES.items()
     if prefix + symbol not in ("Mm", "Gg", "Grad", "hbar")  # nobody means them
 }
-"""Units by symbol. Others are looked up in pint's registry, whose import takes longer than a simulation."""
+"""Units by symbol, which remedies propose."""
+
+_LONG = {
+    "": "", "pico": "p", "nano": "n", "micro": "u", "milli": "m", "centi": "c", "deci": "d", "deca": "da", "deka": "da",
+    "hecto": "h", "kilo": "k", "mega": "M", "giga": "G", "tera": "T",
+}  # fmt: skip
+_WORDS = {
+    "meter": "m", "metre": "m", "gram": "g", "gramme": "g", "second": "s", "radian": "rad", "hertz": "Hz", "newton": "N",
+    "pascal": "Pa", "bar": "bar", "joule": "J", "watt": "W",
+}  # fmt: skip
+_FURTHER: dict[str, Unit] = {
+    "yd yard": _unit(36 * _INCH, 1), "mi mile": _unit(63_360 * _INCH, 1), "nmi": _unit(1852, 1),
+    "angstrom": _unit(Fraction(1, 10**10), 1), "foot feet": _SINGLE["ft"],
+    "tonne": _SINGLE["t"], "pound": _SINGLE["lb"], "ounce": _SINGLE["oz"], "carat ct": _unit(Fraction(1, 5), 0, 1),
+    "grain": _unit(1000 * _POUND / 7000, 0, 1), "stone": _unit(14_000 * _POUND, 0, 1),
+    "slug": _unit(1000 * _POUND_FORCE / (12 * _INCH), 0, 1), "slinch blob": _unit(1000 * _POUND_FORCE / _INCH, 0, 1),
+    "minute": _SINGLE["min"], "hour": _SINGLE["h"], "day d": _unit(86_400, 0, 0, 1), "week": _unit(604_800, 0, 0, 1),
+    "msec": _unit(Fraction(1, 1000), 0, 0, 1), "usec": _unit(Fraction(1, 10**6), 0, 0, 1),
+    "degree": _SINGLE["deg"], "revolution cycle": _SINGLE["turn"], "gon grad grade": _unit(Fraction(pi) / 200, 0, 0, 0, 1),
+    "arcmin": _unit(Fraction(pi) / 10_800, 0, 0, 0, 1), "arcsec": _unit(Fraction(pi) / 648_000, 0, 0, 0, 1),
+    "mdeg": _unit(Fraction(pi) / 180_000, 0, 0, 0, 1),
+    "dyn dyne": _unit(Fraction(1, 100), 1, 1, -2), "gf": _unit(_G, 1, 1, -2), "tf": _unit(10**6 * _G, 1, 1, -2),
+    "kip klbf": _unit(10**6 * _POUND_FORCE, 1, 1, -2), "pdl poundal": _unit(1000 * _POUND * 12 * _INCH, 1, 1, -2),
+    "atm": _unit(101_325_000, -1, 1, -2), "torr": _unit(Fraction(101_325_000, 760), -1, 1, -2),
+    "at": _unit(98_066_500, -1, 1, -2), "kpsi": _SINGLE["ksi"],
+    "Mpsi": _unit(10**9 * _POUND_FORCE / _INCH**2, -1, 1, -2),
+    "mmHg": _unit(Fraction(133_322_387_415, 10**6), -1, 1, -2),
+    "inHg": _unit(Fraction(254, 10) * Fraction(133_322_387_415, 10**6), -1, 1, -2),
+    "erg": _unit(Fraction(1, 10**4), 2, 1, -2), "hp horsepower": _unit(550_000 * _POUND_FORCE * 12 * _INCH, 2, 1, -3),
+    "PS": _unit(75_000 * _G, 2, 1, -3),
+    "poise": _SINGLE["P"], "centipoise": _SINGLE["cP"], "reyn": _unit(1000 * _POUND_FORCE / _INCH**2, -1, 1, -1),
+    "St stokes": _unit(Fraction(1, 10**4), 2, 0, -1), "cSt": _unit(Fraction(1, 10**6), 2, 0, -1),
+    "knot kt": _unit(Fraction(1852, 3600), 1, 0, -1), "mph": _unit(63_360 * _INCH / 3600, 1, 0, -1),
+    "kph": _unit(Fraction(10, 36), 1, 0, -1), "fps": _unit(12 * _INCH, 1, 0, -1),
+    "l L liter litre": _unit(Fraction(1, 1000), 3), "dimensionless": _unit(1),
+}  # fmt: skip
+OTHERS: dict[str, Unit] = {name: unit for names, unit in _FURTHER.items() for name in names.split()}
+OTHERS |= {
+    prefix + symbol: (size * Fraction(10) ** exponent, powers)
+    for symbol, (size, powers) in _BASES.items()
+    for prefix, exponent in (("p", -12), ("T", 12))
+    if prefix + symbol not in ("pbar", "Tm", "Tg")
+}
+OTHERS |= {
+    prefix + word: (UNITS | OTHERS)[short + symbol]
+    for prefix, short in _LONG.items()
+    for word, symbol in _WORDS.items()
+    if short + symbol in UNITS | OTHERS
+}
+OTHERS |= {
+    f"{name}s": unit for name, unit in OTHERS.items() if len(name) > 3 and name[-1] not in "szH"
+}
+"""Units that are read besides: the SI's in full words, and those of other systems."""
 
 SPELLINGS = {
     name: symbol
@@ -107,5 +161,12 @@ REFUSED = {
     "Nms": "Write N*m*s or N*ms",
     "barg": "Write an absolute pressure in bar: a gauge pressure leaves the ambient pressure out",
     "psig": "Write an absolute pressure in psi: a gauge pressure leaves the ambient pressure out",
-}
+    "ton": "Write t for 1000 kg, or lb", "tons": "Write t for 1000 kg, or lb",
+    "hundredweight": "Write kg or lb", "cwt": "Write kg or lb", "quarter": "Write kg or lb",
+    "dram": "Write g or oz", "drachm": "Write g or oz", "pond": "Write gf", "cal": "Write J", "calorie": "Write J",
+    **dict.fromkeys(
+        ("furlong", "furlongs", "fathom", "fathoms", "chain", "chains", "rod", "rods", "pole", "perch", "link", "league"),
+        "Write m, ft or yd: it is one length by the survey foot and another by the international foot",
+    ),
+}  # fmt: skip
 """Names that are read in more than one way, and what to write."""

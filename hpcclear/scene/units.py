@@ -12,17 +12,17 @@ nothing. A turn is a cycle. An angular speed in 1/min means revolutions, as on n
 import itertools
 import re
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
 from math import pi
-from typing import TYPE_CHECKING, Any
 
 from hpcclear.scene.unit_names import (
     HEADS,
+    OTHERS,
     REFUSED,
     SPELLINGS,
     TAILS,
@@ -31,9 +31,6 @@ from hpcclear.scene.unit_names import (
     Dimensions,
     Unit,
 )
-
-if TYPE_CHECKING:
-    from pint import UnitRegistry
 
 _NUMBER = r"[+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:[eE][+-]?\d{1,3})?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
@@ -48,8 +45,14 @@ _FOREIGN = str.maketrans(
     | dict.fromkeys("\u200b\u2060\ufeff")
 )
 """Signs that word processors put in place of those of a keyboard; of no width: dropped."""
-_GROUPED = re.compile(r"[.,'\u2019\s]\s*\d")
+_DIGITS = re.compile(r"[+-]?[.,]?[0-9](?:[0-9.,'\u2019\s]*[0-9])?")
+_GROUPS = re.compile(
+    r"([+-]?[1-9][0-9]{0,2}(?:([.,'\u2019\s])[0-9]{3})(?:\2[0-9]{3})*)(?:[.,]([0-9]+))?"
+)
+_POWER_OF_TEN = re.compile(r"\s*[xX*·×⋅]\s*10")
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 _LONGEST = 80
+"""Characters of a quantity or unit, so that nothing takes long over it."""
 _TURN = Fraction(2 * pi)
 
 
@@ -66,48 +69,24 @@ class _NoUnit(ValueError):
     """A text that is not made of names, powers and signs."""
 
 
-@lru_cache(maxsize=1)
-def _registry() -> "UnitRegistry[Any]":
-    # Imported here because it costs about half a second, and most scenes need the names of `unit_names` alone. Exact
-    # fractions make "0.3 mm" the same float as 3e-4, so that the spelling of a number cannot change
-    # a result.
-    from pint import UnitRegistry
-
-    return UnitRegistry(non_int_type=Fraction)
-
-
 def _named(name: str) -> list[tuple[str, Unit]]:
     """Units that a name stands for, two of "Nm"; raises ValueError."""
     name = SPELLINGS.get(name, name)
     if name in REFUSED:
         raise UnitError(f"{name!r} may mean more than one unit", REFUSED[name])
-    if name in UNITS:
-        return [(name, UNITS[name])]
+    for known in (UNITS, OTHERS):
+        if name in known:
+            return [(name, known[name])]
     for cut in range(1, len(name)):
         if name[:cut] in HEADS and name[cut:] in TAILS:
             return [(part, UNITS[part]) for part in (name[:cut], name[cut:])]
-    return [(name, _of_registry(name))]
-
-
-def _of_registry(name: str) -> Unit:
-    from pint import UndefinedUnitError
-    from pint.errors import DefinitionSyntaxError, OffsetUnitCalculusError
-
-    scale: Any
-    try:
-        scale, base = _registry().get_root_units(_registry().parse_units(name))
-    except UndefinedUnitError:
-        raise ValueError(f"{name!r} is not a known unit") from None
-    except (
-        OffsetUnitCalculusError, DefinitionSyntaxError, ValueError, AttributeError, TypeError, KeyError,
-    ):  # fmt: skip
-        raise ValueError(f"{name!r} cannot be read as a unit") from None
-    exponents: Mapping[Any, Any] = base._units
-    return Fraction(scale), {str(key): Fraction(power) for key, power in exponents.items()}
+    raise ValueError(f"{name!r} is not a known unit")
 
 
 def _tidy(text: str) -> str:
-    """A unit in the characters of a keyboard: "N·m²" as "N*m2"."""
+    """A unit in the characters of a keyboard: "N·m²" as "N*m2"; raises _NoUnit where it is too long for one."""
+    if len(text) > _LONGEST:
+        raise _NoUnit
     plain = unicodedata.normalize("NFKC", text.translate(_FOREIGN)).translate(_FOREIGN)
     plain = re.sub(r"(?<=\w)\s+per\s+(?=\w)", "/", plain.strip().replace("''", '"'))
     plain = _CRANK_ANGLE.sub(
@@ -157,20 +136,33 @@ def _raised(size: Fraction, power: Fraction) -> Fraction:
         return Fraction(base**exponent)
 
 
+def dimensions(unit: str) -> tuple[Fraction, Dimensions]:
+    """Factor of a unit to metre, gram, second and radian, and its exponents of these; raises ValueError."""
+    return _parsed(unit)[:2] if unit else (Fraction(1), {})
+
+
+def parts(unit: str) -> list[tuple[str, Unit, Fraction]]:
+    """Names, units and powers of which a unit is the product; raises ValueError."""
+    factors, found = _factors(_tidy(unit)), []
+    for name, power, side in factors:
+        *before, last = _named(name)
+        found += [(part, one, Fraction(side)) for part, one in before]
+        found.append((*last, power * side))
+    seconds = sum(own.get("second", 0) * power for _, (_, own), power in found)
+    if any(name in TURNS_BY_TIME for name, _, _ in factors) and seconds >= 0:
+        raise ValueError(f"{unit!r} is not a known unit")
+    return found
+
+
 @lru_cache(maxsize=256)
 def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
     """Factor to base units, dimensions, and those of each unit named; ValueError says why there are none."""
     scale, powers, names = Fraction(1), dict[str, Fraction](), dict[str, Dimensions]()
-    factors = _factors(_tidy(unit))
-    for name, power, side in factors:
-        *before, last = _named(name)
-        for (part, (size, own)), raised in ((last, power), *((one, Fraction(1)) for one in before)):
-            scale *= _raised(size, raised * side)
-            names[part] = own
-            for base, exponent in own.items():
-                powers[base] = powers.get(base, Fraction(0)) + exponent * raised * side
-    if any(name in TURNS_BY_TIME for name, _, _ in factors) and powers.get("second", 0) >= 0:
-        raise ValueError(f"{unit!r} is not a known unit")
+    for name, (size, own), power in parts(unit):
+        scale *= _raised(size, power)
+        names[name] = own
+        for base, exponent in own.items():
+            powers[base] = powers.get(base, Fraction(0)) + exponent * power
     return scale, {base: power for base, power in powers.items() if power}, names
 
 
@@ -205,7 +197,7 @@ def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
 def _fitting(unit: str, target: str) -> Fraction | None:
     """What one `unit` is in `target`; None where they are of different quantities. Raises ValueError."""
     scale, base, names = _parsed(unit)
-    own, wanted = _parsed(target)[:2] if target else (Fraction(1), {})
+    own, wanted = dimensions(target)
     angle, expected_angle = (one.get("radian", 0) for one in (base, wanted))
     alike = {**base, "radian": 0} == {**wanted, "radian": 0}
     hertz = {"second": -1} in names.values()
@@ -218,6 +210,14 @@ def _fitting(unit: str, target: str) -> Fraction | None:
     if target == "rad/s" and all(one == {"second": 1} for one in names.values()):
         return scale * _TURN
     return None
+
+
+def fits(unit: str, target: str) -> bool:
+    """Whether a unit is one of the quantity of `target`."""
+    try:
+        return _fitting(unit, target) is not None
+    except ValueError:
+        return False
 
 
 def factor(unit: str, target: str) -> Fraction:
@@ -239,19 +239,14 @@ def factor(unit: str, target: str) -> Fraction:
 
 def _remedy(unit: str, target: str) -> str:
     """What to write in place of a unit that does not fit."""
-
-    def fits(text: str) -> bool:
-        try:
-            return text != unit and _fitting(text, target) is not None
-        except ValueError:
-            return False
-
     if not target:
         return "Write a plain number"
     if target == "rad/s" and "hz" in unit.casefold():  # readings differ by 2 pi
         return "Hz is ambiguous for an angular speed: write rpm, rad/s or turn/s"
     with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", SPELLINGS.get(unit, unit))
-    near = _respelled(unit, fits) or ([with_force] if fits(with_force) else [])
+    near = _respelled(unit, lambda text: text != unit and fits(text, target))
+    if not near and with_force != unit and fits(with_force, target):
+        near = [with_force]
     if near:
         return f"Did you mean {' or '.join(map(repr, near[:3]))}?"
     return f"Write it in {target}, or as a plain number in {target}"
@@ -293,7 +288,7 @@ _EXAMPLES = {
 }
 
 
-def to_si(text: str, target: str) -> float:
+def to_si(text: str, target: str, decided: bool = False) -> float:
     """Read a quantity such as ``"0.3 mm"`` as a float in `target`.
 
     Parameters
@@ -302,20 +297,24 @@ def to_si(text: str, target: str) -> float:
         A decimal number and a unit.
     target : str
         The SI unit expected, ``""`` for a number without one.
+    decided : bool
+        Whether it is known that a point stands before decimals, also in "3.000".
 
     Raises
     ------
     UnitError
-        If the text is not a number with a unit, or the unit has another dimension.
+        If the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
     """
     shown = target or "1"
     found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= _LONGEST else None
     number, unit = found.groups() if found else ("", "")
+    if not decided:
+        check_thousands(text)
     if found is None or (unit is not None and not _is_written(text, unit)):
         hint = f", such as {_EXAMPLES[target]}" if target in _EXAMPLES else ""
         raise UnitError(
             f"the text is not a number with a unit of {shown}",
-            _mended(number, unit)
+            mended(text)
             or f"Write a number in {shown}"
             + (f", or a string with a unit{hint}" if target else ""),
         )
@@ -323,12 +322,52 @@ def to_si(text: str, target: str) -> float:
         raise UnitError(
             "a number in quotes has no unit", f"Drop the quotes for a number in {shown}"
         )
+    value = of_unit(number, unit, target)
+    note_turns(text.strip(), number, unit, target)
+    return value
+
+
+def of_unit(number: str, unit: str, target: str) -> float:
+    """A decimal number of a unit as the nearest float in `target`; raises UnitError."""
+    exact = Fraction(number) * factor(unit, target)
     try:
-        value = float(Fraction(number) * factor(unit, target))
-        note_turns(text.strip(), number, unit, target)
-        return value
+        value = float(exact)
     except OverflowError:
-        raise UnitError("the number is too large", f"Write a finite number in {shown}") from None
+        remedy = f"Write a finite number in {target or '1'}"
+        raise UnitError("the number is too large", remedy) from None
+    if exact and not value:
+        raise UnitError(
+            "the number is too small", f"Write 0, or a larger number in {target or '1'}"
+        )
+    return value
+
+
+def _digits(text: str) -> tuple[str, str]:
+    """The number that a text begins with, with whatever stands between its digits, and the rest of the text."""
+    text = text.strip()[:_LONGEST].replace("\u2212", "-")
+    found = _DIGITS.match(text)
+    return (found[0], text[found.end() :]) if found else ("", text)
+
+
+def may_be_thousands(number: str) -> bool:
+    """Whether three digits after the only comma or point of a number may be decimals or thousands."""
+    return _THOUSANDS.fullmatch(number) is not None
+
+
+def check_thousands(text: str) -> None:
+    """Raise UnitError where the number of a text may be read in two ways."""
+    number, rest = _digits(text)
+    if (
+        not _THOUSANDS.fullmatch(number)
+        or re.match(r"[eE][+-]?\d", rest)
+        or _POWER_OF_TEN.match(rest)
+    ):
+        return
+    decimal, whole = number.replace(",", "."), re.sub("[.,]", "", number)
+    short = decimal.rstrip("0").rstrip(".")
+    short = f"{decimal}0" if short == decimal else short
+    reason = f"may be {decimal}{rest} or {whole}{rest}"
+    raise UnitError(reason, f"Write {short}{rest} or {whole}{rest}")
 
 
 def is_unit(text: str) -> bool:
@@ -349,12 +388,19 @@ def _is_written(text: str, unit: str) -> bool:
         return False
 
 
-def _mended(number: str, rest: str) -> str:
-    """What to write where digits follow the number: "0,3 mm", "5 000 rpm", "1.2·10^-3 m"."""
-    if re.match(r",\s*\d", rest) and "." not in number:
-        return f"Write a decimal point: {number}.{rest[1:].lstrip()}"
-    if re.match(r"[xX*·×⋅]\s*10", rest):
+def mended(text: str) -> str:
+    """What to write where signs stand between the digits of a number: "0,3 mm", "1,234.5 rpm", "1.2·10^-3 m"."""
+    number, rest = _digits(text)
+    if _POWER_OF_TEN.match(rest):
         return f"Write powers of ten as in {number}e-3"
-    if _GROUPED.match(rest) or rest[:1].isdigit():
-        return "Write the digits of a number without signs or spaces between them"
-    return ""
+    between = "Write the digits of a number without signs or spaces between them"
+    if grouped := _GROUPS.fullmatch(number):
+        decimals = f".{grouped[3]}" if grouped[3] else ""
+        return f"{between}: {re.sub(r'[^0-9+-]', '', grouped[1])}{decimals}{rest}"
+    if re.fullmatch(r"[+-]?\d*,\d+", number):
+        return f"Write a decimal point: {number.replace(',', '.')}{rest}"
+    return (
+        between
+        if re.search(r"\d[^\d]+\d.*[^\d]|\d[^\d.]+\d|\.\.", number) or rest[:1].isdigit()
+        else ""
+    )

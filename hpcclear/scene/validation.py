@@ -11,7 +11,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import Table, invalid, nearest
-from hpcclear.scene.paths import PHYSICAL, flatten, quantities, replace
+from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables, plain
@@ -71,7 +71,7 @@ def scene_of(kind: type[Whole], content: Mapping[str, object]) -> Whole:
     Source text that it carries is run: `hpcclear.scene.load_scene` sees to it that it may be.
     """
     read: dict[str, str] = {}
-    with noting(read.__setitem__), using(texts_of(content)) as packages:
+    with noting(read.__setitem__), of_kinds(content), using(texts_of(content)) as packages:
         scene = validated(kind, content)
         rows = {name: {"version": version} for name, version in sorted(packages.items())}
         if rows != content.get("plugins", {}).get("packages", {}):

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
 from hpcclear.scene import choices
@@ -45,6 +45,16 @@ class Variable(NamedInput):
     ("worst"), or the mean with these weights, one for each row."""
     cost: Cost | None = None
     """Cost of a design as a function of this value, for the statistic "cost" of a case."""
+
+    _unit: str = PrivateAttr("")
+
+    @model_validator(mode="after")
+    def _keep_unit(self) -> "Variable":
+        """While the kinds of the scene's loads are known."""
+        if not self.rows:
+            own = quantities()[self.paths[0]] if self.paths else _of_input(self.__dict__)
+            self._unit = own.unit
+        return self
 
     @staticmethod
     def _without_numbers(data: Mapping[str, object]) -> Mapping[str, Any]:
@@ -290,9 +300,7 @@ class Variable(NamedInput):
     @property
     def unit(self) -> str:
         """SI unit of its value, "" for none."""
-        if self.rows:
-            return ""
-        return quantities()[self.paths[0]].unit if self.paths else _of_input(self.__dict__).unit
+        return self._unit
 
     @property
     def words(self) -> str:

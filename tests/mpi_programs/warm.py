@@ -26,9 +26,9 @@ from numba.core.registry import cpu_target
 
 import hpcclear
 from hpcclear import cli, scene
+from hpcclear.dynamics.laws import checks
 from hpcclear.ensemble import identity, samples
 from hpcclear.ranks import boundary
-from hpcclear.scene import units
 
 HIGH = 500  # a descriptor above all in use
 LIMIT = 200_000  # bytes of a request: words, environment, folder
@@ -134,7 +134,7 @@ def load() -> None:
     boundary.describe_mpi()  # loads the library once for all; the rest is what another user may not read
     shipped = scene.load_scene(Path(__file__).parents[2] / "jobs" / "quickstart.toml")
     identity.sample_key(shipped, samples.design(shipped, None))
-    units._registry()
+    checks.registry()
     # which of them keeps Numba to one thread is found later
     for layer in ("tbbpool", "omppool", "workqueue"):
         with contextlib.suppress(ImportError):

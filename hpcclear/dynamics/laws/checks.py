@@ -1,6 +1,8 @@
 """Checks of a law that nobody here wrote, before anything runs: what it uses, its units, its numbers, its energy."""
 
+import keyword
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
@@ -12,6 +14,7 @@ from hpcclear.dynamics.laws.declared import (
     ContactLaw,
     FrictionLaw,
     Law,
+    Parameter,
 )
 from hpcclear.dynamics.laws.lanes import text_of
 from hpcclear.dynamics.laws.numbers import (
@@ -24,6 +27,10 @@ from hpcclear.dynamics.laws.numbers import (
 )
 from hpcclear.dynamics.laws.translate import LawError
 from hpcclear.dynamics.layout import LAW_NUMBERS
+from hpcclear.scene.unit_names import UNITS
+from hpcclear.scene.units import parts
+
+MOST_PARAMETERS = 32
 
 TYPICAL = {
     "stiffness": 9e8,
@@ -52,8 +59,64 @@ SAME = 1e-4
 """Relative, of slopes by differences."""
 
 
+_PAIRS = {
+    "contact": (
+        ("factor", "elastic", "factor multiplies the elastic part of the force"),
+    ),
+    "friction": (
+        ("deflection", "largest", "the largest deflection, m, sets the tolerance of bristles"),
+    ),
+}  # fmt: skip
+"""What a law declares, what belongs to it, and why."""
+
+
+def _check_declared(law: Law) -> None:
+    """LawError unless what a law declares is complete."""
+    for own, other, why in _PAIRS[law.kind]:
+        if getattr(law, own) and not getattr(law, other):
+            geometry = ", or name a geometry in the scene" if other == "elastic" else ""
+            raise LawError(f"declares {own} without {other}: {why}", f"Declare {other}{geometry}")
+    main = "force" if law.kind == "contact" else "ratio"
+    plain = next(one.default for one in fields(law) if one.name == main)
+    declared = getattr(law, main) is not plain
+    if not declared and getattr(law, "factor", None) is None:
+        other = " (or factor and elastic)" if law.kind == "contact" else ""
+        raise LawError(f"declares no {main}", f"Declare {main}{other}")
+    if declared and getattr(law, "factor", None) is not None:
+        raise LawError("declares both force and factor", "Declare force, or factor and elastic")
+    if len(getattr(law, "kinks", ())) not in (0, 2):
+        raise LawError(f"declares {len(law.kinks)} kinks", "Declare two, or none")  # type: ignore[attr-defined]
+    if law.numbers and law.once is None:
+        listed = ", ".join(law.numbers)
+        raise LawError(
+            f"declares the numbers {listed} without once", "Declare once, which returns them"
+        )
+
+
+@lru_cache(maxsize=256)
+def check_parameters(law: Law) -> None:
+    """LawError unless a law's parameters are parameters, of names that a function may have, in units that are known."""
+    if len(law.parameters) > MOST_PARAMETERS:
+        reason = f"has {len(law.parameters)} parameters, more than {MOST_PARAMETERS}"
+        raise LawError(reason, "Compute some of them from others")
+    names = [getattr(one, "name", None) for one in law.parameters]
+    for one, name in zip(law.parameters, names, strict=True):
+        if not isinstance(one, Parameter):
+            raise LawError(f"has the parameter {one!r}", "Write Parameter(name, unit)")
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+            raise LawError(
+                f"has a parameter {name!r}, which is not a name", "Write letters, digits and _"
+            )
+        if names.count(name) > 1:
+            raise LawError(f"declares the parameter {name!r} twice", "Give one another name")
+        unit_of(one.unit, name)
+    for name, unit in law.numbers.items():
+        unit_of(unit, name)
+
+
 def check_shape(law: Law) -> None:
     """LawError unless the law's functions require known quantities, are arithmetic, and fit their rows."""
+    _check_declared(law)
     own = {one.name for one in law.parameters}
     given = own | JOINT.keys() | law.numbers.keys() | VARYING[law.kind].keys()
     for name in own & (JOINT.keys() | VARYING[law.kind].keys()):
@@ -79,8 +142,6 @@ def check_shape(law: Law) -> None:
             *law.arguments(law.elastic)
         }:
             raise LawError(f"elastic uses {name!r}, but stored energy depends on the depth alone")
-    if isinstance(law, FrictionLaw) and law.bristled and law.largest is None:
-        raise LawError("has bristles without a largest deflection", "Declare largest, m")
     text_of(law)
 
 
@@ -103,7 +164,12 @@ def _size_and_sign(x: Any, y: Any) -> Any:
 
 
 def _of_pure(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: registry().Quantity(float(function(_pure(x))), "")
+    def of(x: Any) -> Any:
+        if np.iscomplexobj(pure := _pure(x)):
+            raise ValueError("complex number")
+        return registry().Quantity(float(function(pure)), "")
+
+    return of
 
 
 WORDS = {
@@ -129,7 +195,8 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
     def run(title: str, function: Callable[..., Any], unit: str) -> Any:
         asked = (given[name] for name in law.arguments(function))
         try:
-            return _in_unit(law, with_words(function, WORDS, {})(*asked), title, unit)
+            with np.errstate(all="ignore"):
+                return _in_unit(law, with_words(function, WORDS, {})(*asked), title, unit)
         except (ZeroDivisionError, OverflowError):
             reason = f"{title} is not finite"
             raise LawError(reason, "Correct the formula, or the parameters") from None
@@ -138,6 +205,15 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
                 f"{title} does not fit its units: {error}",
                 "Correct the formula, or the unit of a parameter",
             ) from None
+        except LawError:
+            raise
+        except (TypeError, ValueError, ArithmeticError, LookupError, NameError) as error:
+            said = f"raised {type(error).__name__}: {error}"
+            if "Cannot compare" in str(error):  # of pint, whose classes nobody here knows
+                said = "does not fit its units: it compares a quantity with a plain number"
+            elif "complex" in str(error):
+                said = "has no real value"
+            raise LawError(f"{title} {said}", "Correct the formula") from None
 
     for made_once in law.worked_out():
         given |= run("once", made_once, "")
@@ -150,29 +226,45 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
 
 def _quantities(law: Law, values: Mapping[str, Any]) -> dict[str, Any]:
     """What a law's functions may require, with units."""
-    import pint
-
-    unknown = (
-        pint.UndefinedUnitError,
-        pint.DefinitionSyntaxError,
-        ValueError,
-        AttributeError,
-        TypeError,
-    )
     made = registry().Quantity
     given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
     given |= {name: made(0.1, unit) for name, unit in VARYING[law.kind].items()}
     given["depth"] = made(1e-5, "m")
     for one in law.parameters:
-        value, several = values[one.name], isinstance(values[one.name], tuple)
-        try:
-            found = [made(v, one.unit) for v in (value if several else [value])]
-        except unknown as error:
-            raise LawError(
-                f"the unit {one.unit!r} of {one.name} is not known ({error})", "Write, say, s/m"
-            ) from None
+        value, unit = values[one.name], unit_of(one.unit, one.name)
+        several = isinstance(value, tuple)
+        found = [v * unit for v in (value if several else [value])]
         given[one.name] = tuple(found) if several else found[0]
     return given
+
+
+_NAMED = {
+    frozenset(dimensions.items()): name
+    for name, dimensions in (
+        ("newton", UNITS["N"][1]), ("pascal", UNITS["Pa"][1]), ("joule", UNITS["J"][1]), ("watt", UNITS["W"][1]),
+    )
+}  # fmt: skip
+"""Pint's names of units, so that fractional powers of one cancel to the last digit."""
+
+
+def unit_of(unit: str, name: str) -> Any:
+    """One of a unit, as pint has it; LawError says of which number it is not known."""
+    made = registry().Quantity(1.0, "")
+    if not isinstance(unit, str):
+        raise LawError(f"the unit of {name} is {unit!r}", 'Write it in quotes, "s/m"')
+    try:
+        for _, (size, own), power in parts(unit) if unit else ():
+            known = _NAMED.get(frozenset(own.items()))
+            powers = (
+                {base: float(one) for base, one in own.items()} if known is None else {known: 1.0}
+            )
+            scale = size if known is None else size / 1000
+            one = registry().Quantity(float(scale), registry().UnitsContainer(powers))
+            made = made * one ** float(power)
+    except ValueError:
+        reason = f"the unit {unit!r} of {name} is not known"
+        raise LawError(reason, "Write, say, s/m") from None
+    return made
 
 
 def _in_unit(law: Law, found: Any, title: str, unit: str) -> Any:
@@ -190,9 +282,16 @@ def _in_unit(law: Law, found: Any, title: str, unit: str) -> Any:
             name: _in_unit(law, value, f"{title}: {name}", law.numbers[name])
             for name, value in found.items()
         }
+    own = unit_of(unit, title).units
     if not hasattr(found, "magnitude"):
-        found = registry().Quantity(found, unit if found == 0 else "")
-    return found.to(unit or "dimensionless")
+        if isinstance(found, complex):
+            raise LawError(f"{title} has no real value", "Correct the formula")
+        if isinstance(found, bool) or not isinstance(found, int | float):
+            raise LawError(
+                f"{title} returns {type(found).__name__}, which is no number", "Correct it"
+            )
+        found = registry().Quantity(found, own if found == 0 else "")
+    return found.to(own)
 
 
 # ---- numbers --------------------------------------------------------------------------------------

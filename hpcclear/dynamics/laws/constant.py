@@ -19,6 +19,8 @@ from hpcclear.dynamics.laws.translate import LawError, definition_of
 from hpcclear.dynamics.layout import LAW_NUMBERS
 
 COSTLY = (ast.Div, ast.Pow, ast.Call)
+LONGEST_PART = 200
+"""Nodes of a constant part that is written out for its name: names of names of names double at each step."""
 IMPACT, INVERSE = "impact_speed", "inverse_impact_speed"
 
 
@@ -28,7 +30,7 @@ def with_constants(law: Any) -> Any:
     try:
         known: dict[tuple[str, int], str] = {}
         made = {name: _Parts(law.kind, name, one, known) for name, one in law.functions().items()}
-    except LawError:  # said where its text is written
+    except (LawError, RecursionError):  # said where its text is written
         return law
     changed: dict[str, Any] = {name: one.function() for name, one in made.items() if one.changed}
     if not changed:
@@ -70,7 +72,8 @@ class _Parts(ast.NodeTransformer):
         match one:
             case ast.Assign(targets=[ast.Name(id=name)], value=value):
                 value = _Named(self.locals).visit(value)
-                if self.stored.count(name) == 1 and self._constant(value):
+                short = sum(1 for _ in ast.walk(value)) <= LONGEST_PART
+                if self.stored.count(name) == 1 and short and self._constant(value):
                     self.locals[name] = value
                     return True
         return False

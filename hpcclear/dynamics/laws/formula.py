@@ -1,14 +1,17 @@
-"""A law that is a formula in the scene: read by Python's parser, which lets arithmetic through alone, and made a function."""
+"""A law that is a formula in the scene, made a function."""
 
 import ast
 import hashlib
 import linecache
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
+from hpcclear.base.arithmetic import WORDS, read
 from hpcclear.dynamics.laws.declared import JOINT, VARYING, ContactLaw, FrictionLaw, Law, Parameter
-from hpcclear.dynamics.laws.translate import WORDS, LawError
+from hpcclear.dynamics.laws.translate import LawError
+from hpcclear.scene.units import dimensions
 
 LONGEST = 500
 
@@ -17,11 +20,6 @@ SHORT = {
     "friction": {"v": "speed", "F": "force"},
 }
 """Short names that a formula may use, by the kind of law, for what they stand for."""
-
-_LET_THROUGH = (
-    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Compare, ast.IfExp, ast.BoolOp, ast.Call, ast.Name, ast.Load, ast.Constant,
-    ast.operator, ast.unaryop, ast.cmpop, ast.boolop,
-)  # fmt: skip
 
 
 def law_of(kind: str, formula: str, units: Mapping[str, str]) -> Law:
@@ -41,18 +39,18 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     parameters = tuple(Parameter(name, unit, "a parameter of the formula") for name, unit in units)
     entry = "force" if kind == "contact" else "ratio"
     known = {name: name for name in (*VARYING[kind], *JOINT)} | short
+    for name, unit in units:
+        if name in WORDS or name in known:
+            raise LawError(
+                f"the parameter {name!r} has a name that formulas use", "Give it another name"
+            )
+        _check_si(name, unit)
     known |= {name: name for name, _ in units}
-    tree = _parsed(formula)
+    tree = read(formula, LONGEST, WORDS, "K * d**1.5 * (1 + b * v)")
+    called = {id(one.func) for one in ast.walk(tree) if isinstance(one, ast.Call)}
     used: list[str] = []
     for node in ast.walk(tree):
-        if not isinstance(node, _LET_THROUGH):
-            raise LawError(f"contains more than arithmetic: {ast.unparse(node)!r}")
-        if isinstance(node, ast.Call):
-            if not (isinstance(node.func, ast.Name) and node.func.id in WORDS) or node.keywords:
-                raise LawError(
-                    f"calls {ast.unparse(node.func)!r}", f"Use one of: {', '.join(WORDS)}"
-                )
-        elif isinstance(node, ast.Name) and node.id not in WORDS:
+        if isinstance(node, ast.Name) and id(node) not in called:
             if node.id not in known:
                 others = ", ".join(sorted({*short, *JOINT}))
                 raise LawError(
@@ -74,15 +72,17 @@ def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
     return FrictionLaw(**named, parameters=parameters, ratio=function)
 
 
-def _parsed(formula: str) -> ast.Expression:
-    if len(formula) > LONGEST:
-        raise LawError(f"has more than {LONGEST} characters", "Write the law in a file")
+def _check_si(name: str, unit: str) -> None:
+    """LawError if a unit is known and not of the SI: a formula takes its numbers as they are."""
     try:
-        return ast.parse(formula.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise LawError(
-            "cannot be read as a formula", 'Write, say, "K * d**1.5 * (1 + b * v)"'
-        ) from None
+        size, powers = dimensions(unit)
+    except ValueError:
+        return  # said of all laws alike
+    if size != Fraction(1000) ** powers.get("gram", Fraction(0)):
+        reason = (
+            f"the unit {unit!r} of {name} is not an SI unit, and a formula is computed in SI units"
+        )
+        raise LawError(reason, f'Write, say, "s/m"; the value of {name} may have any unit')
 
 
 def function_of(text: str, name: str, around: Mapping[str, Any] | None = None) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Law
+from hpcclear.dynamics.laws.translate import LawError
 from hpcclear.dynamics.layout import LAW_NUMBERS
 
 _ARRAYS = {
@@ -60,33 +61,64 @@ def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> An
     values = [given[name] for name in names]
     with np.errstate(all="ignore"):
         try:
-            return with_words(function, _ARRAYS, _BUILT_IN)(*values)
-        except (TypeError, ValueError):
+            found = with_words(function, _ARRAYS, _BUILT_IN)(*values)
+            return _one_by_one(function, values) if _is_complex(found) else found
+        except (TypeError, ValueError, ZeroDivisionError, OverflowError):
             return _one_by_one(function, values)
 
 
 def _one_by_one(function: Callable[..., object], values: list[Any]) -> Any:
     shape = np.broadcast_shapes(*(np.shape(one) for one in values))
     flat = [np.broadcast_to(np.asarray(one, float), shape).ravel() for one in values]
-    rows = [_safely(function, [float(one) for one in row]) for row in zip(*flat, strict=True)]
+    rows = [_safely(function, list(row)) for row in zip(*flat, strict=True)]
     if rows and isinstance(rows[0], Mapping):
         return {name: np.array([row[name] for row in rows]).reshape(shape) for name in rows[0]}
     return np.array(rows, float).reshape(shape)
 
 
 def _safely(function: Callable[..., object], row: list[float]) -> Any:
-    """A value; NaN where Python's own arithmetic gives none."""
+    """A value; infinite or NaN where Python's own arithmetic gives no real one."""
+    numbers = [np.float64(one) for one in row]
     try:
-        return function(*row)
-    except (ZeroDivisionError, OverflowError, ValueError):
-        return math.nan
+        found = function(*numbers)
+    except _UNREAL:  # of Python's own floats
+        found = None
+    if found is None or _is_complex(found):
+        try:
+            found = with_words(_with_numpy(function), _ARRAYS, _BUILT_IN)(*numbers)
+        except _UNREAL:
+            return math.nan
+    return found
+
+
+_UNREAL = (ZeroDivisionError, OverflowError, ValueError, TypeError)
+
+
+def _with_numpy(function: Callable[..., object]) -> Any:
+    """The same function with NumPy's floats for its constants: dividing by 0 gives infinity, a root of -1 NaN."""
+    if not isinstance(function, FunctionType):
+        return function
+    code = function.__code__
+    constants = tuple(np.float64(one) if type(one) is float else one for one in code.co_consts)
+    changed = code.replace(co_consts=constants)
+    return FunctionType(
+        changed, function.__globals__, function.__name__, None, function.__closure__
+    )
+
+
+def _is_complex(found: object) -> bool:
+    parts = found.values() if isinstance(found, Mapping) else (found,)
+    return any(map(np.iscomplexobj, parts))
 
 
 def sample_numbers(law: Law, given: Mapping[str, object]) -> dict[str, Any]:
     """All numbers of samples, (m,) each: the joint's, the parameters, and what the law works out once."""
     found = dict(given)
     for one in law.worked_out():
-        found |= evaluate(one, found)
+        made = evaluate(one, found)
+        if not isinstance(made, Mapping):
+            raise LawError("once gives no numbers", "Correct once, or the parameters")
+        found |= made
     return found
 
 

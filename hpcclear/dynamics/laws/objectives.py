@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcclear.base.objectives import MADE, OF_ALL, OF_JOINTS, RECORDED, Objective, arguments
 from hpcclear.base.outcome import FIELDS
-from hpcclear.dynamics.laws.checks import TYPICAL, WORDS, registry
+from hpcclear.dynamics.laws.checks import TYPICAL, WORDS, registry, unit_of
 from hpcclear.dynamics.laws.lanes import HEAD, InLanes
 from hpcclear.dynamics.laws.numbers import evaluate, with_words
 from hpcclear.dynamics.laws.translate import LawError, written
@@ -167,11 +167,9 @@ def _with_unit(function: Callable[..., object], given: Mapping[str, object], tit
 
 def _fits(found: Any, unit: str, what: str) -> None:
     """LawError unless a quantity is of a unit."""
-    import pint
-
     try:
-        expected = registry().parse_units(unit or "dimensionless")
-    except (pint.UndefinedUnitError, pint.DefinitionSyntaxError, ValueError, TypeError):
+        expected = unit_of(unit, what).units
+    except LawError:
         raise LawError(f"the unit {unit!r} is not known", "Write, say, N m") from None
     quantity = found if hasattr(found, "magnitude") else registry().Quantity(float(found), "")
     if not quantity.is_compatible_with(expected):

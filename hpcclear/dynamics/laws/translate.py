@@ -16,6 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.arithmetic import FormulaError, check_count, constant_of
+
+LawError = FormulaError
+
 WORDS = {
     "sqrt": "math.sqrt", "exp": "powers.exponential", "log": "powers.logarithm", "tanh": "powers.tanh",
     "atan": "powers.arctan", "arctan": "powers.arctan", "abs": "abs", "fabs": "abs", "absolute": "abs",
@@ -25,14 +29,6 @@ WORDS = {
 """What a law may call, of Python, `math` or NumPy, and how that is written in the lanes."""
 
 MOST_POWER = 9.0
-
-
-class LawError(ValueError):
-    """A law's function has more in it than a law may have, or a fault; the message says what, and `remedy` what to do."""
-
-    def __init__(self, reason: str, remedy: str = "Write arithmetic of numbers alone") -> None:
-        self.reason, self.remedy = reason, remedy
-        super().__init__(reason)
 
 
 def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
@@ -66,7 +62,10 @@ def written(function: Callable[..., object], name: str, title: str) -> list[str]
     LawError
         If it has more in it than arithmetic.
     """
-    return _Writer(title).function(function, name)
+    try:
+        return _Writer(title).function(function, name)
+    except RecursionError:
+        raise LawError(f"{title} is nested too deeply", "Split it into parts") from None
 
 
 class _Writer:
@@ -223,9 +222,13 @@ class _Writer:
     def number(self, value: object) -> str:
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             raise LawError(f"{self.title} uses {value!r}, which is not a number")
+        try:
+            value = float(value)
+        except OverflowError:
+            value = math.inf
         if not math.isfinite(value):
             raise LawError(f"{self.title} has a number that is not finite")
-        return repr(float(value)) if value >= 0 else f"({float(value)!r})"
+        return repr(value) if value >= 0 else f"({value!r})"
 
     def constant(self, name: str) -> str:
         if name not in self.globals:
@@ -245,16 +248,21 @@ class _Writer:
                     return getattr(module, attribute)
         raise LawError(f"{self.title} uses {ast.unparse(node)!r}, which is not defined")
 
+    def named(self, name: str) -> object:
+        """What a name of the module stands for; None for an argument or a local value."""
+        return None if name in self.known else self.globals.get(name)
+
     def power(self, base: ast.expr, power: ast.expr) -> str:
         inside = self.text(base)
         negative = isinstance(power, ast.UnaryOp) and isinstance(power.op, ast.USub)
         number: object = power.operand if negative else power  # type: ignore[attr-defined]
         if isinstance(number, ast.Name) and number.id not in self.known:
             number = ast.Constant(self.globals.get(number.id))
-        if isinstance(number, ast.BinOp) and all(
-            isinstance(one, ast.Constant) for one in (number.left, number.right)
-        ):  # such as 3/2
-            number = ast.Constant(eval(compile(ast.Expression(number), "", "eval"), {}))
+        if isinstance(number, ast.BinOp):  # such as 3/2
+            known = constant_of(number, self.named)
+            if known is not None:
+                negative, number = negative != (known < 0.0), ast.Constant(abs(known))
+        constant_of(ast.BinOp(base, ast.Pow(), power), self.named)  # has a finite value, if any
         if isinstance(number, ast.Constant):
             value = float(self.number(number.value))
             if value > MOST_POWER:
@@ -275,10 +283,7 @@ class _Writer:
         if name == "float" and known:
             return texts[0]
         if known and name in WORDS:
-            if WORDS[name] in ("no_more", "no_less") and len(texts) != 2:
-                raise LawError(
-                    f"{self.title} calls {name} with more or fewer than two numbers", "Nest it"
-                )
+            check_count(name, len(texts))
             return self.let(f"{WORDS[name]}({', '.join(texts)})")
         if isinstance(function, FunctionType):
             return self.let(f"{self.helper(function)}({', '.join(texts)})")

@@ -8,7 +8,7 @@ from pathlib import Path
 from hpcclear.base.errors import InputError
 from hpcclear.scene.importers.points import GROUND, NAME, Drawing, Point
 from hpcclear.scene.sheets import Column, Sheet, read
-from hpcclear.scene.units import UnitError, to_si
+from hpcclear.scene.units import UnitError, of_unit, to_si
 
 _COLUMNS = {
     "name": ("name", "point", "joint", "label", "punkt"),
@@ -105,4 +105,4 @@ def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
     if column is None or _cell(column, row) in ("", "-"):
         return None
     value = sheet.number(column, row, "rad")
-    return to_si(f"{value!r} {column.unit or 'deg'}", "rad")
+    return of_unit(repr(value), column.unit or "deg", "rad")
