@@ -258,7 +258,9 @@ def _book(sheets: Mapping[str, Iterable[Sequence[Any]]]) -> bytes:
                     if not isinstance(value, int | float):
                         sheet.write_string(at, column, _CONTROL.sub(" ", str(value))[:LONGEST_CELL])
                     elif math.isfinite(value):
-                        sheet.write_number(at, column, _Exact(value) if isinstance(value, float) else value)
+                        sheet.write_number(
+                            at, column, _Exact(value) if isinstance(value, float) else value
+                        )
     with zipfile.ZipFile(buffer, "a") as archive:
         archive.comment = BOOK_MARK
     return buffer.getvalue()

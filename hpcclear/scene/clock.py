@@ -31,7 +31,11 @@ _MOMENT = re.compile(
     r"\s*(?P<zone>z|utc|gmt|[+-]\d\d:?(?:\d\d)?)?)?",
     re.IGNORECASE,
 )
-_ORDERS = {"day, month, year": (2, 1, 0), "month, day, year": (2, 0, 1), "year, month, day": (0, 1, 2)}
+_ORDERS = {
+    "day, month, year": (2, 1, 0),
+    "month, day, year": (2, 0, 1),
+    "year, month, day": (0, 1, 2),
+}
 """Where year, month and day stand."""
 
 Moment = tuple[int | None, int, float, bool]
@@ -41,7 +45,12 @@ Moment = tuple[int | None, int, float, bool]
 def is_clock(cell: str) -> bool:
     """Whether a cell is a clock time or a date."""
     text = cell.strip()
-    return (":" in text or len(text) > 7) and len(text) < 60 and bool(text) and _MOMENT.fullmatch(text) is not None
+    return (
+        (":" in text or len(text) > 7)
+        and len(text) < 60
+        and bool(text)
+        and _MOMENT.fullmatch(text) is not None
+    )
 
 
 def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
@@ -67,7 +76,9 @@ def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
             first = last = now
         if (day is None, zoned) != (first[0] is None, first[3]):
             reason = "is a time of another kind than those above it"
-            raise InputError(where(row), cell, reason, "Write date, time and zone of each row in one way")
+            raise InputError(
+                where(row), cell, reason, "Write date, time and zone of each row in one way"
+            )
         if day is None and last[1] - whole > (period := _period(found)) / 2:
             gone += period
         days = (day or 0) - (first[0] or 0)
@@ -83,12 +94,16 @@ def _period(found: re.Match[str] | None) -> int:
 
 def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> Moment:
     if found is None or not cell.strip():
-        raise InputError(where, cell, "is no clock time or date", "Write it as 2026-03-01 12:03:05.2")
+        raise InputError(
+            where, cell, "is no clock time or date", "Write it as 2026-03-01 12:03:05.2"
+        )
     day = None
     if found["date"]:
         day = _day(found["date"], order)
         if day is None:
-            raise InputError(where, cell, f"is no date (read as {order})", "Write it as 2026-03-01 12:03:05.2")
+            raise InputError(
+                where, cell, f"is no date (read as {order})", "Write it as 2026-03-01 12:03:05.2"
+            )
     if found["compact"]:
         clock = [found["compact"][k : k + 2] for k in (0, 2, 4)]
     elif found["hour"]:
@@ -106,7 +121,12 @@ def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> M
     rest = found["fraction"] or found["rest"]
     fraction = float("0." + rest[1:]) if rest else 0.0
     zone = found["zone"]
-    return day, 3600 * hours + 60 * minutes + whole - _offset(zone or ""), fraction, zone is not None
+    return (
+        day,
+        3600 * hours + 60 * minutes + whole - _offset(zone or ""),
+        fraction,
+        zone is not None,
+    )
 
 
 def _offset(zone: str) -> int:
@@ -121,7 +141,9 @@ def _offset(zone: str) -> int:
 @lru_cache(4096)
 def _day(text: str, order: str) -> int | None:
     """Number of a day, None if there is no such one."""
-    parts = re.findall(r"[^\W_]+", text) if not text.isdecimal() else [text[:4], text[4:6], text[6:]]
+    parts = (
+        re.findall(r"[^\W_]+", text) if not text.isdecimal() else [text[:4], text[4:6], text[6:]]
+    )
     month = next((one for one in parts if one.isalpha()), None)
     if month is not None:
         day, year = (one for one in parts if one != month)
@@ -142,13 +164,23 @@ def _order(cells: Sequence[str], where: Callable[[int], str]) -> str:
         for row, cell in enumerate(cells)
         if (found := _MOMENT.fullmatch(cell.strip())) and found["mark"] in ("/", "-")
     ]
-    orders = list(_ORDERS) if any(len(found["date"]) < 9 for _, found in open_) else list(_ORDERS)[:2]
+    orders = (
+        list(_ORDERS) if any(len(found["date"]) < 9 for _, found in open_) else list(_ORDERS)[:2]
+    )
     if not open_:
         return orders[0]
-    fits = [order for order in orders if all(_day(found["date"], order) is not None for _, found in open_)]
+    fits = [
+        order
+        for order in orders
+        if all(_day(found["date"], order) is not None for _, found in open_)
+    ]
     row, found = open_[0]
     if len(fits) > 1:
-        readings = [datetime.date.fromordinal(_day(found["date"], one) or 1).isoformat() for one in fits]
+        readings = [
+            datetime.date.fromordinal(_day(found["date"], one) or 1).isoformat() for one in fits
+        ]
         named = [f"{reading} ({order})" for reading, order in zip(readings, fits, strict=True)]
-        raise InputError(where(row), cells[row], f"may be {' or '.join(named)}", f"Write dates as {readings[0]}")
+        raise InputError(
+            where(row), cells[row], f"may be {' or '.join(named)}", f"Write dates as {readings[0]}"
+        )
     return (fits or orders)[0]

@@ -186,7 +186,11 @@ def _column(
     name, unit = (None, "") if given is None else _named(given, target)
     free = [one for one in sheet.columns if one not in taken]
     times = sheet.clock() if kind == "time" else None
-    if times is not None and name in (None, times.name, times.heading) and not _of_unit(sheet, free, target):
+    if (
+        times is not None
+        and name in (None, times.name, times.heading)
+        and not _of_unit(sheet, free, target)
+    ):
         return times, sheet.seconds(times)
     column = (
         sheet.column(name, f"{key}.{kind}") if name else _likely(sheet, free, kind, target, key)

@@ -162,7 +162,9 @@ class Sheet:
 
     def is_text(self, column: Column) -> bool:
         """Whether no cell of the column begins as a number does, or all are dates: names of parts, times, remarks."""
-        return self.is_clock(column) or not any(cell.lstrip()[:1] in _SIGNS for cell in column.cells)
+        return self.is_clock(column) or not any(
+            cell.lstrip()[:1] in _SIGNS for cell in column.cells
+        )
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -340,7 +342,9 @@ def _rows(path: Path, what: str, lines: Lines, separator: str) -> Rows:
             count += len(cells)
             if count > MOST_CELLS:
                 reason = f"has more than {MOST_CELLS} cells"
-                raise InputError(what, str(path), reason, "Keep the rows and columns that are needed")
+                raise InputError(
+                    what, str(path), reason, "Keep the rows and columns that are needed"
+                )
     except csv.Error as error:
         raise InputError(what, str(path), f"cannot be read ({error})", _SAVE) from None
     for line, cells in rows:
@@ -410,7 +414,9 @@ def _sheet(path: Path, what: str, rows: Rows, found: str, separator: str, headed
         units = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]]
         body = body[1:]
     cells = [
-        one if len(one) == len(header) else _row(path, number, header, one[:width], one[width:], separator)
+        one
+        if len(one) == len(header)
+        else _row(path, number, header, one[:width], one[width:], separator)
         for number, one in body
     ]
     if not cells:

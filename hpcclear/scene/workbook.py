@@ -34,7 +34,8 @@ _DATES = {*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)}
 _TIMES = {18, 19, 20, 21, 22, 32, 33, 45, 46, 47, 55, 56}
 _PERCENT = {9, 10}
 _UNREADABLE = (
-    zipfile.BadZipFile, zlib.error, expat.ExpatError, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError, OSError,
+    zipfile.BadZipFile, zlib.error, expat.ExpatError, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError,
+    OSError,
 )  # fmt: skip
 """What damaged archives and XML raise."""
 
@@ -93,16 +94,23 @@ class _Book:
         def start(tag: str, attributes: dict[str, str]) -> None:
             nonlocal since_1904
             if _local(tag) == "sheet":
-                id_ = next((v for k, v in attributes.items() if k.endswith("id") and k != "sheetId"), "")
+                id_ = next(
+                    (v for k, v in attributes.items() if k.endswith("id") and k != "sheetId"), ""
+                )
                 sheets.append((attributes.get("name", ""), ids.get(id_, "")))
-            since_1904 |= _local(tag) == "workbookPr" and attributes.get("date1904") in ("1", "true")
+            since_1904 |= _local(tag) == "workbookPr" and attributes.get("date1904") in (
+                "1",
+                "true",
+            )
 
         self.parse(root, start)
         if len(sheets) > MOST_SHEETS:
             self.refuse(f"has more than {MOST_SHEETS} sheets")
         known = set(related.get("/worksheet", []))
         self.sheets = {name: part for name, part in sheets if part in known}
-        self.epoch = datetime.datetime(1904, 1, 1) if since_1904 else datetime.datetime(1899, 12, 30)
+        self.epoch = (
+            datetime.datetime(1904, 1, 1) if since_1904 else datetime.datetime(1899, 12, 30)
+        )
         self.texts, self.formats = list[str](), list[str]()
         for part in related.get("/sharedStrings", [])[:1]:
             self._read_texts(part)
@@ -155,7 +163,9 @@ class _Book:
         def start(tag: str, attributes: dict[str, str]) -> None:
             if _local(tag) == "Relationship":
                 target = attributes.get("Target", "")
-                whole = posixpath.normpath(target[1:] if target.startswith("/") else place.parent / target)
+                whole = posixpath.normpath(
+                    target[1:] if target.startswith("/") else place.parent / target
+                )
                 if whole in self.archive.NameToInfo:
                     found.append((attributes.get("Id", ""), attributes.get("Type", ""), whole))
 
@@ -374,7 +384,9 @@ class _Page:
         if not style:
             return raw if len(raw) < 16 else repr(float(raw))
         number = float(raw)
-        return f"{100 * number!r} %" if style == "percent" else _moment(number, style, self.book.epoch)
+        return (
+            f"{100 * number!r} %" if style == "percent" else _moment(number, style, self.book.epoch)
+        )
 
     def _merge(self, reference: str) -> None:
         first, _, last = reference.partition(":")
@@ -425,7 +437,15 @@ def _kind(number: str, own: Mapping[str, str]) -> str:
     if code is None:
         if id_ == 46:
             return "elapsed"
-        return "percent" if id_ in _PERCENT else "time" if id_ in _TIMES else "date" if id_ in _DATES else ""
+        return (
+            "percent"
+            if id_ in _PERCENT
+            else "time"
+            if id_ in _TIMES
+            else "date"
+            if id_ in _DATES
+            else ""
+        )
     plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
     if re.search(r"\[(h+|m+|s+)\]", plain):
         return "elapsed"
