@@ -38,7 +38,11 @@ def machine(random, dyads=None, machines=None):
             moved = random.uniform(-4, 4, 2).tolist()
             points[name] = (round(base + x + moved[0], 2), round(y + moved[1], 2))
         ground += [a, d]
-        bodies |= {f"crank{number}": [a, b], f"coupler{number}": [b, c, k], f"rocker{number}": [c, d]}
+        bodies |= {
+            f"crank{number}": [a, b],
+            f"coupler{number}": [b, c, k],
+            f"rocker{number}": [c, d],
+        }
         speeds[f"crank{number}"] = float(random.integers(1, 90) * random.choice([-1, 1]))
         for more in range(random.integers(0, 2) if dyads is None else dyads):
             e, f = next(letters), next(letters)
@@ -67,14 +71,24 @@ def workbook(made, random=None):
     book = Workbook()
     for line in table(made).decode().splitlines():
         name, *places, bodies = line.split(";")
-        book.active.append([name, *(float(p) if p[:1] in "-0123456789" else p for p in places), bodies])
+        book.active.append(
+            [name, *(float(p) if p[:1] in "-0123456789" else p for p in places), bodies]
+        )
     stream = io.BytesIO()
     book.save(stream)
     return stream.getvalue()
 
 
 def _pairs(pairs, unit):
-    head = [(0, "SECTION"), (2, "HEADER"), (9, "$INSUNITS"), (70, unit), (0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")]
+    head = [
+        (0, "SECTION"),
+        (2, "HEADER"),
+        (9, "$INSUNITS"),
+        (70, unit),
+        (0, "ENDSEC"),
+        (0, "SECTION"),
+        (2, "ENTITIES"),
+    ]
     every = [*head, *pairs, (0, "ENDSEC"), (0, "EOF")]
     return "".join(f"{code:3d}\n{value}\n" for code, value in every).encode()
 
@@ -102,7 +116,13 @@ def document(made, random=None):
     ET.SubElement(root, "program", units="Millimeters")
     ids = {name: str(k) for k, name in enumerate(made.points)}
     for name, (x, y) in made.points.items():
-        row = {"id": ids[name], "name": name, "x": repr(x / SHOWN), "y": repr(y / SHOWN), "layer": "16"}
+        row = {
+            "id": ids[name],
+            "name": name,
+            "x": repr(x / SHOWN),
+            "y": repr(y / SHOWN),
+            "layer": "16",
+        }
         if name in made.ground:
             row["anchor"] = "true"
         driven = [speed for body, speed in made.speeds.items() if made.bodies[body][0] == name]
@@ -132,7 +152,9 @@ def project(made, random=None, kinds="YAMG0123"):
         driven = [speed for body, speed in made.speeds.items() if made.bodies[body][0] == name]
         flags = 4 * (name in made.ground) + 2 * bool(driven) + 16 * int(random.integers(2))
         row = [DIGITS[flags] + name, name, *(digits(round(100 * p)) for p in (x, y)), "0"]
-        rows.append(",".join([*row, *(["", "", "", digits(round(1000 * driven[0]))] if driven else [])]))
+        rows.append(
+            ",".join([*row, *(["", "", "", digits(round(1000 * driven[0]))] if driven else [])])
+        )
     rows.append("")
     for body, own in made.bodies.items():
         kind = str(random.choice(list(kinds)))
@@ -151,7 +173,9 @@ def successor(made, random=None):
     for name, (x, y) in made.points.items():
         driven = [speed for body, speed in made.speeds.items() if made.bodies[body][0] == name]
         words = [str(one).lower() for one in (name in made.ground, bool(driven))]
-        rows.append(f'{ids[name]},"{name}",{x},{y},1,0,{",".join(words)},{driven[0] if driven else 0},false,false')
+        rows.append(
+            f'{ids[name]},"{name}",{x},{y},1,0,{",".join(words)},{driven[0] if driven else 0},false,false'
+        )
     rows += ["", "--- l ---", "Link ID,..."]
     for k, (body, own) in enumerate(made.bodies.items()):
         rows.append(f"{k},{body},1,#aaa,0,0,{'|'.join(str(ids[p]) for p in own)},,false,1,0")
@@ -163,7 +187,23 @@ KINDS = {
     "project.pmks": project, "successor.csv": successor,
 }  # fmt: skip
 
-EVIL = (b"", b"nan", b"inf", b"-1e300", b"1e-300", b"abc", b"9" * 400, b"0", b"-1", b"\xff\xfe", b"=1+1", b"\x00", b"true", b"center", b"ground")
+EVIL = (
+    b"",
+    b"nan",
+    b"inf",
+    b"-1e300",
+    b"1e-300",
+    b"abc",
+    b"9" * 400,
+    b"0",
+    b"-1",
+    b"\xff\xfe",
+    b"=1+1",
+    b"\x00",
+    b"true",
+    b"center",
+    b"ground",
+)
 
 
 def mutated(data, random):

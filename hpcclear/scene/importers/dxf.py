@@ -113,8 +113,9 @@ def drawing_of(path: Path, unit: str) -> Drawing:
         )
     extent = _extent(every)
     places, at = _distinct(every, extent, key)
-    if len(places) > MOST_POINTS or sum(len(body.lines) for body in bodies.values()) > MOST_LINES:
-        reason = f"has more than {MOST_POINTS} points or {MOST_LINES} lines: no linkage has as many"
+    lines = sum(len(body.lines) for body in bodies.values())
+    if max(len(places), len(bodies)) > MOST_POINTS or lines > MOST_LINES:
+        reason = f"has more than {MOST_POINTS} points or bodies, or {MOST_LINES} lines: no linkage has as many"
         raise InputError(key, path.name, reason, "Save the sketch of the mechanism alone")
     owners: list[list[str]] = [[] for _ in places]
     for name, body in bodies.items():

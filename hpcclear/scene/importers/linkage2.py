@@ -14,7 +14,16 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, listed, number, scale_of
+from hpcclear.scene.importers.points import (
+    GROUND,
+    Drawing,
+    Names,
+    Point,
+    limit,
+    listed,
+    number,
+    scale_of,
+)
 
 _SIZES = {
     "millimeters": (24.5e-3 / 96.0, 1e-3), "mm": (24.5e-3 / 96.0, 1e-3), "inches": (25.4e-3 / 96.0, 25.4e-3),
@@ -72,6 +81,7 @@ def drawing_of(path: Path, unit: str) -> Drawing:
     scale_of(stated, shown, unit, key)
     names = Names("connector", "P"), Names("link", "link")
     connectors = _connectors(root, key, names[0])
+    limit(len(connectors) // 2, key)
     bodies = _links(root, connectors, key, names[1])
     points, speeds, unstated, lone = [], {}, [], Counter[str]()
     for one in connectors.values():

@@ -14,7 +14,16 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, listed, number, scale_of
+from hpcclear.scene.importers.points import (
+    GROUND,
+    Drawing,
+    Names,
+    Point,
+    limit,
+    listed,
+    number,
+    scale_of,
+)
 from hpcclear.scene.units import to_si
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
@@ -99,6 +108,7 @@ def _project(query: str, key: str, unit: str) -> Drawing:
         raise InputError(key, len(fields), "has fewer fields than a project", _AGAIN)
     flags, _, integers, kinds, *rest = fields
     first, second = _ends(rest, key)
+    limit(max(first, second - first) // 2, key)
     joints = [_joint(row, key) for row in rest[:first]]
     rows = rest[first + 1 : second]
     wrong = next((row for row in rows if row[0] not in _ROOTS + _MEMBERS), None)
@@ -178,6 +188,7 @@ def _table(text: str, key: str, unit: str) -> Drawing:
                 rows.setdefault(section, []).append(row)
     except csv.Error as error:
         raise InputError(key, "table", f"cannot be read ({error})", _AGAIN) from None
+    limit(max(map(len, rows.values()), default=0) // 2, key)
     joints = [_joint_of(row, key) for row in rows.get("j", [])[1:]]
     links = [
         _Link(row[0], row[1], False, _ids(row, 6, key))

@@ -21,6 +21,8 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 """Of a point or a body."""
 MOST_POINTS = 1000
 """Of a linkage: points are compared in pairs, and a file of more holds something else."""
+MOST_TURNS = 64
+"""Of a drive in a revolution."""
 FARTHEST = 1e5
 """m from the origin."""
 LONGEST_NUMBER = 100
@@ -111,6 +113,13 @@ def number(text: str, key: str, what: str) -> float:
     return value
 
 
+def limit(count: int, key: str) -> None:
+    """Refuse a file with more points, or parts of another kind, than a linkage has."""
+    if count > MOST_POINTS:
+        reason = f"has more points or bodies than a linkage: at most {MOST_POINTS}"
+        raise InputError(key, count, reason, "Save the mechanism alone")
+
+
 def scale_of(stated: float | None, words: str, unit: str, key: str) -> float:
     """Return the unit of a file's lengths, m.
 
@@ -168,12 +177,7 @@ def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
             "bodies": {name: _body(own[name], frames[name], size) for name in names},
             "ground": {"points": {one.name: [one.x, one.y] for one in own.get(GROUND, [])}},
             "joints": _joints(points, frames),
-            "drives": {
-                "motor" if len(speeds) == 1 else f"motor_{body}": {
-                    "kind": "constant-speed", "body": body, "speed": f"{speed:.12g} rpm",
-                }
-                for body, speed in speeds.items()
-            },
+            "drives": _drives(speeds),
         },
         "effects": {"gravity": 0.0},
     }  # fmt: skip
@@ -190,6 +194,35 @@ def text_of(content: dict[str, Any], source: str, notes: Sequence[str] = ()) -> 
         *(" ".join(note.split()) + "." for note in notes),
     ]
     return "\n".join(f"# {line}" for line in lines) + "\n\n" + tomli_w.dumps(content)
+
+
+def _drives(speeds: Mapping[str, float]) -> dict[str, Any]:
+    """A drive for each body; where one turn of the slowest is not enough for all to repeat, its turns until they do."""
+    made: dict[str, Any] = {
+        "motor" if len(speeds) == 1 else f"motor_{body}": {
+            "kind": "constant-speed", "body": body, "speed": f"{speed:.12g} rpm",
+        }
+        for body, speed in speeds.items()
+    }  # fmt: skip
+    sizes = [round(1e6 * abs(speed)) for speed in speeds.values()]
+    turns = min(sizes) // max(math.gcd(*sizes), 1)
+    if 1 < turns <= MOST_TURNS:
+        list(made.values())[sizes.index(min(sizes))] |= {"period": True, "turns": turns}
+    elif len(set(sizes)) > 1:
+        list(made.values())[sizes.index(min(sizes))] |= {"period": True}
+    return made
+
+
+def _repeating(drives: Mapping[str, Mapping[str, Any]]) -> str:
+    """After how many turns several drives repeat together, in words."""
+    main = next((row for row in drives.values() if row.get("period")), None)
+    if main is None:
+        return ""
+    speed = float(main["speed"].split()[0]) / main.get("turns", 1)
+    ratios = [float(row["speed"].split()[0]) / speed for row in drives.values()]
+    if any(abs(one - round(one)) > 1e-9 * abs(one) for one in ratios):
+        return f"; check refuses them, since they do not repeat together within {MOST_TURNS} turns"
+    return f"; they repeat together after {main.get('turns', 1)} turns of {main['body']}, which is one revolution of the scene"
 
 
 def summary(content: Mapping[str, Any], drawing: Drawing) -> list[tuple[str, str]]:
@@ -226,12 +259,8 @@ def summary(content: Mapping[str, Any], drawing: Drawing) -> list[tuple[str, str
 
 def _checked(points: Sequence[Point], key: str) -> Sequence[Point]:
     """Points that are not too many, and near enough."""
-    if len(points) > MOST_POINTS:
-        reason = f"has {len(points)} points; a linkage has at most {MOST_POINTS}"
-        raise InputError(key, len(points), reason, "Save the mechanism alone")
-    if (joined := sum(len(one.bodies) for one in points)) > 4 * MOST_POINTS:
-        reason = f"has {joined} places of bodies; a linkage has at most {4 * MOST_POINTS}"
-        raise InputError(key, joined, reason, "Save the mechanism alone")
+    limit(len(points), key)
+    limit(sum(len(one.bodies) for one in points) // 4, key)
     for one in points:
         if not max(abs(one.x), abs(one.y)) <= FARTHEST:
             reason = f"is more than {FARTHEST:g} m from the origin"

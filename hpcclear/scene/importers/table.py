@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, nearest
-from hpcclear.scene.importers.points import GROUND, MOST_POINTS, Drawing, Names, Point, scale_of
+from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, limit, scale_of
 from hpcclear.scene.sheets import Column, Sheet, read
 from hpcclear.scene.units import UnitError, to_si
 
@@ -29,9 +29,7 @@ def drawing_of(path: Path, unit: str) -> Drawing:
     that stand still. `slide` is the angle of a guide.
     """
     sheet, key = read(path, "table of points"), str(path)
-    if len(sheet.lines) > MOST_POINTS:
-        reason = f"has {len(sheet.lines)} points; a linkage has at most {MOST_POINTS}"
-        raise InputError(key, len(sheet.lines), reason, "Save the mechanism alone")
+    limit(len(sheet.lines), key)
     columns = _columns(sheet, key)
     x, y = (_lengths(sheet, columns.get(axis), key, unit) for axis in ("x", "y"))
     rows = range(len(sheet.lines))
