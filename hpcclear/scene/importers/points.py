@@ -244,7 +244,8 @@ def summary(content: Mapping[str, Any], drawing: Drawing) -> list[tuple[str, str
         (
             "drives",
             listed(drives)
-            + ("" if drawing.speeds else ", a placeholder: the file states no drive"),
+            + ("" if drawing.speeds else ", a placeholder: the file states no drive")
+            + _repeating(mechanism["drives"]),
         ),
     ]
     if length is not None:
