@@ -235,7 +235,7 @@ def _bytes(path: Path, what: str) -> bytes:
         if not path.is_file():
             raise InputError(what, str(path), "there is no such regular file", remedy)
         with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
+            data = stream.read(min(path.stat().st_size, LARGEST_FILE) + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
