@@ -114,7 +114,7 @@ def number(text: str, key: str, what: str) -> float:
 
 
 def limit(count: int, key: str) -> None:
-    """Refuse a file with more points, or parts of another kind, than a linkage has."""
+    """Raise InputError for more points, or parts of another kind, than a linkage has."""
     if count > MOST_POINTS:
         reason = f"has more points or bodies than a linkage: at most {MOST_POINTS}"
         raise InputError(key, count, reason, "Save the mechanism alone")
