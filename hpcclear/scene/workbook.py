@@ -1,6 +1,6 @@
 """Cells of an Excel workbook (.xlsx, .xlsm) as text.
 
-The XML of a sheet is read as a stream, under limits of bytes, rows, columns and cells that hold before anything is kept: other
+The XML of a sheet is read as a stream. Bytes, rows, columns and cells are counted and refused before anything is kept: other
 readers keep a cell for each place of a range, and every text. What only Excel can know is refused with its cell.
 """
 
