@@ -359,7 +359,7 @@ REFUSED = [
     (dxf([*DRAWN[:2], ("LINE", "0", at((120.01, 60), P["B0"])), *PINS]), "neither one pin nor two points"),
     (dxf([*LAYERS[:4], ("LINE", "rocker", at((67.5, 43), P["B0"]))]), "may be a pin or in a slot"),
     (dxf(LAYERS).replace(" 10\n", "ten\n", 1), "is no group code"),
-    (dxf([("LINE", "ground", [(10, "x"), (20, 0)])]), "has a place that cannot be read"),
+    (dxf([("LINE", "ground", [(10, "x"), (20, 0)])]), "a place of LINE is no finite number"),
 ]  # fmt: skip
 
 

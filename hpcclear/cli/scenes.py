@@ -93,7 +93,7 @@ def _copy_jobs(place: Path) -> None:
     "--unit",
     default="",
     metavar="UNIT",
-    help="Of lengths, where the source states none, such as mm.",
+    help="Of lengths, where the source states none, such as mm. It overrides the unit of a DXF drawing, which is noted.",
 )
 @click.option(
     "--sketch",
@@ -121,8 +121,8 @@ def import_(source: Path, file: Path, unit: str, sketch: Path | None) -> int:
     mechanism = content["mechanism"]
     files.write_bytes(file, importers.text_of(content, source.name, drawing.notes).encode())
     show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
-    for note in drawing.notes:
-        show(f"note     {note}")
+    for label, text in importers.summary(content, drawing):
+        show(f"{label:8} {text}")
     if sketch is not None:
         _draw(scene, sketch)
     show(f"next     put masses and the speed in, then: hpcclear check {file}")

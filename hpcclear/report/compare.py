@@ -24,6 +24,11 @@ SHIFTS = 720
 
 NOT_ALIGNED = "not aligned"
 
+_AXES = {
+    "time": "time", "t": "time", "angle": "angle", "crank angle": "angle", "phi": "angle", "crankangle": "angle",
+}  # fmt: skip
+"""Names of the first column, and what it is."""
+
 MOST_POINTS = 4000
 """Measured points that the search for a shift uses."""
 
@@ -222,19 +227,25 @@ def _measured_axis(response: xr.Dataset, axis: str, given: Array, at: Array, eve
 
 
 def read_columns(path: Path) -> list[Column]:
-    """Return the columns of numbers of a measured table, each with its unit; raises InputError where there is no series."""
+    """Return the columns of numbers of a measured table, each with its unit; raises InputError where there is no series.
+
+    Clock times and dates become the first column "time [s]", seconds since the first row, where no column is time or angle.
+    """
     sheet = read(path, "measured table")
-    columns = [one for one in sheet.columns if not sheet.is_text(one)]
+    columns = [
+        Column(one.heading, one.name, one.unit, sheet.numbers(one))
+        for one in sheet.columns
+        if not sheet.is_text(one)
+    ]
+    times = sheet.clock()
+    if times is not None and not any(_plain(one.name) in _AXES for one in columns):
+        columns.insert(0, Column(times.heading, "time", "s", sheet.seconds(times)))
     if len(columns) < 2 or len(sheet.lines) < 3:
         reason = "has no series: an axis, a quantity and three rows are needed"
         raise InputError(
             "measured table", str(path), reason, "Give time or angle first, then quantities"
         )
-    rows = range(len(sheet.lines))
-    return [
-        Column(one.heading, one.name, one.unit, np.array([sheet.number(one, row) for row in rows]))
-        for one in columns
-    ]
+    return columns
 
 
 def _check_names(names: Mapping[str, str], columns: list[Column]) -> None:
@@ -248,11 +259,8 @@ def _check_names(names: Mapping[str, str], columns: list[Column]) -> None:
 
 def _axis(column: Column) -> tuple[str, str]:
     """Kind and SI unit of the first column."""
-    name = _plain(column.name)
-    if name in ("time", "t"):
-        return "time", "s"
-    if name in ("angle", "crank angle", "phi", "crankangle"):
-        return "angle", "rad"
+    if (kind := _AXES.get(_plain(column.name))) is not None:
+        return kind, "s" if kind == "time" else "rad"
     remedy = 'Call it "time [s]" or "crank_angle [deg]"'
     raise InputError(
         "heading", column.heading, "the first column is neither time nor angle", remedy

@@ -1,10 +1,12 @@
 """Tables of results as files of other programs: CSV, Excel, MATLAB, Parquet. Equal results give equal bytes."""
 
+import datetime
 import io
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+import zipfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
-from hpcclear.report import spread, xlsx
+from hpcclear.report import spread
 from hpcclear.report.tables import Units, identifier, to_table
 from hpcclear.results import dataset, files
 from hpcclear.scene.units import factor
@@ -23,6 +25,11 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 2**20 - 1
 """Rows of an Excel sheet below its heading."""
+BOOK_MARK = b"<dc:creator>hpcclear</dc:creator>"
+"""Mark of our Excel files, at the end; earlier versions wrote it near the beginning."""
+LONGEST_CELL = 32_000
+"""Letters of a cell of an Excel file."""
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
 def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "DataFrame":
@@ -240,7 +247,40 @@ def _xlsx(table: "DataFrame") -> Written:
         ],
     }  # fmt: skip
     known = {name: rows for name, rows in sheets.items() if name == "data" or len(rows) > 1}
-    return xlsx.book(known), xlsx.MARK
+    return _book(known), BOOK_MARK
+
+
+class _Exact(float):
+    """A number that is written with all its digits, where XlsxWriter cuts it at 16."""
+
+    def __format__(self, _: str) -> str:
+        return repr(float(self))
+
+
+def _book(sheets: Mapping[str, Iterable[Sequence[Any]]]) -> bytes:
+    """An Excel file of sheets by name: numbers, and text that is never a formula, below a row of headings.
+
+    Numbers that are not finite are empty cells, for Excel has none.
+    """
+    from xlsxwriter import Workbook
+
+    buffer = io.BytesIO()
+    with Workbook(buffer, {"constant_memory": True}) as book:
+        book.set_properties({"author": "hpcclear", "created": datetime.datetime(2000, 1, 1)})
+        for name, rows in sheets.items():
+            sheet = book.add_worksheet(name)
+            sheet.freeze_panes(1, 0)
+            for at, row in enumerate(rows):
+                for column, value in enumerate(row):
+                    if not isinstance(value, int | float):
+                        sheet.write_string(at, column, _CONTROL.sub(" ", str(value))[:LONGEST_CELL])
+                    elif math.isfinite(value):
+                        sheet.write_number(
+                            at, column, _Exact(value) if isinstance(value, float) else value
+                        )
+    with zipfile.ZipFile(buffer, "a") as archive:
+        archive.comment = BOOK_MARK
+    return buffer.getvalue()
 
 
 def _arrow() -> tuple[Any, Any]:

@@ -156,7 +156,8 @@ def against_time(
     _, values = _column(sheet, kind, getattr(curve, kind), unit, key, (first,))
     start = times[0] if kind in _MOTIONS else 0.0
     made = np.column_stack([times - start, values]).tolist()
-    return made, f"{sheet.found}, {len(times)} rows"
+    since = f", {first.heading} since {first.cells[0]}" if sheet.is_clock(first) else ""
+    return made, f"{sheet.found}, {len(times)} rows{since}"
 
 
 def _kind(curve: FileCurve, unit: str, key: str) -> str:
@@ -184,6 +185,13 @@ def _column(
     """The column of a kind, and its numbers in SI, shape (n,)."""
     name, unit = (None, "") if given is None else _named(given, target)
     free = [one for one in sheet.columns if one not in taken]
+    times = sheet.clock() if kind == "time" else None
+    if (
+        times is not None
+        and name in (None, times.name, times.heading)
+        and not _of_unit(sheet, free, target)
+    ):
+        return times, sheet.seconds(times)
     column = (
         sheet.column(name, f"{key}.{kind}") if name else _likely(sheet, free, kind, target, key)
     )
@@ -203,7 +211,7 @@ def _column(
             f'Write {kind} = "{ {"rad": "deg", "Pa": "bar", "s": "s", "N": "N"}.get(target, "Nm") }", say',
         )  # fmt: skip
     size = _size(unit, target, key, kind)
-    return column, size * np.array([sheet.number(column, row) for row in range(len(sheet.lines))])
+    return column, size * sheet.numbers(column)
 
 
 def _plain(unit: str, target: str) -> str:
@@ -228,9 +236,8 @@ def _named(given: str, target: str) -> tuple[str | None, str]:
         return name, unit
 
 
-def _likely(sheet: Sheet, free: Sequence[Column], kind: str, target: str, key: str) -> Column:
-    """The column of a kind by its unit, by its heading, or because it is the only one left."""
-    free = [one for one in free if not sheet.is_text(one)]
+def _of_unit(sheet: Sheet, columns: Sequence[Column], target: str) -> list[Column]:
+    """Columns of numbers whose unit is one of a quantity."""
 
     def fits(column: Column) -> bool:
         try:
@@ -238,7 +245,13 @@ def _likely(sheet: Sheet, free: Sequence[Column], kind: str, target: str, key: s
         except UnitError:
             return False
 
-    by_unit = [one for one in free if fits(one)]
+    return [one for one in columns if fits(one) and not sheet.is_text(one)]
+
+
+def _likely(sheet: Sheet, free: Sequence[Column], kind: str, target: str, key: str) -> Column:
+    """The column of a kind by its unit, by its heading, or because it is the only one left."""
+    free = [one for one in free if not sheet.is_text(one)]
+    by_unit = _of_unit(sheet, free, target)
     by_name = [one for one in free if one.name.lower().startswith(_HINTS[kind])]
     for found in (by_unit, by_name if not by_unit else [], free):
         if len(found) == 1 or (found and kind in ("angle", "time") and found is free):

@@ -102,7 +102,7 @@ def _column(path: Path, column: str | None, key: str) -> tuple[list[float | str]
         )
         raise InputError(f"{key}.column", None, f"{path} has {len(of_numbers)} columns", remedy)
     chosen = of_numbers[0] if column is None else sheet.column(column, f"{key}.column")
-    values = [sheet.number(chosen, row) for row in range(len(sheet.lines))]
+    values = sheet.numbers(chosen).tolist()
     shown = f"{sheet.found}, {len(values)} values of {chosen.heading}"
     return [f"{value!r} {chosen.unit}" if chosen.unit else value for value in values], shown
 

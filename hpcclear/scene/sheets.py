@@ -5,14 +5,20 @@
 
 import codecs
 import csv
+import gc
 import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
+
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.scene import clock
 from hpcclear.scene.units import (
     UnitError,
     check_thousands,
@@ -24,6 +30,8 @@ from hpcclear.scene.units import (
 from hpcclear.scene.workbook import cells_of
 
 LARGEST_FILE = 200_000_000
+MOST_CELLS = 4_000_000
+"""Of a table of text: they take a gigabyte."""
 LONGEST_LINE = 100_000
 """Characters of a line of a table; a design has some ten numbers."""
 
@@ -54,10 +62,11 @@ LONGEST_CELL = 200
 """Characters of a heading or number, so that no pattern takes long over it."""
 _SIGNS = tuple("+-.,0123456789\u2212")
 """How a number begins."""
+_PLAIN = frozenset("0123456789.+-eE")
+"""Characters of numbers that need no thought."""
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One column: its heading, its unit as written, "" for none, and its cells."""
 
     name: str
@@ -95,7 +104,7 @@ class Sheet:
             return _number(text, self.comma)
         except ValueError:
             pass
-        where = f"{self.path}, line {self.lines[row]}, column {column.name}"
+        where = self.place(column, row)
         of_unit = text[:1] in _SIGNS and text[-1:] not in tuple("0123456789.")
         if unit is not None and not column.unit and of_unit:
             try:
@@ -107,6 +116,9 @@ class Sheet:
             reason, remedy = f"the cell is empty: it {reason}", "Give each column a value"
         elif text.startswith("#"):
             reason, remedy = "is an error of the spreadsheet", "Mend its formula"
+        elif clock.is_clock(text):
+            reason = "is a date or time: spreadsheet programs make dates of numbers such as 1.3"
+            remedy = "Format the cell as a number and write it again"
         else:
             remedy = mended(text) or remedy
             try:
@@ -114,6 +126,38 @@ class Sheet:
             except UnitError as error:
                 reason, remedy = error.reason, error.remedy
         raise InputError(where, cell, reason, remedy)
+
+    def numbers(self, column: Column, unit: str | None = None) -> Array:
+        """All cells of a column, shape (n,), as `number` has each."""
+        if not self.comma and all(map(_PLAIN.issuperset, column.cells)):
+            try:
+                values = np.array(column.cells, dtype=float)
+            except ValueError:  # said below, with its place
+                pass
+            else:
+                if np.isfinite(values).all():
+                    return values
+        return np.array([self.number(column, row, unit) for row in range(len(self.lines))])
+
+    def place(self, column: Column, row: int) -> str:
+        """Where a cell stands, in errors."""
+        return f"{self.path}, line {self.lines[row]}, column {column.name}"
+
+    def is_clock(self, column: Column) -> bool:
+        """Whether the column has clock times or dates, by its first cell that is not empty."""
+        return clock.is_clock(next(filter(None, column.cells), ""))
+
+    def seconds(self, column: Column) -> Array:
+        """Clock times or dates of a column as seconds since the first row, shape (n,); InputError says which is none."""
+        return np.array(clock.seconds(column.cells, lambda row: self.place(column, row)))
+
+    def clock(self) -> Column | None:
+        """The column of clock times, with the dates of a column beside it; None where no column has any."""
+        found = [one for one in self.columns if self.is_clock(one)]
+        if len(found) > 1 and not any(":" in cell for cell in found[0].cells):  # dates, then times
+            joined = zip(found[0].cells, found[1].cells, strict=True)
+            return found[1]._replace(cells=tuple(f"{day} {time}" for day, time in joined))
+        return next(iter(found), None)
 
     def column(self, name: str, key: str) -> Column:
         """The column of that name or heading; InputError says which there are."""
@@ -126,8 +170,10 @@ class Sheet:
         raise InputError(key, name, f"is no column of {self.path}", nearest(name, names))
 
     def is_text(self, column: Column) -> bool:
-        """Whether no cell of the column begins as a number does: names of parts, dates, remarks."""
-        return not any(cell.lstrip()[:1] in _SIGNS for cell in column.cells)
+        """Whether no cell of the column begins as a number does, or all are dates: names of parts, times, remarks."""
+        return self.is_clock(column) or not any(
+            cell.lstrip()[:1] in _SIGNS for cell in column.cells
+        )
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -167,6 +213,16 @@ def read(place: Path, what: str = "table of points", headed: bool = True) -> She
         If it is none, or holds what can be read in two ways: the message says what was found, and where.
     """
     path, page = place_of(place)
+    collected = gc.isenabled()
+    gc.disable()  # a list a row, none of them garbage: looking for it takes half of the time
+    try:
+        return _read(path, page, what, headed)
+    finally:
+        if collected:
+            gc.enable()
+
+
+def _read(path: Path, page: str | None, what: str, headed: bool) -> Sheet:
     data = _bytes(path, what)
     if data.startswith(_PACKED):
         rows = cells_of(path, data, what, page)
@@ -188,7 +244,7 @@ def _bytes(path: Path, what: str) -> bytes:
         if not path.is_file():
             raise InputError(what, str(path), "there is no such regular file", remedy)
         with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
+            data = stream.read(min(path.stat().st_size, LARGEST_FILE) + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -289,7 +345,15 @@ def _rows(path: Path, what: str, lines: Lines, separator: str) -> Rows:
             (line + "\n" for _, line in lines),
             delimiter=separator or "\x1f", strict=True, skipinitialspace=True,
         )  # fmt: skip
-        rows = [(lines[cut.line_num - 1][0], [cell.strip() for cell in cells]) for cells in cut]
+        rows, count = Rows(), 0
+        for cells in cut:
+            rows.append((lines[cut.line_num - 1][0], [cell.strip() for cell in cells]))
+            count += len(cells)
+            if count > MOST_CELLS:
+                reason = f"has more than {MOST_CELLS} cells"
+                raise InputError(
+                    what, str(path), reason, "Keep the rows and columns that are needed"
+                )
     except csv.Error as error:
         raise InputError(what, str(path), f"cannot be read ({error})", _SAVE) from None
     for line, cells in rows:
@@ -331,7 +395,6 @@ def _is_number(cell: str) -> bool:
 
 def _sheet(path: Path, what: str, rows: Rows, found: str, separator: str, headed: bool) -> Sheet:
     """Columns of rows: headings, units in them or in a row below, and cells."""
-    rows = [(line, list(cells)) for line, cells in rows]
     if len(rows) < 2:
         remedy = "Write a row of names, then a row for each point or value"
         raise InputError(what, str(path), f"contains no points ({found})", remedy)
@@ -341,7 +404,7 @@ def _sheet(path: Path, what: str, rows: Rows, found: str, separator: str, headed
     first = _header(rows)
     (line, header), body = rows[first], rows[first + 1 :]
     header = header[:width]
-    bare = all(_is_number(cell) for cell in header if cell)
+    bare = all(_is_number(cell) or clock.is_clock(cell) for cell in header if cell)
     if bare and not headed:
         header, body = [str(1 + k) for k in range(width)], rows[first:]
     elif bare:
@@ -360,7 +423,10 @@ def _sheet(path: Path, what: str, rows: Rows, found: str, separator: str, headed
         units = [re.sub(r"[\[\]()]", "", cell).strip() for cell in body[0][1]]
         body = body[1:]
     cells = [
-        _row(path, number, header, one[:width], one[width:], separator) for number, one in body
+        one
+        if len(one) == len(header)
+        else _row(path, number, header, one[:width], one[width:], separator)
+        for number, one in body
     ]
     if not cells:
         raise InputError(
@@ -445,6 +511,8 @@ def _has_commas(path: Path, columns: list[Column], lines: list[int], separator: 
     doubtful = ""
     for column in columns:
         for line, cell in zip(lines, column.cells, strict=True):
+            if "," not in cell and (False in seen or "." not in cell):
+                continue  # neither a decimal comma nor the first point
             text = cell.replace("\u2212", "-")
             for comma, pattern in ((False, _POINT), (True, _COMMA)):
                 if pattern.fullmatch(text):

@@ -1,16 +1,47 @@
-"""Cells of an Excel workbook (.xlsx) as text, read with openpyxl; what only Excel can know is refused with its cell."""
+"""Cells of an Excel workbook (.xlsx, .xlsm) as text.
+
+The XML of a sheet is read as a stream. Bytes, rows, columns and cells are counted and refused before anything is kept: other
+readers keep a cell for each place of a range, and every text. What only Excel can know is refused with its cell.
+"""
 
 import datetime
 import io
-from pathlib import Path
-from typing import Any
+import posixpath
+import re
+import zipfile
+import zlib
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path, PurePosixPath
+from typing import NoReturn
+from xml.parsers import expat
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.extras import installing
 
-LARGEST = 20_000_000
+LARGEST = 50_000_000
 """Bytes of a workbook, which is packed."""
+UNPACKED = 250_000_000
+"""Bytes of what is read of it, unpacked."""
 MOST_CELLS = 2_000_000
+MOST_ROWS, MOST_COLUMNS = 2**20, 2**14
+"""Of a sheet, as Excel has them."""
+MOST_PARTS, MOST_SHEETS = 10_000, 1000
+LONGEST = 200
+"""Characters of a cell that are kept."""
+
+_DATES = {*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)}
+"""Built-in formats of dates and times (ECMA-376, 18.8.30)."""
+_TIMES = {18, 19, 20, 21, 22, 32, 33, 45, 46, 47, 55, 56}
+_PERCENT = {9, 10}
+_UNREADABLE = (
+    zipfile.BadZipFile, zlib.error, expat.ExpatError, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError,
+    OSError,
+)  # fmt: skip
+"""What damaged archives and XML raise."""
+
+
+class _Enough(Exception):
+    """The rest of a part is of no use."""
 
 
 def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> list[tuple[int, list[str]]]:
@@ -19,92 +50,425 @@ def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> list[tupl
     Raises
     ------
     InputError
-        If openpyxl is not installed, several sheets hold something and none is named, or a cell is a date, a formula without a
-        stored value, or merged with others.
+        If the file is too large or damaged, several sheets hold something and none is named, or a cell is a formula
+        without a stored value, or merged with others.
     """
-    try:
-        import openpyxl
-    except ImportError:
-        raise InputError(
-            what, str(path), "reading an Excel workbook takes the package openpyxl",
-            f"{installing('tables')}, or save it as CSV",
-        ) from None  # fmt: skip
     if len(data) > LARGEST:
         raise InputError(what, str(path), f"is larger than {LARGEST} bytes", "Save it as CSV")
     try:
-        values, formulas = (
-            openpyxl.load_workbook(io.BytesIO(data), data_only=stored) for stored in (True, False)
-        )
-    except Exception as error:
+        book = _Book(path, data, what)
+        page = _Page(book, book.chosen(sheet))
+    except _UNREADABLE as error:
+        if isinstance(error, InputError):
+            raise
         reason = f"is no Excel workbook that can be read ({type(error).__name__}: {error})"
         raise InputError(what, str(path), reason[:300], "Save it anew as .xlsx or CSV") from error
-    page = values[_chosen(path, what, values, sheet)]
-    if page.max_row * page.max_column > MOST_CELLS:
-        raise InputError(what, str(path), f"has more than {MOST_CELLS} cells", "Save it as CSV")
-    for merged in page.merged_cells.ranges:
-        if merged.min_col < merged.max_col and not _is_title(page, merged.min_row):
-            raise InputError(
-                f"{path}, cells {merged.coord}", page.cell(merged.min_row, merged.min_col).value,
-                "the cells are merged, so it is open which column they head",
-                "Split them, and give each column a heading of its own",
-            )  # fmt: skip
-    rows = []
-    for row in page.iter_rows():
-        cells = [_text(path, one, formulas[page.title][one.coordinate]) for one in row]
-        if any(cells):
-            rows.append((row[0].row, cells))
-    return rows
+    page.refuse_merged()
+    return [(row, cells) for row, cells in page.rows.items() if any(cells)]
 
 
-def _is_title(page: Any, row: int) -> bool:
-    """Whether one cell alone is filled in a row, as a title above the table is."""
-    return sum(one.value is not None for one in page[row]) == 1
+class _Book:
+    """The parts of a workbook.
 
+    Attributes
+    ----------
+    left : int
+        Bytes that may still be unpacked.
+    texts : list of str
+        Shared texts.
+    formats : list of str
+        What the numbers of each style are: "" for plain ones, "percent", "date", "time", "elapsed".
+    epoch : datetime.datetime
+        The day 0.
+    """
 
-def _chosen(path: Path, what: str, book: Any, sheet: str | None) -> str:
-    names = [
-        page.title for page in book.worksheets if page.max_row > 1 or page["A1"].value is not None
-    ]
-    if sheet is not None:
-        if sheet not in names:
-            raise InputError(
-                what,
-                str(path),
-                f"has no sheet {sheet!r} with cells",
-                f"Use one of: {', '.join(names)}",
+    def __init__(self, path: Path, data: bytes, what: str) -> None:
+        self.path, self.what, self.left = path, what, UNPACKED
+        if data.count(b"PK\x01\x02") > MOST_PARTS:
+            self.refuse(f"has more than {MOST_PARTS} parts")
+        self.archive = zipfile.ZipFile(io.BytesIO(data))
+        root = self._related("").get("/officeDocument", ["xl/workbook.xml"])[0]
+        related, ids = self._related(root), self._ids(root)
+        sheets, since_1904 = list[tuple[str, str]](), False
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            nonlocal since_1904
+            if _local(tag) == "sheet":
+                id_ = next(
+                    (v for k, v in attributes.items() if k.endswith("id") and k != "sheetId"), ""
+                )
+                sheets.append((attributes.get("name", ""), ids.get(id_, "")))
+            since_1904 |= _local(tag) == "workbookPr" and attributes.get("date1904") in (
+                "1",
+                "true",
             )
-        return sheet
-    if len(names) != 1:
-        reason = f"has {len(names)} sheets that hold something" + (
-            f": {', '.join(names)}" if names else ""
+
+        self.parse(root, start)
+        if len(sheets) > MOST_SHEETS:
+            self.refuse(f"has more than {MOST_SHEETS} sheets")
+        known = set(related.get("/worksheet", []))
+        self.sheets = {name: part for name, part in sheets if part in known}
+        self.epoch = (
+            datetime.datetime(1904, 1, 1) if since_1904 else datetime.datetime(1899, 12, 30)
         )
-        raise InputError(
-            what,
-            str(path),
-            reason,
-            f'Name one as in "{path.name}#{names[0]}"' if names else "Fill one",
-        )
-    return str(names[0])
+        self.texts, self.formats = list[str](), list[str]()
+        for part in related.get("/sharedStrings", [])[:1]:
+            self._read_texts(part)
+        for part in related.get("/styles", [])[:1]:
+            self._read_formats(part)
+
+    def refuse(self, reason: str) -> NoReturn:
+        raise InputError(self.what, str(self.path), reason, "Save the table alone, as CSV")
+
+    def chunks(self, name: str) -> Iterator[bytes]:
+        """Bytes of a part, counted before they are unpacked."""
+        info = self.archive.getinfo(name)
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise NotImplementedError("compression of another kind")
+        if info.file_size > self.left:
+            self.refuse(f"has more than {UNPACKED} bytes when unpacked")
+        with self.archive.open(info) as stream:
+            while data := stream.read(1 << 16):
+                self.left -= len(data)
+                yield data
+
+    def parse(
+        self, name: str, start: Callable[[str, dict[str, str]], object], end: Callable[[str], object] | None = None,
+        text: Callable[[str], object] | None = None,
+    ) -> None:  # fmt: skip
+        """Read the XML of a part; tags come as written. Declarations of entities, which may expand, are refused."""
+
+        def declared(*_: object) -> None:
+            raise ValueError("declares a document type")
+
+        parser = expat.ParserCreate()
+        parser.buffer_text = True
+        parser.StartElementHandler = start
+        parser.EndElementHandler = end
+        parser.CharacterDataHandler = text
+        parser.StartDoctypeDeclHandler = declared
+        try:
+            for data in self.chunks(name):
+                parser.Parse(data)
+            parser.Parse(b"", True)
+        except _Enough:
+            pass
+
+    def _relations(self, part: str) -> list[tuple[str, str, str]]:
+        """Id, kind and target of the relationships of a part; "" for the workbook itself."""
+        place = PurePosixPath(part)
+        name = str(place.parent / "_rels" / f"{place.name}.rels") if part else "_rels/.rels"
+        found = list[tuple[str, str, str]]()
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            if _local(tag) == "Relationship":
+                target = attributes.get("Target", "")
+                whole = posixpath.normpath(
+                    target[1:] if target.startswith("/") else place.parent / target
+                )
+                if whole in self.archive.NameToInfo:
+                    found.append((attributes.get("Id", ""), attributes.get("Type", ""), whole))
+
+        if name in self.archive.NameToInfo:
+            self.parse(name, start)
+        return found
+
+    def _related(self, part: str) -> dict[str, list[str]]:
+        """Targets by the last word of their kind."""
+        made: dict[str, list[str]] = {}
+        for _, kind, target in self._relations(part):
+            made.setdefault(f"/{kind.rpartition('/')[2]}", []).append(target)
+        return made
+
+    def _ids(self, part: str) -> dict[str, str]:
+        return {id_: target for id_, _, target in self._relations(part)}
+
+    def _read_texts(self, part: str) -> None:
+        """Shared texts, of which no more is kept than of a cell."""
+        text = _Text()
+
+        def start(tag: str, _: object) -> None:
+            if len(self.texts) >= MOST_CELLS:
+                self.refuse(f"has more than {MOST_CELLS} texts")
+            text.start(_local(tag))
+
+        def end(tag: str) -> None:
+            if text.end(_local(tag)) == "si":
+                self.texts.append(text.take())
+
+        self.parse(part, start, end, text.parts.append)
+
+    def _read_formats(self, part: str) -> None:
+        own: dict[str, str] = {}
+        within = [""]
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            tag = _local(tag)
+            if tag == "numFmt":
+                own[attributes.get("numFmtId", "")] = attributes.get("formatCode", "")[:LONGEST]
+            elif tag in ("cellXfs", "cellStyleXfs"):
+                within[0] = tag
+            elif tag == "xf" and within[0] == "cellXfs" and len(self.formats) < MOST_CELLS:
+                self.formats.append(_kind(attributes.get("numFmtId", "0"), own))
+
+        self.parse(part, start)
+
+    def chosen(self, sheet: str | None) -> str:
+        """The part of the sheet that is named, or of the only one that holds something."""
+        if sheet in self.sheets:
+            return self.sheets[sheet]
+        filled = [name for name, part in self.sheets.items() if self._is_filled(part)]
+        place = str(self.path)
+        if sheet is not None:
+            reason = f"has no sheet {sheet!r} with cells"
+            raise InputError(self.what, place, reason, f"Use one of: {', '.join(filled)}"[:1000])
+        if len(filled) != 1:
+            listed = f": {', '.join(filled)}"[:1000] if filled else ""
+            remedy = f'Name one as in "{self.path.name}#{filled[0]}"' if filled else "Fill one"
+            raise InputError(
+                self.what, place, f"has {len(filled)} sheets that hold something{listed}", remedy
+            )
+        return self.sheets[filled[0]]
+
+    def _is_filled(self, part: str) -> bool:
+        """Whether some cell of a sheet holds something; no more is read."""
+        seen, rows = False, 0
+
+        def start(tag: str, _: object) -> None:
+            nonlocal seen, rows
+            rows += (tag := _local(tag)) == "row"
+            seen = tag in ("v", "t", "f")
+            if seen or rows > MOST_ROWS:
+                raise _Enough
+
+        self.parse(part, start)
+        if rows > MOST_ROWS:
+            self.refuse(f"has more than {MOST_ROWS} rows")
+        return seen
 
 
-def _text(path: Path, cell: Any, formula: Any) -> str:
-    value, where = cell.value, f"{path}, cell {cell.coordinate}"
-    if value is None and formula.data_type == "f":
-        raise InputError(
-            where, str(formula.value)[:80], "is a formula without a stored value",
-            "Open and save the file in a spreadsheet program, or write the number",
-        )  # fmt: skip
-    if isinstance(value, datetime.date | datetime.time | datetime.timedelta):
-        raise InputError(
-            where, str(value), "is a date: spreadsheet programs make dates of numbers such as 1.3",
-            "Format the cell as a number and write it again",
-        )  # fmt: skip
-    if value is None:
+def _local(tag: str) -> str:
+    """A tag without the prefix of its namespace."""
+    return tag.rpartition(":")[2] if ":" in tag else tag
+
+
+class _Text:
+    """Text of <t> elements, without readings in another script; no more of it than a cell may have.
+
+    Attributes
+    ----------
+    parts : deque of str
+        Pieces of the element that is read; the first go where there are very many.
+    """
+
+    def __init__(self) -> None:
+        self.parts = deque[str](maxlen=64)
+        self.made, self.aside = "", False
+
+    def start(self, tag: str) -> None:
+        self.parts.clear()
+        self.aside |= tag == "rPh"
+
+    def end(self, tag: str) -> str:
+        if tag == "t" and not self.aside and len(self.made) <= LONGEST:
+            self.made += "".join(self.parts)[: LONGEST + 1]
+        self.aside &= tag != "rPh"
+        return tag
+
+    def take(self) -> str:
+        made, self.made = self.made.strip()[:LONGEST], ""
+        return made
+
+
+class _Page:
+    """The rows of a sheet.
+
+    Attributes
+    ----------
+    rows : dict of int to list of str
+        Cells by the number of their row.
+    merged : list of tuple
+        Ranges that are merged over several columns, and their first rows.
+    """
+
+    def __init__(self, book: _Book, part: str) -> None:
+        self.book = book
+        self.rows: dict[int, list[str]] = {}
+        self.merged = list[tuple[str, int]]()
+        self.columns: dict[str, int] = {}  # by letters
+        self.row = self.column = self.elements = self.kept = 0
+        self.kind = self.style = ""
+        self.value: str | None = None
+        self.formula: str | None = None
+        self.text = _Text()
+        self.parts = self.text.parts
+        book.parse(part, self._start, self._end, self.parts.append)
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        if ":" in tag:
+            tag = _local(tag)
+        if tag == "c":
+            letters = attributes.get("r", "").rstrip("0123456789")
+            if letters:
+                self.column = self.columns.get(letters) or self._column(letters)
+            else:
+                self.column += 1
+            self.elements += 1
+            if self.column > MOST_COLUMNS or self.elements > 2 * MOST_CELLS:
+                self.book.refuse(f"has more than {MOST_CELLS} cells or {MOST_COLUMNS} columns")
+            self.kind, self.style = attributes.get("t", "n"), attributes.get("s", "0")
+            self.value = self.formula = None
+        elif tag == "row":
+            last, number = self.row, attributes.get("r")
+            self.row, self.column = int(number) if number else last + 1, 0
+            if not last < self.row <= MOST_ROWS:
+                self.book.refuse(f"has more than {MOST_ROWS} rows, or rows in disorder")
+        elif tag == "mergeCell":
+            self._merge(attributes.get("ref", ""))
+        else:
+            self.text.start(tag)
+
+    def _column(self, letters: str) -> int:
+        self.columns[letters] = _place(f"{letters}1")[1]
+        return self.columns[letters]
+
+    def _end(self, tag: str) -> None:
+        if ":" in tag:
+            tag = _local(tag)
+        if tag == "v":
+            self.value = "".join(self.parts)
+        elif tag == "c":
+            if self.value is not None or self.formula is not None:
+                self._keep()
+        elif tag == "f":
+            self.formula = "".join(self.parts)
+        elif tag == "is":
+            self.value = self.text.take()
+        else:
+            self.text.end(tag)
+
+    def _keep(self) -> None:
+        """Put a cell into its row, if it holds something."""
+        text = self._plain()
+        if not text:
+            return
+        row = self.rows.get(self.row)
+        missing = self.column - (0 if row is None else len(row))
+        self.kept += missing
+        if self.kept > MOST_CELLS:
+            self.book.refuse(f"has more than {MOST_CELLS} cells")
+        if missing <= 0:
+            raise ValueError(f"row {self.row} has cells in disorder")
+        if row is None:
+            row = self.rows[self.row] = []
+        if missing > 1:
+            row.extend([""] * (missing - 1))
+        row.append(text)
+
+    def _plain(self) -> str:
+        """What the cell says."""
+        raw, formats = (self.value or "").strip(), self.book.formats
+        if self.formula is not None and not raw and (self.value is None or self.kind != "str"):
+            raise InputError(
+                f"{self.book.path}, cell {_letters(self.column)}{self.row}", f"={self.formula}"[:80],
+                "is a formula without a stored value",
+                "Open and save the file in a spreadsheet program, or write the number",
+            )  # fmt: skip
+        if self.kind == "s":
+            return self.book.texts[abs(int(raw))] if raw else ""
+        if self.kind == "b":
+            return "true" if raw == "1" else "false"
+        if self.kind != "n" or not raw:
+            return raw[:LONGEST]
+        style = formats[abs(int(self.style))] if formats else ""
+        if not style:
+            return raw if len(raw) < 16 else repr(float(raw))
+        number = float(raw)
+        return (
+            f"{100 * number!r} %" if style == "percent" else _moment(number, style, self.book.epoch)
+        )
+
+    def _merge(self, reference: str) -> None:
+        first, _, last = reference.partition(":")
+        (row, begin), (_, end) = _place(first), _place(last or first)
+        if begin < end:
+            if len(self.merged) >= MOST_CELLS // 10:
+                self.book.refuse("has too many merged cells")
+            self.merged.append((reference, row))
+
+    def refuse_merged(self) -> None:
+        """InputError where a row with several filled cells has merged ones; a title may be merged."""
+        for reference, row in self.merged:
+            cells = self.rows.get(row, [])
+            if sum(map(bool, cells)) > 1:
+                raise InputError(
+                    f"{self.book.path}, cells {reference}", next(filter(None, cells)),
+                    "the cells are merged, so it is open which column they head",
+                    "Split them, and give each column a heading of its own",
+                )  # fmt: skip
+
+
+_PLACE = re.compile(r"\$?([A-Z]{1,3})\$?([0-9]{1,7})")
+
+
+def _place(reference: str) -> tuple[int, int]:
+    """Row and column, from 1 on, of a reference such as C5."""
+    found = _PLACE.fullmatch(reference)
+    if found is None:
+        raise ValueError(f"{reference[:20]!r} is no cell")
+    column = 0
+    for letter in found[1]:
+        column = 26 * column + ord(letter) - 64
+    return int(found[2]), column
+
+
+def _letters(column: int) -> str:
+    made = ""
+    while column:
+        column, rest = divmod(column - 1, 26)
+        made = chr(65 + rest) + made
+    return made
+
+
+def _kind(number: str, own: Mapping[str, str]) -> str:
+    """What numbers of a format are."""
+    id_ = int(number) if number.isdecimal() else 0
+    code = own.get(number)
+    if code is None:
+        if id_ == 46:
+            return "elapsed"
+        return (
+            "percent"
+            if id_ in _PERCENT
+            else "time"
+            if id_ in _TIMES
+            else "date"
+            if id_ in _DATES
+            else ""
+        )
+    plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
+    if re.search(r"\[(h+|m+|s+)\]", plain):
+        return "elapsed"
+    plain = re.sub(r"\[[^\]]*\]", "", plain)
+    if plain in ("general", "@", ""):
         return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int | float):
-        if "%" in (cell.number_format or ""):
-            return f"{100 * value!r} %"
-        return repr(value)
-    return str(value).strip()[:200]
+    if re.search("[hs]", plain):
+        return "time"
+    return "date" if re.search("[dmy]", plain) else "percent" if "%" in plain else ""
+
+
+def _moment(days: float, style: str, epoch: datetime.datetime) -> str:
+    """A date or time as text, by ISO 8601; hours may be more than 24 where they are counted on."""
+    if not 0 <= days < 2_958_466:  # the year 10000
+        raise ValueError(f"{days!r} is no date")
+    micros = round(days * 86_400_000_000)
+    if style == "elapsed" or days < 1:
+        seconds, rest = divmod(micros, 1_000_000)
+        text = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+        return f"{text}.{rest:06d}" if rest else text
+    if days < 60 and epoch.year < 1904:
+        micros += 86_400_000_000  # Excel has a 29 February 1900
+    moment = epoch + datetime.timedelta(microseconds=micros)
+    if style == "date" and days == int(days):
+        return moment.date().isoformat()
+    return moment.isoformat(sep=" ")

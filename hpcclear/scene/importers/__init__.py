@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene.importers import dxf, linkage2, pmks, table
-from hpcclear.scene.importers.points import Drawing, scene_of, text_of
+from hpcclear.scene.importers.points import Drawing, scene_of, summary, text_of
 from hpcclear.scene.units import UnitError, to_si
 
-__all__ = ["FORMATS", "Drawing", "drawing_of", "linkage_of", "scene_of", "text_of"]
+__all__ = ["FORMATS", "Drawing", "drawing_of", "linkage_of", "scene_of", "summary", "text_of"]
 
 LARGEST_FILE = 20_000_000
 
@@ -44,7 +44,8 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
     path : Path
         In any of `FORMATS`.
     unit : str
-        Of lengths, where the file states none.
+        Of lengths, where the file states none. One that contradicts the file is refused; of a drawing it is used and noted,
+        since drawings often state the unit of a template.
 
     Raises
     ------
@@ -57,16 +58,17 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
         except UnitError as error:
             raise InputError("--unit", unit, error.reason, error.remedy) from None
     begin = b""
-    if path.is_file():
-        with path.open("rb") as stream:
-            begin = stream.read(4096)
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(
-                "file",
-                str(path),
-                f"is larger than {LARGEST_FILE} bytes",
-                "Save the mechanism alone",
-            )
+    try:
+        if path.is_file():
+            with path.open("rb") as stream:
+                begin = stream.read(4096)
+            if path.stat().st_size > LARGEST_FILE:
+                reason = f"is larger than {LARGEST_FILE} bytes"
+                raise InputError("file", str(path), reason, "Save the mechanism alone")
+    except OSError as error:
+        raise InputError(
+            "file", str(path), f"cannot be read ({error.strerror})", "Check the file"
+        ) from None
     return next(one for one in FORMATS if one.begins(begin)).drawing_of(path, unit)
 
 

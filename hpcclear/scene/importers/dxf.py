@@ -15,25 +15,37 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import GROUND, Drawing, Point, named
+from hpcclear.scene.importers.points import (
+    GROUND,
+    MOST_POINTS,
+    Drawing,
+    Names,
+    Point,
+    listed,
+    number,
+    scale_of,
+)
 from hpcclear.scene.units import to_si
 
-_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 14: "dm"}
-"""Units of lengths, by $INSUNITS."""
+_FOOT = 1200 / 3937  # of US surveys
+_UNITS = {
+    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 1e-3), 5: ("centimetres", 1e-2),
+    6: ("metres", 1.0), 7: ("kilometres", 1e3), 8: ("microinches", 2.54e-8), 9: ("mils", 2.54e-5), 10: ("yards", 0.9144),
+    11: ("angstroms", 1e-10), 12: ("nanometres", 1e-9), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1),
+    15: ("decametres", 10.0), 16: ("hectometres", 100.0), 17: ("gigametres", 1e9), 18: ("astronomical units", 1.495978707e11),
+    19: ("light years", 9.4607304725808e15), 20: ("parsecs", 3.0856775814913673e16), 21: ("US survey feet", _FOOT),
+    22: ("US survey inches", _FOOT / 12), 23: ("US survey yards", 3 * _FOOT), 24: ("US survey miles", 5280 * _FOOT),
+}  # fmt: skip
+"""Units of lengths and their size in m, by $INSUNITS."""
 _STILL = ("ground", "frame", "base", "fixed", "gestell")
 """Layers that stand still, in small letters."""
-_SKIPPED = {
-    "TEXT",
-    "MTEXT",
-    "DIMENSION",
-    "LEADER",
-    "MULTILEADER",
-    "HATCH",
-    "VIEWPORT",
-    "SEQEND",
-    "ATTDEF",
-}
+_TEXTS = (
+    "TEXT", "MTEXT", "DIMENSION", "LEADER", "MULTILEADER", "HATCH", "VIEWPORT", "ATTDEF",
+)  # fmt: skip
 """Entities without points of a mechanism."""
+_READ = ("POINT", "LINE", "CIRCLE", "LWPOLYLINE", "POLYLINE")
+MOST_LINES = 2000
+"""Of a drawing, each counted once."""
 _SAME, _NEAR = 1e-6, 1e-3
 """Distances of the drawing's size up to which points are one, and from which on they are two."""
 
@@ -51,13 +63,13 @@ class _Entity(NamedTuple):
 
     def places(self, code: int, key: str) -> list[Place]:
         """Places of a code of x, such as 10; y has the code that is 10 higher."""
-        found = {c: [v for one, v in self.pairs if one == c] for c in (code, code + 10)}
-        try:
-            return [(float(x), float(y)) for x, y in zip(*found.values(), strict=True)]
-        except ValueError:
+        x, y = ([v for one, v in self.pairs if one == c] for c in (code, code + 10))
+        if len(x) != len(y):
             raise InputError(
                 key, self.kind, "has a place that cannot be read", "Save the drawing again"
-            ) from None
+            )
+        what = f"a place of {self.kind[:40]}"
+        return [(number(a, key, what), number(b, key, what)) for a, b in zip(x, y, strict=True)]
 
 
 @dataclass
@@ -65,7 +77,8 @@ class _Body:
     """Points and lines of one body of the drawing."""
 
     points: list[Place] = field(default_factory=list)
-    lines: list[tuple[Place, Place]] = field(default_factory=list)
+    lines: dict[tuple[Place, Place], None] = field(default_factory=dict)
+    """Each once."""
 
 
 def begins(data: bytes) -> bool:
@@ -81,15 +94,15 @@ def drawing_of(path: Path, unit: str) -> Drawing:
     """Bodies and pins of a drawing; raises InputError where the file cannot be read in full."""
     key = str(path)
     header, entities = _read(path)
-    unit = _UNITS.get(header, "") or unit
-    if not unit:
-        raise InputError(
-            key,
-            f"$INSUNITS = {header}",
-            "the drawing states no unit of lengths",
-            "Add --unit, such as --unit mm",
+    stated, size = _UNITS.get(header, ("", None))
+    notes = []
+    if size is not None and unit and not math.isclose(size, to_si(f"1 {unit}", "m"), rel_tol=1e-9):
+        notes.append(
+            f"The drawing states {stated} ($INSUNITS = {header}), and --unit {unit} is used: check the largest length"
         )
-    bodies, notes = _bodies(list(_joined(entities)), key)
+        size = None  # programs state the unit of their template, whatever was drawn
+    scale = scale_of(size, stated, unit, f"{key}, $INSUNITS = {header}")
+    bodies, left = _bodies(list(_joined(entities)), key)
     every = [place for body in bodies.values() for place in body.points]
     if not every:
         raise InputError(
@@ -98,15 +111,30 @@ def drawing_of(path: Path, unit: str) -> Drawing:
             "has no points, lines, circles or polylines",
             "Draw the sketch in the model space",
         )
-    low = tuple(min(place[k] for place in every) for k in (0, 1))
-    size = max(math.dist(place, low) for place in every)
-    places = _distinct(every, size, key)
-    scale = to_si(f"1 {unit}", "m")
+    extent = _extent(every)
+    places, at = _distinct(every, extent, key)
+    lines = sum(len(body.lines) for body in bodies.values())
+    if max(len(places), len(bodies)) > MOST_POINTS or lines > MOST_LINES:
+        reason = f"has more than {MOST_POINTS} points or bodies, or {MOST_LINES} lines: no linkage has as many"
+        raise InputError(key, path.name, reason, "Save the sketch of the mechanism alone")
+    owners: list[list[str]] = [[] for _ in places]
+    for name, body in bodies.items():
+        for k in {at[place] for place in body.points}:
+            owners[k].append(name)
     points = [
-        _point(f"P{k}", place, bodies, _SAME * size, scale, key)
-        for k, place in enumerate(places, 1)
+        _point(Point(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, key)
+        for k, (place, own) in enumerate(zip(places, owners, strict=True), 1)
     ]
-    return Drawing([one for one in points if one.bodies != (GROUND,)], {}, notes)
+    points = [
+        one._replace(x=round(scale * one.x, 12), y=round(scale * one.y, 12)) for one in points
+    ]
+    return Drawing([one for one in points if one.bodies != (GROUND,)], {}, [*notes, *left])
+
+
+def _extent(places: Sequence[Place]) -> float:
+    """Largest distance of places from the lower left corner of them all."""
+    low = tuple(min(place[k] for place in places) for k in (0, 1))
+    return max(math.dist(place, low) for place in places)
 
 
 def _read(path: Path) -> tuple[int, list[_Entity]]:
@@ -115,9 +143,10 @@ def _read(path: Path) -> tuple[int, list[_Entity]]:
     if data.startswith(b"AutoCAD Binary DXF"):
         raise InputError(str(path), path.name, "is a binary DXF drawing", "Save it as ASCII DXF")
     try:
-        lines = data.decode("utf-8-sig").splitlines()
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        lines = data.decode("cp1252", "replace").splitlines()
+        text = data.decode("cp1252", "replace")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     section, unit = "", 0
     found: list[_Entity] = []
     last = ""
@@ -125,7 +154,7 @@ def _read(path: Path) -> tuple[int, list[_Entity]]:
         if code == 2 and last == "SECTION":
             section = value
         elif section == "HEADER" and last == "$INSUNITS" and code == 70:
-            unit = int(value)
+            unit = int(number(value, str(path), "$INSUNITS"))
         elif section == "ENTITIES" and code == 0 and value != "ENDSEC":
             found.append(_Entity(value, []))
         elif section == "ENTITIES" and found:
@@ -136,13 +165,13 @@ def _read(path: Path) -> tuple[int, list[_Entity]]:
 
 
 def _pairs(lines: Sequence[str], key: str) -> Iterator[tuple[int, str]]:
-    for number in range(0, len(lines) - 1, 2):
+    for at in range(0, len(lines) - 1, 2):
         try:
-            yield int(lines[number]), lines[number + 1].strip()
+            yield int(lines[at]), lines[at + 1].strip()
         except ValueError:
             raise InputError(
-                f"{key}, line {number + 1}",
-                lines[number][:40],
+                f"{key}, line {at + 1}",
+                lines[at][:40],
                 "is no group code",
                 "Save the drawing again as ASCII DXF",
             ) from None
@@ -151,27 +180,39 @@ def _pairs(lines: Sequence[str], key: str) -> Iterator[tuple[int, str]]:
 def _joined(entities: Sequence[_Entity]) -> Iterator[_Entity]:
     """Entities with the vertices of each old polyline in it."""
     made: list[_Entity] = []
+    within: _Entity | None = None
     for one in entities:
-        if one.kind == "VERTEX" and made:
-            made[-1].pairs.extend(pair for pair in one.pairs if pair[0] in (10, 20))
+        if one.kind == "VERTEX" and within is not None:
+            within.pairs.extend(pair for pair in one.pairs if pair[0] in (10, 20, 42))
         elif one.kind == "POLYLINE":  # its own place says nothing
-            made.append(one._replace(pairs=[pair for pair in one.pairs if pair[0] not in (10, 20)]))
-        elif one.kind not in _SKIPPED and one.text(8).lower() != "defpoints":
+            within = one._replace(pairs=[pair for pair in one.pairs if pair[0] not in (10, 20)])
+            made.append(within)
+        elif one.kind != "SEQEND":
+            within = None
             made.append(one)
     yield from made
 
 
 def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], list[str]]:
     """Bodies by name, the ground among them, and what was left out."""
-    by_layer = any(one.text(8).lower() in _STILL for one in entities)
+    by_layer = any(one.text(8).lower() in _STILL for one in entities if one.kind in _READ)
     bodies, names = {GROUND: _Body()}, dict[str, str]()
-    left = Counter[str]()
-    for number, one in enumerate(entities, 1):
+    given, left, bars = Names("layer", "layer"), Counter[str](), 0
+    for one in entities:
         layer = one.text(8, "0")
         if one.kind == "INSERT":
             raise InputError(
-                key, one.text(2), "the drawing has a block", "Explode blocks, and save it again"
+                key,
+                one.text(2)[:40],
+                "the drawing has a block",
+                "Explode blocks, and save it again",
             )
+        if one.text(67).strip() == "1" or layer.lower() == "defpoints" or one.kind not in _READ:
+            where = " of the paper space" if one.text(67).strip() == "1" else ""
+            left[
+                f"{one.kind[:40]}{where or ' of the layer Defpoints' * (layer.lower() == 'defpoints')}"
+            ] += 1
+            continue
         if one.text(230).startswith("-"):
             raise InputError(
                 key,
@@ -179,26 +220,38 @@ def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], li
                 "is seen from behind (extrusion along -z)",
                 "Draw it in the plane of the sketch",
             )
-        if one.kind not in ("POINT", "LINE", "CIRCLE", "LWPOLYLINE", "POLYLINE"):
-            left[one.kind] += 1
-            continue
         if layer.lower() in _STILL or (not by_layer and one.kind == "POINT"):
             name = GROUND
         elif by_layer:
             if layer not in names:
-                names[layer] = named(layer, "layer", list(bodies))
+                names[layer] = given.given(layer)
             name = names[layer]
         elif one.kind == "CIRCLE":
-            continue  # drawn around a pin
+            left["CIRCLE, taken for one that is drawn around a pin"] += 1
+            continue
         else:
-            name = f"bar{number}"
+            bars += 1
+            name = f"bar{bars}"
+        left["bulge of a polyline, which is read as a straight line"] += _bulges(one, key)
         _add(bodies.setdefault(name, _Body()), one, key)
     if not bodies[GROUND].points:
         raise InputError(
             key, "ground", "nothing says what stands still",
             "Put it on a layer of the name ground, or draw a POINT at each pin of the ground"
         )  # fmt: skip
-    return bodies, [f"Not read: {count} {kind}" for kind, count in left.items()]
+    notes = []
+    for words, texts in (("Not read", False), ("Left out", True)):
+        counted = [
+            f"{count} {kind}" for kind, count in left.items() if count and (kind in _TEXTS) == texts
+        ]
+        if counted:
+            notes.append(f"{words}: {listed(counted)}")
+    return bodies, [*notes, *given.notes()]
+
+
+def _bulges(one: _Entity, key: str) -> int:
+    """How many sides of a polyline are arcs."""
+    return sum(number(value, key, "a bulge") != 0.0 for code, value in one.pairs if code == 42)
 
 
 def _add(body: _Body, one: _Entity, key: str) -> None:
@@ -206,40 +259,53 @@ def _add(body: _Body, one: _Entity, key: str) -> None:
     places = one.places(10, key)
     if one.kind == "LINE":
         places += one.places(11, key)
-    if "POLYLINE" in one.kind and int(one.text(70, "0") or 0) & 1:
+    if not places or (one.kind == "LINE" and len(places) != 2):
+        raise InputError(
+            key, one.kind, "has no place, or an end too many or too few", "Save the drawing again"
+        )
+    if "POLYLINE" in one.kind and int(number(one.text(70) or "0", key, "a flag of a polyline")) & 1:
         places = [*places, places[0]]
     body.points += places
-    body.lines += list(itertools.pairwise(places))
+    body.lines |= dict.fromkeys(itertools.pairwise(places))
 
 
-def _distinct(places: Sequence[Place], size: float, key: str) -> list[Place]:
-    """Each place once; places that are neither one nor two are refused."""
-    made: list[Place] = []
-    for place in places:
-        gap, near = min(((math.dist(place, one), one) for one in made), default=(math.inf, place))
+def _distinct(
+    places: Sequence[Place], size: float, key: str
+) -> tuple[list[Place], dict[Place, int]]:
+    """Each place once, and which of them each is; places that are neither one nor two are refused.
+
+    Places are kept in squares, so that those beside one are found without a look at all.
+    """
+    made, at = list[Place](), dict[Place, int]()
+    squares: dict[tuple[int, int], list[int]] = {}
+    side = _NEAR * size or 1.0
+    for place in dict.fromkeys(places):
+        i, j = math.floor(place[0] / side), math.floor(place[1] / side)
+        beside = [
+            k for m in (-1, 0, 1) for n in (-1, 0, 1) for k in squares.get((i + m, j + n), ())
+        ]
+        gap, k = min(((math.dist(place, made[k]), k) for k in beside), default=(math.inf, 0))
         if _SAME * size < gap < _NEAR * size:
+            near = made[k]
             reason = f"is {gap:.3g} beside {near[0]:g}, {near[1]:g}: neither one pin nor two points"
             raise InputError(
                 key, f"{place[0]:g}, {place[1]:g}", reason, "Let the ends of lines snap"
             )
         if gap > _SAME * size:
+            k = len(made)
             made.append(place)
-    return made
+            squares.setdefault((i, j), []).append(k)
+        at[place] = k
+    return made, at
 
 
-def _point(
-    name: str, place: Place, bodies: Mapping[str, _Body], near: float, scale: float, key: str
-) -> Point:
-    """The point at a place, with its bodies; it slides where it lies inside a line of the ground."""
-    own = tuple(
-        n for n, body in bodies.items() if any(math.dist(place, p) <= near for p in body.points)
-    )
-    made = Point(name, round(scale * place[0], 12), round(scale * place[1], 12), own)
+def _point(made: Point, bodies: Mapping[str, _Body], near: float, key: str) -> Point:
+    """A point of some bodies, in the drawing's unit; it slides where it lies inside a line of the ground."""
+    place = made.x, made.y
     for carrier, body in bodies.items():
-        line = next(
-            (ends for ends in body.lines if carrier not in own and _is_inside(place, ends, near)),
-            None,
-        )
+        if carrier in made.bodies:
+            continue
+        line = next((ends for ends in body.lines if _is_inside(place, ends, near)), None)
         if line is not None and carrier == GROUND:
             made = made._replace(slide=math.atan2(line[1][1] - line[0][1], line[1][0] - line[0][0]))
         elif line is not None:

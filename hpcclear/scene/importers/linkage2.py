@@ -7,20 +7,45 @@ shows. A positive speed is clockwise.
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import GROUND, Drawing, Point, named
+from hpcclear.scene.importers.points import (
+    GROUND,
+    Drawing,
+    Names,
+    Point,
+    limit,
+    listed,
+    number,
+    scale_of,
+)
 
-_SIZES = {"millimeters": 24.5e-3 / 96.0, "mm": 24.5e-3 / 96.0, "inches": 25.4e-3 / 96.0}
-"""m of a unit of the coordinates, by the unit that the document shows."""
+_SIZES = {
+    "millimeters": (24.5e-3 / 96.0, 1e-3), "mm": (24.5e-3 / 96.0, 1e-3), "inches": (25.4e-3 / 96.0, 25.4e-3),
+}  # fmt: skip
+"""m of a unit of the coordinates, and of the unit that the document shows, by its name."""
 _DRAWING_LAYER = 1
+_LINKS = ("Link", "element")
+_SPEED = "15"
+"""rpm of an input that states none."""
+_IGNORED = {
+    "alwaysmanual": "inputs or actuators that are moved by hand",
+    "limitangle": "inputs that swing to and fro",
+    "startoffset": "inputs that start at an offset",
+    "drawcircle": "circles around connectors",
+}
+"""Attributes without a counterpart."""
 _REFUSED = {
     "actuator": ("an actuator, which changes its length", "Replace it with a crank"),
     "gear": ("a gear", "Remove gears: only pins and sliders are read"),
+    "fastenlink": ("a link that is fastened to another one", "Combine both into one link"),
+    "fastenconnector": ("a link that is fastened to a connector", "Combine both into one link"),
+    "fasten": ("a connector that is fastened to a link", "Make it a connector of this link"),
 }
 """Attributes of links that no scene can have, and what to do."""
 
@@ -46,28 +71,55 @@ class _Connector:
 
 def drawing_of(path: Path, unit: str) -> Drawing:
     """Pins, sliders, anchors and rotating inputs of a document; raises InputError where it cannot be read in full."""
-    root = _root(path)
+    root, key = _root(path), str(path)
     program = root.find("program")
     shown = "Millimeters" if program is None else program.get("units", "Millimeters")
-    size = _SIZES.get(shown.lower())
-    if size is None:
-        raise InputError(
-            str(path),
-            shown,
-            "is no unit of this program that is known",
-            "Set millimetres or inches there",
-        )
-    connectors = _connectors(root, str(path))
-    bodies = _links(root, connectors, str(path))
-    points, speeds = [], {}
+    if shown.lower() not in _SIZES:
+        reason = "is no unit of this program that is known"
+        raise InputError(key, shown[:40], reason, "Set millimetres or inches there")
+    size, stated = _SIZES[shown.lower()]
+    scale_of(stated, shown, unit, key)
+    names = Names("connector", "P"), Names("link", "link")
+    connectors = _connectors(root, key, names[0])
+    limit(len(connectors) // 2, key)
+    bodies = _links(root, connectors, key, names[1])
+    points, speeds, unstated, lone = [], {}, [], Counter[str]()
     for one in connectors.values():
         if not one.links and not (one.has("anchor") and one.has("slider")):
+            lone["connectors without a link"] += 1
             continue
-        points.append(_point(one, connectors, bodies, size, str(path)))
+        point = _point(one, connectors, bodies, size, key)
+        if point.bodies:
+            points.append(point)
         if one.has("input"):
-            speeds[_driven(one, str(path))] = -float(one.row.get("rpm") or 15.0)
-    note = f"Lengths are those that the program shows, in {shown.lower()}; compare one: {_longest(points)}"
-    return Drawing([p for p in points if p.bodies], speeds, [note])
+            if not one.row.get("rpm"):
+                unstated.append(one.name)
+            speeds[_driven(one, key)] = -number(
+                one.row.get("rpm") or _SPEED, key, f"the rpm of {one.name}"
+            )
+    notes = [
+        f"Lengths are those that the program shows, in {shown.lower()}: compare one",
+        *_left(root, lone),
+    ]
+    if unstated:
+        notes.append(f"Inputs without a speed turn at {_SPEED} rpm: {listed(unstated)}")
+    return Drawing(points, speeds, [*notes, *names[0].notes(), *names[1].notes()])
+
+
+def _left(root: ElementTree.Element, lone: Counter[str]) -> list[str]:
+    """What the document has and a scene does not."""
+    lone["elements of the drawing layer"] = sum(map(_is_drawing, root))
+    lone["links of one connector"] = sum(
+        row.tag in _LINKS and not _is_drawing(row) and len(row.findall("connector")) < 2
+        for row in root
+    )
+    for row in root:
+        if row.tag not in ("connector", "program", "selected", "ratios", *_LINKS):
+            lone[f"elements {row.tag[:40]!r}"] += 1
+        for key, words in _IGNORED.items():
+            lone[words] += row.get(key, "") not in ("", "false", "0", "0.000000")
+    counted = [f"{count} {what}" for what, count in lone.items() if count]
+    return [f"Not read: {listed(counted)}"] if counted else []
 
 
 def _root(path: Path) -> ElementTree.Element:
@@ -81,7 +133,7 @@ def _root(path: Path) -> ElementTree.Element:
         )
     try:
         root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # or of an unknown encoding
         raise InputError(
             str(path), path.name, f"is no XML that can be read ({error})", "Save it again"
         ) from None
@@ -103,52 +155,68 @@ def _is_drawing(row: ElementTree.Element) -> bool:
     return row.get("layer") == str(_DRAWING_LAYER) or row.get("measurementelement") == "true"
 
 
-def _connectors(root: ElementTree.Element, key: str) -> dict[str, _Connector]:
+def _refuse(row: ElementTree.Element, key: str) -> None:
+    """InputError where an element has what no scene can have."""
+    for word, (what, remedy) in _REFUSED.items():
+        if row.get(word, "false") not in ("false", ""):
+            raise InputError(
+                key, f"{row.tag} {row.get('id')}"[:40], f"the document has {what}", remedy
+            )
+
+
+def _connectors(root: ElementTree.Element, key: str, names: Names) -> dict[str, _Connector]:
     found: dict[str, _Connector] = {}
     for row in root.findall("connector"):
         if _is_drawing(row):
             continue
-        name = named(
-            row.get("name") or f"P{row.get('id')}", "P", [one.name for one in found.values()]
-        )
-        try:
-            place = float(row.get("x", "")), float(row.get("y", ""))
-        except ValueError:
+        id_ = row.get("id", "")
+        name = names.given(row.get("name") or "", f"P{id_}")
+        if id_ in found:
             raise InputError(
-                key, name, "a connector has no place", "Save the document again"
-            ) from None
-        if float(row.get("slideradius") or 0.0) > 0.0:
+                key, id_[:40], "two connectors have this id", "Save the document again"
+            )
+        _refuse(row, key)
+        x, y = (number(row.get(axis, ""), key, f"{axis} of {name}") for axis in ("x", "y"))
+        if number(row.get("slideradius") or "0", key, f"the slide radius of {name}") > 0.0:
             raise InputError(
                 key,
                 name,
                 "a connector slides along an arc",
                 "Replace the arc by a bar to its centre",
             )
-        found[row.get("id", "")] = _Connector(row, name, *place)
+        found[id_] = _Connector(row, name, x, y)
     return found
 
 
 def _links(
-    root: ElementTree.Element, connectors: Mapping[str, _Connector], key: str
+    root: ElementTree.Element, connectors: Mapping[str, _Connector], key: str, names: Names
 ) -> dict[str, list[str]]:
     """Connectors of each body; a link with two anchors belongs to the ground."""
     bodies: dict[str, list[str]] = {GROUND: []}
-    for row in [*root.findall("Link"), *root.findall("element")]:
-        own = [c.get("id", "") for c in row.findall("connector")]
-        for word, (what, remedy) in _REFUSED.items():
-            if row.get(word) == "true":
-                raise InputError(key, f"link {row.get('id')}", f"the document has {what}", remedy)
-        if _is_drawing(row) or any(c not in connectors for c in own) or len(own) < 2:
-            continue  # a link of one connector is the program's way to write a lone point
+    for row in [row for tag in _LINKS for row in root.findall(tag)]:
+        own = list(dict.fromkeys(c.get("id", "") for c in row.findall("connector")))
+        if _is_drawing(row):
+            continue
+        _refuse(row, key)
+        if any(c.get("id") in connectors for c in row.findall("fastenconnector")):
+            what, remedy = _REFUSED["fastenconnector"]
+            raise InputError(key, f"link {row.get('id')}"[:40], f"the document has {what}", remedy)
+        lost = next((c for c in own if c not in connectors), None)
+        if lost is not None:
+            reason = f"has the connector {lost[:40]}, which is not in the document or is of its drawing layer"
+            raise InputError(key, f"link {row.get('id')}"[:40], reason, "Save the document again")
+        if len(own) < 2:
+            continue  # the program's way to write a lone point
         if sum(connectors[c].has("anchor") for c in own) > 1:
             bodies[GROUND] += own
             continue
-        name = named(row.get("name") or f"link{row.get('id')}", "link", list(bodies))
+        name = names.given(row.get("name") or "", f"link{row.get('id')}")
         bodies[name] = own
         for c in own:
             connectors[c].links.append(name)
+    still = set(bodies[GROUND])
     for one in connectors.values():
-        if one.has("anchor") or one.row.get("id", "") in bodies[GROUND]:
+        if one.has("anchor") or one.row.get("id", "") in still:
             one.links.insert(0, GROUND)
     return bodies
 
@@ -192,15 +260,3 @@ def _driven(one: _Connector, key: str) -> str:
             "Make the input an anchor of its crank",
         )
     return body
-
-
-def _longest(points: Sequence[Point]) -> str:
-    """The longest distance of two points of a body, to compare."""
-    pairs = [
-        (math.hypot(a.x - b.x, a.y - b.y), a.name, b.name)
-        for k, a in enumerate(points)
-        for b in points[:k]
-        if set(a.bodies) & set(b.bodies) - {GROUND}
-    ]
-    length, first, second = max(pairs, default=(0.0, "", ""))
-    return f"{second} to {first} {1e3 * length:.6g} mm"

@@ -1,9 +1,11 @@
 """Linkages of PMKS+ (app.pmksplus.com): its project files (.pmks), links that it shares, and tables of its successor.
 
 A project is what stands behind the question mark of a link: fields between full stops, tokens between commas, numbers
-to the base 64 in thousandths, a leading 0 for a minus sign, and a last character that states the length.
+to the base 64 in thousandths, a leading 0 for a minus sign, and a last character that states the length. Earlier
+projects write a slider as a pin, a joint of the line and a block that connects both, newer ones as one joint.
 """
 
+import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -12,14 +14,28 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import GROUND, Drawing, Point, named
+from hpcclear.scene.importers.points import (
+    GROUND,
+    Drawing,
+    Names,
+    Point,
+    limit,
+    listed,
+    number,
+    scale_of,
+)
 from hpcclear.scene.units import to_si
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 _LENGTHS = ("in", "cm", "m")
 """Units of a project, by the number that it states."""
+_LONGEST_TOKEN = 11
+"""Characters of a number: 64^11 thousandths are farther than any place."""
 _PRISMATIC, _INPUT, _GROUNDED, _WELDED = 1, 2, 4, 8
 """Flags of a joint."""
+_ROOTS, _MEMBERS = "YAMG0123", "Namg4567"
+"""First characters of the rows of links, by what is drawn as a bar or disc with a stated or computed mass centre: links, and
+those that are welded to others and stand in the row of the whole."""
 _AGAIN = "Copy the whole link, or save the project again"
 
 
@@ -35,6 +51,8 @@ class _Joint(NamedTuple):
     """Of a slider's line, rad."""
     slot: tuple[str, ...] = ()
     """Link that has this line, and its joints at both ends; the ground, where there is none."""
+    speed: float = 0.0
+    """rpm of an input, counter-clockwise; 0 for that of the project."""
 
 
 class _Link(NamedTuple):
@@ -44,6 +62,8 @@ class _Link(NamedTuple):
     name: str
     is_block: bool
     joints: tuple[str, ...]
+    members: tuple[str, ...] = ()
+    """Links that are welded together in it."""
 
 
 def begins(data: bytes) -> bool:
@@ -88,17 +108,30 @@ def _project(query: str, key: str, unit: str) -> Drawing:
         raise InputError(key, len(fields), "has fewer fields than a project", _AGAIN)
     flags, _, integers, kinds, *rest = fields
     first, second = _ends(rest, key)
+    limit(max(first, second - first) // 2, key)
     joints = [_joint(row, key) for row in rest[:first]]
-    links = [_link(row, key) for row in rest[first + 1 : second] if row.startswith("Y")]
-    speed = float(_number(integers.split(",")[0], key)) * (
+    rows = rest[first + 1 : second]
+    wrong = next((row for row in rows if row[0] not in _ROOTS + _MEMBERS), None)
+    if wrong is not None:
+        reason = f"begins with {wrong[0]!r}: no kind of link that is known"
+        raise InputError(key, wrong[:40], reason, "Export it with an older version, or as CSV")
+    links = [_link(row, key) for row in rows if row[0] in _ROOTS]
+    welded = {member for link in links for member in link.members}
+    alone = [
+        one for row in rows if row[0] in _MEMBERS and (one := _link(row, key)).key not in welded
+    ]
+    if alone:
+        reason = "is part of a welded link that is not in the file"
+        raise InputError(key, alone[0].key, reason, _AGAIN)
+    speed = abs(_number(integers.split(",")[0], key)) * (
         -1.0 if _number(flags, key, plain=True) & 1 else 1.0
     )
-    length = int(kinds[0]) if kinds[:1].isdigit() else len(_LENGTHS)
-    stated = _LENGTHS[length] if length < len(_LENGTHS) else unit
-    notes = []
-    if any(rest[second + 1 : -1]):
-        notes.append("Forces of the project are not taken over")
-    return _drawing(joints, links, speed, stated, key, notes)
+    length = int(kinds[0]) if kinds[:1] in tuple("0123456789") else len(_LENGTHS)
+    stated = _LENGTHS[length] if length < len(_LENGTHS) else ""
+    size = scale_of(to_si(f"1 {stated}", "m") if stated else None, stated, unit, key)
+    forces = [row for row in rest[second + 1 : -1] if row]
+    notes = [f"Not read: {len(forces)} forces of the project"] if forces else []
+    return _drawing(*_split(joints, links), speed, size, key, notes)
 
 
 def _ends(rest: Sequence[str], key: str) -> tuple[int, int]:
@@ -111,6 +144,8 @@ def _ends(rest: Sequence[str], key: str) -> tuple[int, int]:
 
 def _number(token: str, key: str, plain: bool = False) -> int:
     """An integer to the base 64; a leading 0 is a minus sign unless the number is plain."""
+    if len(token) > _LONGEST_TOKEN:
+        raise InputError(key, token[:20], "is no number of a project", _AGAIN)
     value = 0
     for digit in token:
         place = _DIGITS.find(digit)
@@ -125,65 +160,101 @@ def _joint(row: str, key: str) -> _Joint:
     if len(tokens) < 4 or not row:
         raise InputError(key, row[:40], "is no joint", _AGAIN)
     x, y, angle = (_number(token, key) / 1e3 for token in tokens[1:4])
-    return _Joint(name, tokens[0], x, y, _number(row[0], key, plain=True), angle, tuple(tokens[4:]))
+    slot = tuple(tokens[4:7]) if tokens[4:5] not in ([], [""]) else ()
+    speed = _number(tokens[7], key) / 1e3 if tokens[7:8] not in ([], [""]) else 0.0
+    return _Joint(name, tokens[0], x, y, _number(row[0], key, plain=True), angle, slot, speed)
 
 
 def _link(row: str, key: str) -> _Link:
     name, *tokens = row[2:].split(",")
-    if len(tokens) < 8:
+    if len(tokens) < 7:
         raise InputError(key, row[:40], "is no link", _AGAIN)
     joints = tokens[6:]
-    return _Link(
-        name,
-        tokens[0],
-        row[1] == "P",
-        tuple(joints[: joints.index("")] if "" in joints else joints),
-    )
+    end = joints.index("") if "" in joints else len(joints)
+    members = tuple(one for one in joints[end + 1 :] if one)
+    return _Link(name, tokens[0], row[1] == "P", tuple(joints[:end]), members)
 
 
 def _table(text: str, key: str, unit: str) -> Drawing:
     """The CSV export of the successor: sections of joints (j), links (l) and welded links (c)."""
     rows: dict[str, list[list[str]]] = {}
     section = ""
-    for line in text.splitlines():
-        if line.startswith("---"):
-            section = line.strip("- ")
-            rows[section] = []
-        elif line.strip():
-            rows.setdefault(section, []).append(line.split(","))
-    bodies = [row for row in rows.get("l", [])[1:] if len(row) > 6]
-    joints, links = [], [_Link(row[0], row[1], False, tuple(row[6].split("|"))) for row in bodies]
-    speed = 0.0
-    for row in rows.get("j", [])[1:]:
-        try:
-            prismatic, grounded, turned = row[4] == "0", row[6] == "true", row[7] == "true"
-            flags = _PRISMATIC * prismatic + _INPUT * turned + _GROUNDED * grounded
-            joints.append(
-                _Joint(
-                    row[0], row[1], float(row[2]), float(row[3]), flags, math.radians(float(row[5]))
-                )
-            )
-            speed = float(row[8]) if turned else speed
-        except (IndexError, ValueError):
-            raise InputError(key, ",".join(row)[:40], "is no joint", _AGAIN) from None
+    try:
+        for row in csv.reader(text.splitlines(), strict=True):
+            if row and row[0].startswith("---"):
+                section = row[0].strip("- ")
+                rows[section] = []
+            elif row:
+                rows.setdefault(section, []).append(row)
+    except csv.Error as error:
+        raise InputError(key, "table", f"cannot be read ({error})", _AGAIN) from None
+    limit(max(map(len, rows.values()), default=0) // 2, key)
+    joints = [_joint_of(row, key) for row in rows.get("j", [])[1:]]
+    links = [
+        _Link(row[0], row[1], False, _ids(row, 6, key))
+        for row in rows.get("l", [])[1:]
+        if _ids(row, 6, key)
+    ]
     for row in rows.get("c", [])[1:]:
-        members = [one for one in links if one.key in row[5].split("|")]
-        welded = tuple(dict.fromkeys(joint for one in members for joint in one.joints))
-        links = [one for one in links if one not in members] + [
-            _Link(row[0], row[1], False, welded)
-        ]
+        parts = _ids(row, 5, key)
+        members = [one for one in links if one.key in parts]
+        if len(members) < len(parts):
+            raise InputError(
+                key, ",".join(row)[:40], "is welded of links that are not in the file", _AGAIN
+            )
+        joined = tuple(dict.fromkeys(joint for one in members for joint in one.joints))
+        links = [one for one in links if one not in members]
+        links.append(
+            _Link(f"welded {row[0]}", row[1], False, joined, tuple(one.key for one in members))
+        )
     notes = ["The file does not state the unit of lengths, nor whether the input turns clockwise"]
-    return _drawing(*_split(joints, links), speed, unit, key, notes)
+    kinds = (("f", "forces"), ("p", "positions of a synthesis"), ("t", "trajectories"))
+    left = [f"{count} {words}" for kind, words in kinds if (count := len(rows.get(kind, [])[1:]))]
+    if left:
+        notes.append(f"Not read: {', '.join(left)}")
+    return _drawing(*_split(joints, links), 0.0, scale_of(None, "", unit, key), key, notes)
+
+
+def _ids(row: Sequence[str], place: int, key: str) -> tuple[str, ...]:
+    """Ids of a cell, of joints or of links."""
+    if len(row) <= place:
+        raise InputError(key, ",".join(row)[:40], "is no row of a link", _AGAIN)
+    return tuple(one for one in row[place].split("|") if one)
+
+
+def _joint_of(row: Sequence[str], key: str) -> _Joint:
+    """A joint of the table."""
+    if len(row) < 9:
+        raise InputError(key, ",".join(row)[:40], "is no joint", _AGAIN)
+    x, y, angle = (
+        number(row[k], key, f"a place or angle of joint {row[1][:40]}") for k in (2, 3, 5)
+    )
+    turned, welded = row[7] == "true", row[9:10] == ["true"]
+    flags = (
+        _PRISMATIC * (row[4] == "0")
+        + _INPUT * turned
+        + _GROUNDED * (row[6] == "true")
+        + _WELDED * welded
+    )
+    speed = number(row[8] or "0", key, f"the speed of joint {row[1][:40]}") if turned else 0.0
+    return _Joint(row[0], row[1], x, y, flags, math.radians(angle), speed=speed)
 
 
 def _split(joints: Sequence[_Joint], links: Sequence[_Link]) -> tuple[list[_Joint], list[_Link]]:
-    """Sliders as a project has them: a pin, and a joint of the line that a block connects with it."""
+    """Sliders that are one joint as earlier projects have them: a pin, and a joint of the line that a block connects with it.
+
+    A pin of a block stands still or is driven where its line does.
+    """
     made, blocks = [], []
+    within = {key for link in links if link.is_block for key in link.joints}
     for one in joints:
-        if one.flags & _PRISMATIC:
-            line = one._replace(key=f"line {one.key}", flags=one.flags | _GROUNDED)
+        if one.flags & _PRISMATIC and one.key not in within:
+            grounded = 0 if one.slot else _GROUNDED
+            line = one._replace(key=f"line {one.key}", flags=(one.flags | grounded) & ~_WELDED)
             blocks.append(_Link(f"block {one.key}", "", True, (one.key, line.key)))
-            made += [one._replace(flags=0), line]
+            made += [one._replace(flags=one.flags & _WELDED, slot=()), line]
+        elif one.key in within and not one.flags & _PRISMATIC:
+            made.append(one._replace(flags=one.flags & ~_GROUNDED))
         else:
             made.append(one)
     return made, [*links, *blocks]
@@ -193,45 +264,60 @@ def _drawing(
     joints: Sequence[_Joint],
     links: Sequence[_Link],
     speed: float,
-    unit: str,
+    size: float,
     key: str,
     notes: list[str],
 ) -> Drawing:
-    if not unit:
-        raise InputError(
-            key, "length", "the file states no unit of lengths", "Add --unit, such as --unit cm"
-        )
-    size = to_si(f"1 {unit}", "m")
     by_key = {one.key: one for one in joints}
+    if len(by_key) < len(joints):
+        raise InputError(key, len(joints), "two joints have the same letter", _AGAIN)
     lost = next((k for link in links for k in link.joints if k not in by_key), None)
     if lost is not None:
-        raise InputError(key, lost, "is a joint of a link, but not in the file", _AGAIN)
+        raise InputError(key, lost[:40], "is a joint of a link, but not in the file", _AGAIN)
+    names, given = Names("link", "link"), Names("joint", "P")
     bodies: dict[str, str] = {}
+    own: dict[str, list[str]] = {one.key: [] for one in joints}
     for link in links:
         if not link.is_block:
-            bodies[link.key] = named(link.name or link.key, "link", list(bodies.values()))
+            bodies[link.key] = names.given(link.name, link.key)
+            bodies |= dict.fromkeys(link.members, bodies[link.key])
+            for k in dict.fromkeys(link.joints):
+                own[k].append(bodies[link.key])
     lines = _lines(links, by_key, key)
     points: list[Point] = []
     speeds: dict[str, float] = {}
-    taken: list[str] = []
+    alone = []
     for one in joints:
-        own = [bodies[link.key] for link in links if not link.is_block and one.key in link.joints]
-        if not own:
+        if not own[one.key]:
+            if not one.flags & _PRISMATIC:
+                alone.append(one.name or one.key)
             continue
         if one.flags & _INPUT:
-            if not one.flags & _GROUNDED:
+            speeds[own[one.key][0]] = one.speed or speed
+            if not one.flags & _GROUNDED or one.key in lines:
                 raise InputError(
                     key,
-                    one.name,
+                    one.name[:40],
                     "the input is not on the ground",
                     "Drive a crank on the ground there",
                 )
-            speeds[own[0]] = speed
-        taken.append(named(one.name or one.key, "P", taken))
-        pins = (GROUND, *own) if one.flags & _GROUNDED else tuple(own)
-        point = Point(taken[-1], round(size * one.x, 12), round(size * one.y, 12), pins)
+            if len(own[one.key]) > 1:
+                notes.append(
+                    f"Input {one.name} turns {own[one.key][0]}, the first of {listed(own[one.key])}"
+                )
+        pins = (GROUND, *own[one.key]) if one.flags & _GROUNDED else tuple(own[one.key])
+        name = given.given(one.name, one.key)
+        point = Point(name, round(size * one.x, 12), round(size * one.y, 12), pins)
         points.append(_sliding(point, one, lines.get(one.key), by_key, bodies, key))
-    return Drawing(points, speeds, [*notes, "Masses of the file are not taken over"])
+    if alone:
+        notes.append(f"Not read: joints without a link: {listed(alone)}")
+    if not all(speeds.values()):
+        raise InputError(key, "input", "an input has the speed 0", "Give it a speed there")
+    return Drawing(
+        points,
+        speeds,
+        [*notes, "Masses of the file are not taken over", *names.notes(), *given.notes()],
+    )
 
 
 def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], key: str) -> dict[str, _Joint]:
@@ -246,7 +332,7 @@ def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], key: str) -> di
         if line.flags & _INPUT:
             raise InputError(
                 key,
-                line.name,
+                line.name[:40],
                 "is driven along a line, like a hydraulic cylinder",
                 "Drive a crank there: cylinders are loads here",
             )

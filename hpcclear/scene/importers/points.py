@@ -2,20 +2,33 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import tomli_w
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.units import to_si
 
 GROUND = "ground"
 MASS = 0.1
 """kg of a body whose mass nobody has given."""
 SPEED = 60.0
 """rpm of a drive whose speed nobody has given."""
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 """Of a point or a body."""
+MOST_POINTS = 1000
+"""Of a linkage: points are compared in pairs, and a file of more holds something else."""
+MOST_TURNS = 64
+"""Of a drive in a revolution."""
+FARTHEST = 1e5
+"""m from the origin."""
+LONGEST_NUMBER = 100
+"""Characters."""
+_LISTED = 12
+"""Names in a line of the summary."""
 
 
 class Point(NamedTuple):
@@ -40,20 +53,101 @@ class Drawing(NamedTuple):
     points: Sequence[Point]
     """In m."""
     speeds: Mapping[str, float] = {}
-    """rpm of each driven body, counter-clockwise; none: the first body on the ground, at `SPEED`."""
+    """rpm of each driven body, counter-clockwise; none: the first body that turns about a pin of the ground, at `SPEED`."""
     notes: Sequence[str] = ()
     """What the file has and the scene does not, and what to check."""
 
 
-def named(text: str, kind: str, taken: Sequence[str]) -> str:
-    """A name of a point or body that a file calls `text`: of letters, digits, - and _, and not yet taken."""
-    plain = re.sub(r"[^A-Za-z0-9_-]+", "_", text.strip()).strip("_")[:30]
-    name = plain if NAME.fullmatch(plain) else f"{kind}{plain}"
-    made, count = name, 1
-    while made in taken or made == GROUND:
-        count += 1
-        made = f"{name}_{count}"
-    return made
+class Names:
+    """Names that a scene can have, each once, for those of a file.
+
+    Parameters
+    ----------
+    kind : str
+        What they name, in notes, such as "layer".
+    prefix : str
+        Before a name that does not begin with a letter.
+    """
+
+    def __init__(self, kind: str, prefix: str) -> None:
+        self.kind, self.prefix = kind, prefix
+        self._counts = Counter({GROUND: 1, "center": 1})
+        self._replaced: dict[str, str] = {}
+
+    def given(self, text: str, default: str = "") -> str:
+        """The name for one of the file, or for `default` where it has none: letters, digits and _, and not yet given."""
+        text = text.strip()
+        plain = re.sub(r"[^A-Za-z0-9_]+", "_", text or default).strip("_")[:30]
+        name = made = plain if NAME.fullmatch(plain) else f"{self.prefix}{plain}"
+        while self._counts[made]:
+            self._counts[name] += 1
+            made = f"{name}_{self._counts[name]}"
+        self._counts[made] += 1
+        if text and made != text:
+            self._replaced[text[:60]] = made
+        return made
+
+    def notes(self) -> list[str]:
+        """A sentence that says which names are replaced; none where all are kept."""
+        if not self._replaced:
+            return []
+        pairs = [f"{old!r} is {new}" for old, new in self._replaced.items()]
+        return [f"Names that a scene cannot have, by {self.kind}: {listed(pairs)}"]
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words after each other, the first ones where they are many."""
+    every = list(words)
+    more = f" and {len(every) - _LISTED} more" if len(every) > _LISTED else ""
+    return ", ".join(every[:_LISTED]) + more
+
+
+def number(text: str, key: str, what: str) -> float:
+    """A finite number of a file; raises InputError where `what` is none."""
+    try:
+        value = float(text) if len(text) <= LONGEST_NUMBER else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(key, text[:40], f"{what} is no finite number", "Save the file again")
+    return value
+
+
+def limit(count: int, key: str) -> None:
+    """Raise InputError for more points, or parts of another kind, than a linkage has."""
+    if count > MOST_POINTS:
+        reason = f"has more points or bodies than a linkage: at most {MOST_POINTS}"
+        raise InputError(key, count, reason, "Save the mechanism alone")
+
+
+def scale_of(stated: float | None, words: str, unit: str, key: str) -> float:
+    """Return the unit of a file's lengths, m.
+
+    Parameters
+    ----------
+    stated : float or None
+        What the file states, m.
+    words : str
+        The same in words.
+    unit : str
+        What the user says.
+
+    Raises
+    ------
+    InputError
+        If neither says a unit, or they contradict each other.
+    """
+    given = to_si(f"1 {unit}", "m") if unit else None
+    if stated is None and given is None:
+        raise InputError(
+            key, "length", "the file states no unit of lengths", "Add --unit, such as --unit mm"
+        )
+    if stated is not None and given is not None and not math.isclose(stated, given, rel_tol=1e-9):
+        raise InputError(
+            "--unit", unit, f"the file states {words}", "Leave --unit out, or correct the file"
+        )
+    assert given is not None or stated is not None
+    return float(stated if stated is not None else given or 0.0)
 
 
 def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
@@ -70,27 +164,20 @@ def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
     InputError
         If the bodies make no linkage.
     """
-    points = _with_blocks(drawing.points, key)
-    names = list(dict.fromkeys(body for one in points for body in one.bodies if body != GROUND))
+    points = _with_blocks(_checked(drawing.points, key), key)
+    own = _by_body(points)
+    names = [name for name in own if name != GROUND]
     speeds = dict(drawing.speeds) or {_driven(points, names, key): SPEED}
-    size = max((math.dist(a[1:3], b[1:3]) for a in points for b in points), default=0.0)
-    frames = {name: _frame(name, points, key) for name in names}
-    still = [
-        one for one in points if GROUND in (*one.bodies, one.guide if one.slide is not None else "")
-    ]
+    size = max((math.dist(a[1:3], b[1:3]) for a, b in combinations(points, 2)), default=0.0)
+    frames = {name: _frame(name, own[name], key) for name in names}
     return {
         "format_version": 1,
         "mechanism": {
             "kind": "planar",
-            "bodies": {name: _body(name, points, frames[name], size) for name in names},
-            "ground": {"points": {one.name: [one.x, one.y] for one in still}},
+            "bodies": {name: _body(own[name], frames[name], size) for name in names},
+            "ground": {"points": {one.name: [one.x, one.y] for one in own.get(GROUND, [])}},
             "joints": _joints(points, frames),
-            "drives": {
-                "motor" if len(speeds) == 1 else f"motor_{body}": {
-                    "kind": "constant-speed", "body": body, "speed": f"{speed:.12g} rpm",
-                }
-                for body, speed in speeds.items()
-            },
+            "drives": _drives(speeds),
         },
         "effects": {"gravity": 0.0},
     }  # fmt: skip
@@ -109,30 +196,117 @@ def text_of(content: dict[str, Any], source: str, notes: Sequence[str] = ()) -> 
     return "\n".join(f"# {line}" for line in lines) + "\n\n" + tomli_w.dumps(content)
 
 
-def _driven(points: Sequence[Point], names: Sequence[str], key: str) -> str:
-    """The first body that is pinned to the ground."""
-    for name in names:
-        if any(name in one.bodies and GROUND in one.bodies for one in points):
-            return name
-    raise InputError(
-        key, ", ".join(names), "no body is pinned to the ground",
-        'Name the body "ground" at points that stand still'
+def _drives(speeds: Mapping[str, float]) -> dict[str, Any]:
+    """A drive for each body; where one turn of the slowest is not enough for all to repeat, its turns until they do."""
+    made: dict[str, Any] = {
+        "motor" if len(speeds) == 1 else f"motor_{body}": {
+            "kind": "constant-speed", "body": body, "speed": f"{speed:.12g} rpm",
+        }
+        for body, speed in speeds.items()
+    }  # fmt: skip
+    sizes = [round(1e6 * abs(speed)) for speed in speeds.values()]
+    turns = min(sizes) // max(math.gcd(*sizes), 1)
+    if 1 < turns <= MOST_TURNS:
+        list(made.values())[sizes.index(min(sizes))] |= {"period": True, "turns": turns}
+    elif len(set(sizes)) > 1:
+        list(made.values())[sizes.index(min(sizes))] |= {"period": True}
+    return made
+
+
+def _repeating(drives: Mapping[str, Mapping[str, Any]]) -> str:
+    """After how many turns several drives repeat together, in words."""
+    main = next((row for row in drives.values() if row.get("period")), None)
+    if main is None:
+        return ""
+    speed = float(main["speed"].split()[0]) / main.get("turns", 1)
+    ratios = [float(row["speed"].split()[0]) / speed for row in drives.values()]
+    if any(abs(one - round(one)) > 1e-9 * abs(one) for one in ratios):
+        return f"; check refuses them, since they do not repeat together within {MOST_TURNS} turns"
+    return f"; they repeat together after {main.get('turns', 1)} turns of {main['body']}, which is one revolution of the scene"
+
+
+def summary(content: Mapping[str, Any], drawing: Drawing) -> list[tuple[str, str]]:
+    """Return what a scene has of a file, and what it leaves, as labels and texts."""
+    mechanism = content["mechanism"]
+    drives = [f"{row['body']} at {row['speed']}" for row in mechanism["drives"].values()]
+    kinds = [
+        f"{name} ({'guide' if row['kind'] == 'slide' else 'pin'})"
+        for name, row in mechanism["joints"].items()
+    ]
+    length = max(
+        ((math.dist(a[1:3], b[1:3]), name, a.name, b.name)
+         for name, own in _by_body(drawing.points).items() for a, b in combinations(own, 2)),
+        default=None,
     )  # fmt: skip
+    lines = [
+        ("bodies", listed(mechanism["bodies"])),
+        ("joints", listed(kinds)),
+        (
+            "drives",
+            listed(drives)
+            + ("" if drawing.speeds else ", a placeholder: the file states no drive")
+            + _repeating(mechanism["drives"]),
+        ),
+    ]
+    if length is not None:
+        lines.append(
+            (
+                "length",
+                f"at most {1e3 * length[0]:.6g} mm, from {length[2]} to {length[3]} of {length[1]}",
+            )
+        )
+    return lines + [("note", note) for note in drawing.notes]
+
+
+def _checked(points: Sequence[Point], key: str) -> Sequence[Point]:
+    """Points that are not too many, and near enough."""
+    limit(len(points), key)
+    limit(sum(len(one.bodies) for one in points) // 4, key)
+    for one in points:
+        if not max(abs(one.x), abs(one.y)) <= FARTHEST:
+            reason = f"is more than {FARTHEST:g} m from the origin"
+            raise InputError(key, one.name, reason, "Correct its place or the unit of lengths")
+    return points
+
+
+def _driven(points: Sequence[Point], names: Sequence[str], key: str) -> str:
+    """The first body that turns about a pin of the ground."""
+    pinned = {
+        name for one in points if GROUND in one.bodies and one.slide is None for name in one.bodies
+    }
+    for name in names:
+        if name in pinned:
+            return name
+    still = any(
+        GROUND in (*one.bodies, one.guide if one.slide is not None else "") for one in points
+    )
+    if still:
+        reason, remedy = (
+            "the file states no drive, and no body turns about a pin of the ground",
+            "Drive a crank on the ground",
+        )
+    else:
+        reason, remedy = (
+            "no body is pinned to the ground",
+            'Name the body "ground" at points that stand still',
+        )
+    raise InputError(key, listed(names), reason, remedy)
 
 
 def _with_blocks(points: Sequence[Point], key: str) -> list[Point]:
     """Points with the body that slides last at each that does: a guide keeps it from turning."""
     made = []
+    uses = Counter(body for one in points for body in set(one.bodies))
     for one in points:
         if one.slide is not None:
             if GROUND in one.bodies and one.guide == GROUND:
                 raise InputError(
                     key, one.name, "a point of the ground slides", "Name its moving bodies"
                 )
-            alone = [
-                b for b in one.bodies if b != GROUND and sum(b in p.bodies for p in points) == 1
-            ]
+            alone = [b for b in one.bodies if b != GROUND and uses[b] == 1]
             block = one.block or (alone[-1] if alone else f"slider_{one.name}")
+            while not one.block and not alone and block in uses:
+                block += "_"
             one = one._replace(bodies=(*(b for b in one.bodies if b != block), block), block=block)
         made.append(one)
     return made
@@ -155,17 +329,20 @@ class _Frame(NamedTuple):
         ]  # no -0
 
 
-def _points_of(name: str, points: Sequence[Point]) -> list[Point]:
-    """Pins of a body first, then the places of its guides."""
-    pins = [one for one in points if name in one.bodies]
-    return pins + [
-        one for one in points if one.slide is not None and one.guide == name and one not in pins
-    ]
+def _by_body(points: Sequence[Point]) -> dict[str, list[Point]]:
+    """Points of each body: its pins first, then the places of its guides."""
+    made: dict[str, list[Point]] = {}
+    for one in points:
+        for name in dict.fromkeys(one.bodies):
+            made.setdefault(name, []).append(one)
+    for one in points:
+        if one.slide is not None and one.guide not in one.bodies:
+            made.setdefault(one.guide, []).append(one)
+    return made
 
 
-def _frame(name: str, points: Sequence[Point], key: str) -> _Frame:
+def _frame(name: str, own: Sequence[Point], key: str) -> _Frame:
     """The first point at the origin and the second on the x axis; of a body that slides the x axis along its line."""
-    own = _points_of(name, points)
     slides = [one.slide for one in own if one.slide is not None and one.block == name]
     if slides:
         return _Frame(own[0].x, own[0].y, slides[0])
@@ -179,9 +356,9 @@ def _frame(name: str, points: Sequence[Point], key: str) -> _Frame:
     return _Frame(first.x, first.y, math.atan2(second.y - first.y, second.x - first.x))
 
 
-def _body(name: str, points: Sequence[Point], frame: _Frame, size: float) -> dict[str, Any]:
+def _body(own: Sequence[Point], frame: _Frame, size: float) -> dict[str, Any]:
     """Its table; a body of one point is as long as a tenth of the linkage."""
-    places = {one.name: frame.local(one) for one in _points_of(name, points)}
+    places = {one.name: frame.local(one) for one in own}
     centre = [round(sum(place[k] for place in places.values()) / len(places), 12) for k in (0, 1)]
     spread = sum(math.dist(place, centre) ** 2 for place in places.values()) / len(places)
     return {
@@ -199,19 +376,21 @@ def _degrees(angle: float) -> str:
 
 def _joints(points: Sequence[Point], frames: Mapping[str, _Frame]) -> dict[str, Any]:
     """A pin for each further body of a point; a guide where a point slides."""
-    made = {}
+    made: dict[str, Any] = {}
+    taken = {one.name for one in points}
     for one in points:
         if one.slide is not None:
             carrier = frames[one.guide].angle if one.guide in frames else 0.0
             turned = math.remainder(one.slide - carrier, 2.0 * math.pi)
-            made[f"{one.name}_guide"] = {
+            name = _free(f"{one.name}_guide", taken)
+            made[name] = {
                 "kind": "slide", "point": f"{one.block}.{one.name}",
                 "line": f"{one.guide}.{one.name}", "angle": _degrees(turned),
             }  # fmt: skip
         others = [body for body in one.bodies if body != GROUND]
         hub, *rest = [GROUND, *others] if GROUND in one.bodies else others
-        for number, body in enumerate(rest):
-            name = one.name if number == 0 else f"{one.name}_{number + 1}"
+        for count, body in enumerate(rest):
+            name = one.name if count == 0 else _free(f"{one.name}_{count + 1}", taken)
             made[name] = {
                 "kind": "revolute", "journal": f"{body}.{one.name}", "bearing": f"{hub}.{one.name}",
             }  # fmt: skip
@@ -220,3 +399,11 @@ def _joints(points: Sequence[Point], frames: Mapping[str, _Frame]) -> dict[str, 
             "points", len(points), "no two bodies share a point", "Name the bodies of each point"
         )
     return made
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """A name that no other joint has."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name

@@ -5,8 +5,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import GROUND, NAME, Drawing, Point
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, limit, scale_of
 from hpcclear.scene.sheets import Column, Sheet, read
 from hpcclear.scene.units import UnitError, of_unit, to_si
 
@@ -16,8 +16,10 @@ _COLUMNS = {
     "y": ("y",),
     "bodies": ("bodies", "body", "links", "link", "parts", "members"),
     "slide": ("slide", "guide", "angle"),
+    "remark": ("remark", "remarks", "comment", "comments", "note", "notes", "description"),
 }
-"""Headings, in small letters, of what a table may have."""
+"""Headings, in small letters, of what a table may have; another one is refused, since it may hold the bodies."""
+_GROUNDS = (GROUND, "frame", "base", "fixed", "0")
 
 
 def drawing_of(path: Path, unit: str) -> Drawing:
@@ -26,56 +28,72 @@ def drawing_of(path: Path, unit: str) -> Drawing:
     Points that bodies such as "crank coupler" share are pins; without bodies the points are a chain of bars between two
     that stand still. `slide` is the angle of a guide.
     """
-    return Drawing(_points(read(path, "table of points"), str(path), unit))
-
-
-def _points(sheet: Sheet, key: str, unit: str) -> list[Point]:
-    columns = {
-        kind: next((one for one in sheet.columns if one.name.strip().lower() in words), None)
-        for kind, words in _COLUMNS.items()
-    }
-    for needed in ("name", "x", "y"):
-        if columns[needed] is None:
-            remedy = "Write the headings name, x [mm], y [mm] and bodies"
-            raise InputError(key, ", ".join(sheet.names), f"has no column {needed}", remedy)
-    x, y = (_lengths(sheet, columns[axis], key, unit) for axis in ("x", "y"))
+    sheet, key = read(path, "table of points"), str(path)
+    limit(len(sheet.lines), key)
+    columns = _columns(sheet, key)
+    x, y = (_lengths(sheet, columns.get(axis), key, unit) for axis in ("x", "y"))
     rows = range(len(sheet.lines))
-    names = [_cell(columns["name"], row) for row in rows]
-    for row, name in enumerate(names):
-        where = f"{key}, line {sheet.lines[row]}"
-        if not NAME.fullmatch(name):
+    points, bodies = Names("point", "P"), Names("body", "body")
+    names = [_name(sheet, columns["name"], row, points) for row in rows]
+    belonging = _bodies(columns.get("bodies"), names, key, bodies)
+    slides = [_slide(sheet, columns.get("slide"), row) for row in rows]
+    notes = [*points.notes(), *bodies.notes()]
+    if "remark" in columns:
+        notes.append(f"Column {columns['remark'].heading!r} is not taken over")
+    made = [Point(*one) for one in zip(names, x, y, belonging, slides, strict=True)]
+    return Drawing(made, {}, notes)
+
+
+def _columns(sheet: Sheet, key: str) -> dict[str, Column]:
+    """Columns by what they are; InputError where one is not known, stands twice or is missing."""
+    known = [word for words in _COLUMNS.values() for word in words]
+    found: dict[str, Column] = {}
+    for column in sheet.columns:
+        word = column.name.strip().lower()
+        kind = next((kind for kind, words in _COLUMNS.items() if word in words), None)
+        if kind is None:
+            reason = "is no column of a table of points"
             raise InputError(
-                where,
-                name,
-                "is no name of a point",
-                "Begin with a letter; use letters, digits, - and _",
+                key, column.heading, reason, f"{nearest(word, known)}. Known: {', '.join(_COLUMNS)}"
             )
-        if name in names[:row]:
-            raise InputError(where, name, "a point of this name stands above", "Name each once")
-    bodies = _bodies(columns["bodies"], names, key)
-    slides = [_slide(sheet, columns["slide"], row) for row in rows]
-    return [Point(*one) for one in zip(names, x, y, bodies, slides, strict=True)]
+        if kind in found:
+            reason = f"stands beside {found[kind].heading}, which is the same"
+            raise InputError(key, column.heading, reason, "Keep one of them")
+        found[kind] = column
+    for needed in ("name", "x", "y"):
+        if needed not in found:
+            remedy = "Write the headings name, x [mm], y [mm] and bodies"
+            raise InputError(key, ", ".join(sheet.names)[:200], f"has no column {needed}", remedy)
+    return found
 
 
-def _cell(column: Column | None, row: int) -> str:
-    return "" if column is None else column.cells[row].strip()
+def _name(sheet: Sheet, column: Column, row: int, points: Names) -> str:
+    text = column.cells[row].strip()
+    where = f"{sheet.path}, line {sheet.lines[row]}"
+    if not text:
+        raise InputError(where, text, "the point has no name", "Name each point")
+    if text in column.cells[:row]:
+        raise InputError(where, text, "a point of this name stands above", "Name each once")
+    return points.given(text)
 
 
 def _lengths(sheet: Sheet, column: Column | None, key: str, unit: str) -> list[float]:
     assert column is not None  # looked for before
-    unit = column.unit or unit
-    if not unit:
+    try:
+        stated = float(to_si(f"1 {column.unit}", "m")) if column.unit else None
+    except UnitError as error:
+        raise InputError(key, column.heading, error.reason, error.remedy) from None
+    if stated is None and not unit:
         raise InputError(
             key, column.heading, "nothing says its unit", f'Write "{column.name} [mm]", say'
         )
-    try:
-        size = to_si(f"1 {unit}", "m")
-    except UnitError as error:
-        raise InputError(key, column.heading, error.reason, error.remedy) from None
-    return [round(size * sheet.number(column, row), 12) for row in range(len(sheet.lines))]
+    size = scale_of(stated, column.heading, unit, key)
+    return [round(size * value, 12) for value in sheet.numbers(column).tolist()]
 
 
-def _bodies(column: Column | None, names: Sequence[str], key: str) -> list[tuple[str, ...]]:
+def _bodies(
+    column: Column | None, names: Sequence[str], key: str, given: Names
+) -> list[tuple[str, ...]]:
     """Bodies of each point; of a file without them bars from each point to the next, the first and the last on the ground."""
     if column is None:
         if len(names) < 4:
@@ -87,22 +105,26 @@ def _bodies(column: Column | None, names: Sequence[str], key: str) -> list[tuple
             )
         bars = [GROUND, *(f"bar{k}" for k in range(1, len(names))), GROUND]
         return list(itertools.pairwise(bars))
+    known = dict.fromkeys(_GROUNDS, GROUND)
     found = []
     for row, cell in enumerate(column.cells):
-        bodies = tuple(dict.fromkeys(re.split(r"[\s,;+/&|-]+", cell.strip().lower())))
-        wrong = next((one for one in bodies if not NAME.fullmatch(one)), None)
-        if wrong is not None:
+        words = re.findall(r"[^\s,;+/&|-]+", cell.lower())
+        if not words:
             raise InputError(
                 key, cell, f"{names[row]} belongs to no body", 'Write, say, "crank coupler"'
             )
-        found.append(
-            tuple(GROUND if one in ("frame", "base", "fixed", "0") else one for one in bodies)
-        )
+        for word in words:
+            if word not in known:
+                known[word] = given.given(word)
+        found.append(tuple(dict.fromkeys(known[word] for word in words)))
     return found
 
 
 def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
-    if column is None or _cell(column, row) in ("", "-"):
+    if column is None or column.cells[row].strip() in ("", "-"):
         return None
     value = sheet.number(column, row, "rad")
-    return of_unit(repr(value), column.unit or "deg", "rad")
+    try:
+        return of_unit(repr(value), column.unit or "deg", "rad")
+    except UnitError as error:
+        raise InputError(sheet.path, column.heading, error.reason, error.remedy) from None

@@ -1,0 +1,186 @@
+"""Clock times and dates of tables: cells such as "12:03:05.2", "2026-03-01 12:03:05" or "1.3.2026 0:05", as seconds.
+
+What can be read in two ways, such as 03/04/2026, is refused with both readings.
+"""
+
+import datetime
+import re
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+from hpcclear.base.errors import InputError
+
+DAY = 86_400
+_MONTHS = {
+    word: number
+    for number, words in enumerate((
+        "jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez",
+    ), 1)
+    for word in words.split()
+}  # fmt: skip
+_DATE = (
+    r"(?P<year>\d{4})(?P<sign>[-/.])\d{1,2}(?P=sign)\d{1,2}|(?P<basic>\d{8})(?=T)"
+    r"|\d{1,2}(?P<mark>[-/.])\d{1,2}(?P=mark)(?:\d{4}|\d\d(?=[\sT,]))"
+    r"|\d{1,2}[-\s.]{1,2}[^\W\d_]{3,9}[-\s.,]{1,2}\d{4}|[^\W\d_]{3,9}\.?\s\d{1,2},?\s\d{4}"
+)
+_TIME = r"(?:(?P<hours>\d{1,4}):)?(?P<minutes>\d{1,2}):(?P<seconds>\d\d)(?P<fraction>[.,]\d{1,12})?"
+_HOURS = r"(?P<hour>\d{1,2}):(?P<minute>\d\d)"
+_COMPACT = r"(?<=T)(?P<compact>\d{6})(?P<rest>[.,]\d{1,12})?"
+_MOMENT = re.compile(
+    rf"(?:(?P<date>{_DATE})(?:[T\s,]+|$))?(?:(?:{_HOURS}|{_TIME}|{_COMPACT})\s*(?P<half>[ap]\.?m\.?)?"
+    r"\s*(?P<zone>z|utc|gmt|[+-]\d\d:?(?:\d\d)?)?)?",
+    re.IGNORECASE,
+)
+_ORDERS = {
+    "day, month, year": (2, 1, 0),
+    "month, day, year": (2, 0, 1),
+    "year, month, day": (0, 1, 2),
+}
+"""Where year, month and day stand."""
+
+Moment = tuple[int | None, int, float, bool]
+"""Day, or None without a date; whole seconds, those of a zone taken off; their fraction; whether a zone is stated."""
+
+
+def is_clock(cell: str) -> bool:
+    """Whether a cell is a clock time or a date."""
+    text = cell.strip()
+    return (
+        (":" in text or len(text) > 7)
+        and len(text) < 60
+        and bool(text)
+        and _MOMENT.fullmatch(text) is not None
+    )
+
+
+def seconds(cells: Sequence[str], where: Callable[[int], str]) -> list[float]:
+    """Seconds since the first of clock times or dates; times of day go on after midnight.
+
+    Parameters
+    ----------
+    cells : sequence of str
+    where : callable
+        Place of a cell by its number, in errors.
+
+    Raises
+    ------
+    InputError
+        A cell is none, is another kind than those above it, or the order of day and month is open.
+    """
+    order = _order(cells, where)
+    made, gone, first, last = list[float](), 0, None, None
+    for row, cell in enumerate(cells):
+        found = _MOMENT.fullmatch(cell.strip())
+        day, whole, fraction, zoned = now = _moment(found, order, cell, where(row))
+        if first is None or last is None:
+            first = last = now
+        if (day is None, zoned) != (first[0] is None, first[3]):
+            reason = "is a time of another kind than those above it"
+            raise InputError(
+                where(row), cell, reason, "Write date, time and zone of each row in one way"
+            )
+        if day is None and last[1] - whole > (period := _period(found)) / 2:
+            gone += period
+        days = (day or 0) - (first[0] or 0)
+        made.append(DAY * days + gone + whole - first[1] + (fraction - first[2]))
+        last = now
+    return made
+
+
+def _period(found: re.Match[str] | None) -> int:
+    """When such a time begins again: a day, or an hour of minutes and seconds."""
+    return 3600 if found is not None and found["minutes"] and not found["hours"] else DAY
+
+
+def _moment(found: re.Match[str] | None, order: str, cell: str, where: str) -> Moment:
+    if found is None or not cell.strip():
+        raise InputError(
+            where, cell, "is no clock time or date", "Write it as 2026-03-01 12:03:05.2"
+        )
+    day = None
+    if found["date"]:
+        day = _day(found["date"], order)
+        if day is None:
+            raise InputError(
+                where, cell, f"is no date (read as {order})", "Write it as 2026-03-01 12:03:05.2"
+            )
+    if found["compact"]:
+        clock = [found["compact"][k : k + 2] for k in (0, 2, 4)]
+    elif found["hour"]:
+        clock = [found["hour"], found["minute"], "0"]
+    else:
+        clock = [found["hours"] or "0", found["minutes"] or "0", found["seconds"] or "0"]
+    hours, minutes, whole = map(int, clock)
+    if day is None and found["hour"] and not found["half"]:
+        reason = f"may be {hours} h {minutes} min or {hours} min {minutes} s"
+        raise InputError(where, cell, reason, f"Write 0:{cell.strip()} or {cell.strip()}:00")
+    if found["half"] and 1 <= hours <= 12:
+        hours = hours % 12 + 12 * (found["half"][0].lower() == "p")
+    elif found["half"] or (day is not None and hours > 24) or minutes > 59 or whole > 60:
+        raise InputError(where, cell, "is no time of day", "Write it as 12:03:05.2")
+    rest = found["fraction"] or found["rest"]
+    fraction = float("0." + rest[1:]) if rest else 0.0
+    zone = found["zone"]
+    return (
+        day,
+        3600 * hours + 60 * minutes + whole - _offset(zone or ""),
+        fraction,
+        zone is not None,
+    )
+
+
+def _offset(zone: str) -> int:
+    """Seconds by which a zone is ahead."""
+    digits = zone[1:].replace(":", "")
+    if not digits.isdecimal():
+        return 0
+    ahead = 3600 * int(digits[:2]) + 60 * int(digits[2:] or 0)
+    return -ahead if zone[0] == "-" else ahead
+
+
+@lru_cache(4096)
+def _day(text: str, order: str) -> int | None:
+    """Number of a day, None if there is no such one."""
+    parts = (
+        re.findall(r"[^\W_]+", text) if not text.isdecimal() else [text[:4], text[4:6], text[6:]]
+    )
+    month = next((one for one in parts if one.isalpha()), None)
+    if month is not None:
+        day, year = (one for one in parts if one != month)
+        number = _MONTHS.get(month[:3].lower(), 0)
+    else:
+        places = _ORDERS["year, month, day" if len(parts[0]) == 4 else order]
+        year, number, day = parts[places[0]], int(parts[places[1]]), parts[places[2]]
+    try:
+        return datetime.date(int(year) + 2000 * (len(year) == 2), number, int(day)).toordinal()
+    except ValueError:
+        return None
+
+
+def _order(cells: Sequence[str], where: Callable[[int], str]) -> str:
+    """The order of day, month and year that makes each cell a date; points stand between day, month and year."""
+    open_ = [
+        (row, found)
+        for row, cell in enumerate(cells)
+        if (found := _MOMENT.fullmatch(cell.strip())) and found["mark"] in ("/", "-")
+    ]
+    orders = (
+        list(_ORDERS) if any(len(found["date"]) < 9 for _, found in open_) else list(_ORDERS)[:2]
+    )
+    if not open_:
+        return orders[0]
+    fits = [
+        order
+        for order in orders
+        if all(_day(found["date"], order) is not None for _, found in open_)
+    ]
+    row, found = open_[0]
+    if len(fits) > 1:
+        readings = [
+            datetime.date.fromordinal(_day(found["date"], one) or 1).isoformat() for one in fits
+        ]
+        named = [f"{reading} ({order})" for reading, order in zip(readings, fits, strict=True)]
+        raise InputError(
+            where(row), cells[row], f"may be {' or '.join(named)}", f"Write dates as {readings[0]}"
+        )
+    return (fits or orders)[0]
