@@ -72,7 +72,7 @@ class Address(NamedTuple):
 
 
 class Connections:
-    """Connections of this rank to those of other nodes that it exchanges pulses with; none of the calls waits but `join`."""
+    """Connections of this rank to those of other nodes that it exchanges pulses with. Only `join` waits."""
 
     _HELLO = struct.Struct("16sq")
 
