@@ -18,7 +18,7 @@ ROUNDS = {
 
 @pytest.mark.parametrize(
     ("name", "rounds", "kills"),
-    [("bifurcation", 1, 2), ("import", 1, 1), ("export", 1, 1)]
+    [("map", 1, 1), ("import", 1, 2), ("export", 1, 1)]
     + [pytest.param(*row, 2, marks=pytest.mark.nightly) for row in ROUNDS.items()],
 )
 @pytest.mark.timeout(3600)
