@@ -14,6 +14,9 @@ from hpcclear.ranks.team import FLUSH_INTERVAL
 UNSAVED = "readings: simulations"
 """The stage whose samples are kept a reading at a time."""
 
+RESPONSES = ("bifurcation#", "ensemble#")
+"""Beginnings of the names of single responses, which are kept as a stage that is written again each time."""
+
 DELIVERY = 10
 """Turns of root within which a message that was sent is received: MPI needs some polls for a long one."""
 
@@ -58,13 +61,18 @@ def saved_and_since(events: list[Event]) -> tuple[set[str], float]:
 def check_interval_kept(events: list[Event], interval: float) -> None:
     """Assert that root saved at the first batch of samples after the interval, each time."""
     root = [event for event in events if event.rank == 0 and event.what != "finished"]
-    since = 0.0
+    since, stage_since = 0.0, 0.0
     for event, following in pairwise(root):
         if event.what in ("opened", "saved"):
             since = event.time
-        kept_otherwise = all(sample.startswith(UNSAVED) for sample in event.samples)
-        if event.what == "received" and not kept_otherwise and event.time - since >= interval:
-            assert following.what == "saving", (event.time - since, following)
+        if event.what in ("stage", "saved a stage"):
+            stage_since = event.time
+        if event.what != "received" or all(name.startswith(UNSAVED) for name in event.samples):
+            continue
+        single = all(name.startswith(RESPONSES) for name in event.samples)
+        if event.time - (stage_since if single else since) >= interval:
+            saving = "saving a stage" if single else "saving"
+            assert following.what == saving, (event, following)
 
 
 def check_sent_in_time(events: list[Event], lost: set[str]) -> None:

@@ -4,20 +4,37 @@ Nodes are namespaces (`tests/cluster/box.py`), which need root; the launcher is 
 """
 
 import os
+import shlex
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
 from cluster import slurm
 from cluster.box import Box, refusal
-from commands import CHEAP, ROOT, SCENE, finish, overrides, run, sample, start
+from commands import (
+    CHEAP,
+    MPIEXEC,
+    ROOT,
+    SCENE,
+    began,
+    finish,
+    overrides,
+    ranks_of,
+    run,
+    sample,
+    start,
+)
 from patience import crowded
 
-from hpcclear.ranks.watch import BEATS, Watch, silence
+from hpcclear.base.host import process_fields
+from hpcclear.ranks import launcher, life
+from hpcclear.ranks.watch import BEATS, Neighbour, Watch, silence
 
 REFUSAL = refusal()
 pytestmark = pytest.mark.timeout(900)
@@ -238,10 +255,17 @@ class Silent:
 
     neighbours = (1,)
 
-    def __init__(self, beats: int, goodbye: bool = False) -> None:
+    def __init__(self, beats: int, goodbye: bool = False, life: bool | None = None) -> None:
         self._left, self._goodbye = beats, goodbye
+        self.life = life
         self.sent: list[int] = []
         self.listened = 0
+
+    def connect(self) -> None:
+        pass
+
+    def lives(self, rank: int) -> bool | None:
+        return self.life
 
     def pulse(self, to: int, tag: int) -> None:
         self.sent.append(tag)
@@ -259,6 +283,7 @@ def test_a_neighbour_is_given_up_once_and_not_when_it_said_goodbye():
         (Silent(50), [1], 2),
         (Silent(50, goodbye=True), [], 1),  # no goodbye of ours to who is gone
         (Silent(10**9), [], 2),
+        (Silent(50, life=True), [], 2),
     ):
         lost: list[int] = []
         with Watch(mail, 0.06, lost.append, lambda: None):
@@ -270,9 +295,160 @@ def test_a_neighbour_is_given_up_once_and_not_when_it_said_goodbye():
         assert mail.sent[-1] == last
 
 
+def beats_until_lost(neighbour: Neighbour, lives: Iterable[bool | None], patience: float) -> int:
+    """Beats without a pulse after which a neighbour is given up; 0 if it is not."""
+    for count, alive in enumerate(lives, 1):
+        if neighbour.beat(alive, patience):
+            return count
+    return 0
+
+
+@pytest.mark.parametrize("patience", [6, 48, float("inf")])
+def test_who_is_silent_is_judged_by_what_the_system_says_of_it(patience):
+    """Ended: given up after two beats; nothing known: after its patience; while it computes: never."""
+    most = 200
+    for lives, expected in (
+        ([False] * most, 2),
+        ([None] * most, patience if patience < most else 0),
+        ([True] * most, 0),
+        # starved of its processor for longer than it is borne, in turns
+        ([True, None] * most, 2 * patience if patience < most else 0),
+        ([None] * 3 + [False] * most, 4),
+    ):
+        assert beats_until_lost(Neighbour(), lives, patience) == expected
+
+
+def test_a_system_that_calls_dead_who_sends_pulses_is_not_believed():
+    """A connection that broke on a network of its own, while the ranks exchange messages on another."""
+    neighbour = Neighbour()
+    for _ in range(3):
+        neighbour.heard(1)
+        assert not neighbour.beat(False, 48)
+    assert beats_until_lost(neighbour, [False] * 100, 48) == 48
+
+
+def test_the_processor_time_of_a_process_says_whether_it_lives():
+    """One that computes, one that sleeps, one that is stopped, one that has ended (a zombie until it is waited for), none."""
+    program = "import sys, time; print(flush=True)\nwhile len(sys.argv) > 1: pass\ntime.sleep(600)"
+    made = [
+        subprocess.Popen([sys.executable, "-c", program, *more], stdout=subprocess.PIPE)
+        for more in (["busy"], [], ["stopped"], ["ended"])
+    ]
+    try:
+        for process in made:
+            process.stdout.readline()
+        known = [life.Process(_identity(process.pid)) for process in made]
+        assert all(process.visible for process in known)
+        made[2].send_signal(signal.SIGSTOP)
+        made[3].kill()
+        patience = time.monotonic() + crowded(20.0)
+        while (found := [process.lives() for process in known]) != [True, None, None, False]:
+            assert time.monotonic() < patience, found
+            time.sleep(0.1)
+        other = _identity(made[0].pid)._replace(started="1")  # another one has the number now
+        assert life.Process(other).lives() is False
+        assert not life.Process(other).visible
+    finally:
+        for process in made:
+            process.kill()
+            process.wait()
+    assert known[0].lives() is False
+
+
+def _identity(process: int) -> life.Identity:
+    mine = life.identity()
+    assert mine is not None
+    return life.Identity(process, process_fields(process)[19], mine.namespace)
+
+
+def test_a_connection_is_of_ranks_only_and_says_when_the_other_end_ends():
+    root, other = life.Connections(), life.Connections()
+    address = root.offer([3])
+    assert address is not None
+    address = address._replace(host="127.0.0.1")
+    stranger = socket.create_connection(address[:2])
+    stranger.sendall(bytes(24))  # not the word
+    joining = threading.Thread(target=other.join, args=(3, 0, address))
+    joining.start()
+    while joining.is_alive():
+        root.accept()
+    assert stranger.recv(1) == b""
+    assert root.lives(3) is None
+    assert other.lives(0) is None
+    with pytest.raises(ConnectionRefusedError):  # nobody else is due
+        socket.create_connection(address[:2]).recv(1)
+    other.close()
+    patience = time.monotonic() + crowded(5.0)
+    while root.lives(3) is not False:
+        assert time.monotonic() < patience
+    root.close()
+    stranger.close()
+
+
 def test_the_silence_can_be_set_and_a_slip_does_not_count():
-    assert silence({}) == 15.0
+    assert silence({}) == 120.0
     assert silence({"HPCCLEAR_SILENCE": "5"}) == 5.0
     assert silence({"HPCCLEAR_SILENCE": "0"}) == 0.0
-    assert silence({"HPCCLEAR_SILENCE": "soon"}) == 15.0
-    assert silence({"HPCCLEAR_SILENCE": "nan"}) == 15.0
+    assert silence({"HPCCLEAR_SILENCE": "soon"}) == 120.0
+    assert silence({"HPCCLEAR_SILENCE": "nan"}) == 120.0
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("who", ["root", "remote", "beside"])
+def test_a_rank_without_a_processor_for_60_s_is_kept(box, tmp_path, who):
+    output = tmp_path / "samples.nc"
+    job = working(box, output, seconds=None)
+    first, second = box.nodes
+    place, rank = {"root": (first, 0), "beside": (first, 1), "remote": (second, 2)}[who]
+    victim = place.ranks()[rank]
+    os.kill(victim, signal.SIGSTOP)
+    time.sleep(60.0)
+    assert job.poll() is None, job.communicate()[0]
+    os.kill(victim, signal.SIGCONT)
+    time.sleep(5.0)
+    strike(box, "term")
+    code, text = ended(box, job)
+    assert code == 3, text
+    assert "nothing was heard" not in text
+
+
+def test_what_comes_from_the_launcher_ends_at_the_launcher(monkeypatch):
+    """A process that no launcher started has no lineage: it goes on when the shell that started it ends (nohup, setsid)."""
+    for name in (*launcher._RANK, "SLURM_PROCID", "SLURM_STEP_NUM_TASKS"):
+        monkeypatch.delenv(name, raising=False)
+    assert launcher.lineage() == {}
+    monkeypatch.setenv("PMI_RANK", "0")
+    assert launcher.lineage() == {os.getpid(): os.getppid()}
+    assert not launcher.is_orphan({os.getpid(): os.getppid()})
+    assert launcher.is_orphan({os.getpid(): os.getppid() + 1})
+    assert launcher.is_orphan({2**22 + 1: 1})  # there is no such process
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("wrapped", [False, True])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_ranks_end_with_their_launcher_also_a_single_one_and_behind_a_shell(
+    tmp_path, ranks, wrapped
+):
+    """The process of the launcher on this node is killed, which reports nothing to its ranks."""
+    output = tmp_path / "samples.nc"
+    words = [sys.executable, "-m", "hpcclear", *sample(output, 500_000)]
+    words += ["--checkpoint-interval", "0.5", "--progress", "quiet"]
+    if wrapped:
+        words = ["sh", "-c", f"{shlex.join(words)}; true"]
+    job = began([str(MPIEXEC), "-n", str(ranks), *words])
+    until_it_saves(job, output)
+    known = list(ranks_of(job).values())
+    proxies = [int(number) for number in _children(job.pid)]
+    assert proxies
+    for number in proxies:
+        os.kill(number, signal.SIGKILL)
+    patience = time.monotonic() + crowded(15.0)
+    while any(process_fields(number)[:1] not in ([], ["Z"]) for number in known):
+        assert time.monotonic() < patience, "a rank lives on"
+        time.sleep(0.1)
+    job.communicate(timeout=crowded(30.0))
+
+
+def _children(process: int) -> list[str]:
+    return Path(f"/proc/{process}/task/{process}/children").read_text().split()

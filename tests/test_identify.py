@@ -17,7 +17,7 @@ import hpcclear
 from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
-from hpcclear.identify import training
+from hpcclear.ensemble import single
 from hpcclear.identify.advice import advice, noise_of
 from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter
@@ -398,22 +398,22 @@ def identified(measured, tmp_path_factory):
     words += ["--advise", "--limit", "100um", "--progress", "quiet"]
     for table, date in zip(measured, ("2026-01-01", "2026-03-01"), strict=True):
         words += ["--signal", str(table), "--date", date]
-    real, calls = training.responses_of, []
+    real, simulated = single.simulate_together, []
 
-    def breaking(*arguments, **options):
-        calls.append(1)
-        if len(calls) == 2:
+    def breaking(scenes, copies):
+        if len(simulated) == 16:
+            simulated.append(0)
             raise KeyboardInterrupt
-        return real(*arguments, **options)
+        simulated.extend(copies)
+        return real(scenes, copies)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training, "CHUNK", 16)
-        patch.setattr(training, "responses_of", breaking)
+        patch.setattr(single, "simulate_together", breaking)
         broken = CliRunner().invoke(cli, words, standalone_mode=False)
         assert not place.exists(), broken.output
         done = CliRunner().invoke(cli, words, standalone_mode=False)
     assert done.exception is None, done.output
-    assert len(calls) == 3  # the finished half was not simulated again
+    assert len(simulated) == 32 + 1  # the finished half was not simulated again
     return place, done.output, done.exit_code, words
 
 

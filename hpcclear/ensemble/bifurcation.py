@@ -123,7 +123,7 @@ def run_bifurcation(
             what = observation.described(_short(long, variants[0]))
             count = observation.revolutions
             asked = long, variants, observation, (count,), ranks, "bifurcation"
-            observed = responses_of(*asked, together=TOGETHER)[:, 0]
+            observed = responses_of(*asked, together=TOGETHER, checkpoint=session.opened())[:, 0]
             coords = {"value": np.arange(len(points)), "crossing": np.arange(count)}
             content = session.write(
                 dataset.dataset(

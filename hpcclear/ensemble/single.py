@@ -1,5 +1,6 @@
 """Single responses of variants of a scene, on all ranks: of each what it boils down to."""
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -8,10 +9,12 @@ import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.response import simulate_together
+from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.simulate import content_of
 from hpcclear.ranks import leading
 from hpcclear.ranks.schedule import Task
 from hpcclear.ranks.team import Ranks
+from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene, load_scene
 
 TOGETHER = 8
@@ -27,6 +30,8 @@ def responses_of(
     stage: str,
     copies: int = 1,
     together: int = 1,
+    checkpoint: Checkpoint | None = None,
+    kept: str = "",
 ) -> Array:
     """What each response comes to, NaN where `evaluate` returns it; call it on root.
 
@@ -45,6 +50,10 @@ def responses_of(
         Starts of each variant; all but the first are perturbed.
     together : int
         Responses in a batch, which share the memory of a rank; results do not depend on it.
+    checkpoint : Checkpoint, optional
+        Has those that were finished earlier, and gets each new one.
+    kept : str
+        Name of a stage of it, as `Checkpoint.save_stage`; by default `stage`.
 
     Returns
     -------
@@ -53,6 +62,8 @@ def responses_of(
     Raises
     ------
     Stopped, RankFailed, InputError
+    StorageError
+        The disk refuses a checkpoint.
     """
     dtype = np.dtype([("sample", "i8"), ("values", "f8", (int(np.prod(shape)),))])
     payload = {
@@ -63,8 +74,49 @@ def responses_of(
         "together": together,
     }
     rows = np.indices((len(variants), copies)).reshape(2, -1).T.astype(float)
-    records = leading.run_points(ranks, Task(stage, Responses, payload, dtype), rows)
+    task = Task(stage, Responses, payload, dtype)
+    if checkpoint is None:
+        records = leading.run_points(ranks, task, rows)
+    else:
+        keeper = _Keeper(checkpoint, kept or stage, dtype)
+        with saving(keeper.flush):
+            records = leading.run_points(
+                ranks,
+                task,
+                rows,
+                completed=keeper.records,
+                on_records=keeper.take,
+                save=keeper.flush_when_due,
+            )
     return records["values"].reshape(len(variants), copies, *shape)
+
+
+class _Keeper:
+    """Keeps finished records in a checkpoint, as a stage that is written again with each save."""
+
+    def __init__(self, checkpoint: Checkpoint, name: str, dtype: np.dtype) -> None:
+        self._checkpoint, self._name = checkpoint, name
+        self._saved_at, self._new = time.monotonic(), False
+        known = checkpoint.load_stage(name) or {key: np.zeros(0) for key in dtype.names or ()}
+        self.records = np.zeros(len(known["sample"]), dtype)
+        for key in dtype.names or ():
+            self.records[key] = known[key].reshape(self.records[key].shape)
+
+    def take(self, records: np.ndarray) -> None:
+        """Take new ones."""
+        self.records, self._new = np.concatenate([self.records, records]), True
+
+    def flush_when_due(self) -> None:
+        """Save what is new when the interval is over; raises as `flush`."""
+        if time.monotonic() - self._saved_at >= self._checkpoint.interval:
+            self.flush()
+
+    def flush(self) -> None:
+        """Save what is new; raises as `Checkpoint.save_stage`."""
+        if self._new:
+            data = {key: self.records[key] for key in self.records.dtype.names or ()}
+            self._checkpoint.save_stage(self._name, data)
+            self._saved_at, self._new = time.monotonic(), False
 
 
 class Responses:

@@ -27,7 +27,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
 CHUNK = 64
-"""Members between two checkpoints."""
+"""Members that are simulated together, and reported."""
 
 LEAST_REVOLUTIONS = 10
 """Revolutions that a member is averaged over at least: chaos takes some to be seen."""
@@ -104,7 +104,7 @@ def simulated(
     seed : int
     ranks : Ranks
     checkpoint : Checkpoint, optional
-        Keeps every `CHUNK` members.
+        Keeps finished members.
     quiet : bool
         Whether nothing is printed meanwhile.
 
@@ -119,18 +119,12 @@ def simulated(
     shape = (len(names), PARTS, ORDERS + 1)
     parts = []
     for first in range(0, members, CHUNK):
-        stage = f"ensemble-{first:06d}"
-        known = None if checkpoint is None else checkpoint.load_stage(stage)
-        if known is None:
-            rows = variants[first : first + CHUNK]
-            reduced = partial(spectra, names=tuple(names))
-            found = responses_of(scene, rows, reduced, shape, ranks, "ensemble", together=TOGETHER)[
-                :, 0
-            ]
-            known = {"spectra": found}
-            if checkpoint is not None:
-                checkpoint.save_stage(stage, known)
-        parts.append(known["spectra"])
+        rows, reduced = variants[first : first + CHUNK], partial(spectra, names=tuple(names))
+        found = responses_of(
+            scene, rows, reduced, shape, ranks, "ensemble",
+            together=TOGETHER, checkpoint=checkpoint, kept=f"members-{first:06d}",
+        )  # fmt: skip
+        parts.append(found[:, 0])
         if not quiet:
             done = first + len(parts[-1])
             print(f"ensemble: {done} of {members} members", file=sys.stderr, flush=True)

@@ -7,6 +7,7 @@ the same exit code, within seconds. Without a launcher there is one process and 
 
 import contextlib
 import faulthandler
+import functools
 import os
 import socket
 import sys
@@ -38,13 +39,13 @@ from hpcclear.ranks.stopping import (
     StopSwitch,
 )
 from hpcclear.ranks.team import Ranks
-from hpcclear.ranks.watch import Watch, silence
+from hpcclear.ranks.watch import SILENCE, Watch, silence
 
 PATIENCE = 600.0
 """Seconds that a rank waits for all others to come into MPI: a cold start of many nodes takes some minutes."""
 
-LAST_WAIT = 60.0
-"""Seconds that a rank which is done waits for the others to leave MPI with it."""
+LAST_WAIT = SILENCE
+"""Seconds that a rank which is done waits for the others to leave MPI with it: one of them may be starved of its processor."""
 
 COMPLAINT_PATIENCE = 30.0
 """Seconds that a rank which cannot begin waits for them: they may be at something that needs no MPI."""
@@ -147,12 +148,14 @@ def _watch(ranks: Ranks) -> Watch:
     """Who lives is watched: root fails when a rank is lost, the others end when root is, and say so."""
     mail, stop = ranks.mail, ranks.stop_switch
     seconds = mail.everyone(silence())[0]  # root's word counts
+    parents = launcher.lineage()
 
     def give_up(rank: int) -> None:
-        text = (
-            f"Error: nothing was heard of rank {rank} for {seconds:g} s (HPCCLEAR_SILENCE): its process, its node "
-            f"or the network is gone"
-        )
+        text = f"Error: nothing was heard of rank {rank}"
+        if mail.lives(rank) is False:
+            text += ", and the system reports: its process has ended, or its node or the network is gone"
+        else:
+            text += f" for {seconds:g} s (HPCCLEAR_SILENCE): its process, its node or the network is gone"
         if ranks.is_root:
             mail.notify_itself(
                 Message(rank, Tag.ERROR, (f"{text}. What was finished is saved", Exit.FAILED, None))
@@ -167,7 +170,8 @@ def _watch(ranks: Ranks) -> Watch:
     def orphaned() -> None:
         stop.request("the process that started it is gone")
 
-    return Watch(mail, seconds, give_up, orphaned)
+    is_orphan = functools.partial(launcher.is_orphan, parents) if parents else None
+    return Watch(mail, seconds, give_up, orphaned, is_orphan)
 
 
 def refuse_together(complaint: str) -> int:

@@ -6,7 +6,9 @@ import os
 import sys
 import time
 from collections.abc import Mapping
+from pathlib import Path
 
+from hpcclear.base.host import process_fields
 from hpcclear.base.plain import plain
 
 _SIZE = (
@@ -59,6 +61,40 @@ def launched_rank(environment: Mapping[str, str] = os.environ) -> int | None:
 def is_launched(environment: Mapping[str, str] = os.environ) -> bool:
     """Whether a launcher started this process, so that MPI is needed."""
     return launched_rank(environment) is not None
+
+
+def lineage() -> dict[int, int]:
+    """Parents of this process and of those above it that the launcher started too, such as a shell, by process number.
+
+    They end with the process of the launcher on this node, whose number is the last. Without a launcher there is none: whoever
+    starts a command in the background may end before it. srun without MPI counts where it started this process itself.
+    """
+    names = [name for name in (*_RANK, "SLURM_PROCID") if name in os.environ]
+    found, above = {os.getpid(): os.getppid()}, os.getppid()
+    while names and above not in found and _began_with(above, names[0]):
+        fields = process_fields(above)
+        if not fields:
+            break
+        found[above] = above = int(fields[1])
+    return found if is_launched() or (names and len(found) == 1) else {}
+
+
+def is_orphan(parents: Mapping[int, int]) -> bool:
+    """Whether any of these processes lost its parent (`lineage`), so that the launcher does not reach this one any more."""
+    own = os.getpid()
+    return any(
+        (os.getppid() if process == own else int((process_fields(process) or "00")[1])) != parent
+        for process, parent in parents.items()
+    )
+
+
+def _began_with(process: int, name: str) -> bool:
+    """Whether a process got this variable from who started it; False where that cannot be read."""
+    try:
+        entries = Path(f"/proc/{process}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return False
+    return any(entry.startswith(f"{name}=".encode()) for entry in entries)
 
 
 def end_job(complaint: str, code: int) -> None:

@@ -14,6 +14,7 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 from hpcclear.base import host
+from hpcclear.ranks.life import Connections, Process, identity
 
 _SHORTEST = 2e-4  # s
 
@@ -98,6 +99,8 @@ class Mail:
         self._pulsed: list[Any] = []
         self._lock = threading.Lock()
         self._news: deque[Message] = deque()  # messages of this rank to itself
+        self._processes: dict[int, Process] = {}
+        self._connections, self._address = Connections(), None
         self.neighbours: list[int] = []
         self.leaders: list[int] = []
         self.group: list[int] = []
@@ -119,7 +122,8 @@ class Mail:
 
         Root: the first rank of every other node, and all of its own; the first of a node: root and its others.
         """
-        here = self._node.allgather(self.rank)
+        beside = self._node.allgather((self.rank, identity()))
+        here = [rank for rank, _ in beside]
         first, working = here[0], [rank for rank in here if rank != 0]
         every = self._comm.allgather((first, working[0] if working else 0))
         self.leaders = sorted({leader for _, leader in every} - {0})
@@ -130,6 +134,10 @@ class Mail:
         elif threads:
             firsts = sorted({head for head, _ in every} - {0})
             self.neighbours = [*(firsts if first == 0 else [0]), *here[1:]]
+        known = {rank: Process(it) for rank, it in beside if it and rank in self.neighbours}
+        self._processes = {rank: process for rank, process in known.items() if process.visible}
+        away = {rank for rank in self.neighbours if rank not in here}
+        self._address = self._comm.bcast(self._connections.offer(away) if self.rank == 0 else None)
 
     def everyone(self, word: object) -> list[Any]:
         """What every rank has to say, by rank; all must call it at the same time, before any work."""
@@ -190,6 +198,18 @@ class Mail:
                 found.append((status.source, status.tag))
         return found
 
+    def connect(self) -> None:
+        """Connect the first rank of a node with root; root takes such connections as they come (`lives`)."""
+        if self._address is not None and self.rank and 0 in self.neighbours:
+            self._connections.join(self.rank, 0, self._address)
+
+    def lives(self, rank: int) -> bool | None:
+        """What the system says of a neighbour: it computes (True), it has ended or its connection broke (False), or nothing."""
+        if rank in self._processes:
+            return self._processes[rank].lives()
+        self._connections.accept()
+        return self._connections.lives(rank)
+
     def meet_on_node(self) -> None:
         """Wait until every rank of this node is here."""
         if self._mpi is not None:
@@ -205,6 +225,7 @@ class Mail:
         """Leave MPI; every rank must come."""
         if self._mpi is not None and self._finalizes:
             self._mpi.Finalize()
+        self._connections.close()
 
     def abort(self, code: int) -> None:
         """End all ranks now; does not return."""

@@ -1,5 +1,6 @@
 """Why a run ends early: signals and a time limit become one flag, with a last resort behind it."""
 
+import contextlib
 import os
 import select
 import signal
@@ -189,7 +190,8 @@ class StopSwitch:
         if code == Exit.STOPPED and not self.reported:
             self.reported = True
             text = f"Stopped early: {self.reason}, in the midst of something. {self.outlook}.\n"
-            os.write(2, text.encode())  # the main thread may hold what sys.stderr needs
+            with contextlib.suppress(OSError):  # a launcher that is gone reads no more
+                os.write(2, text.encode())  # the main thread may hold what sys.stderr needs
             time.sleep(0.2)  # the launcher passes it on
         threading.Thread(target=self.last_resort, args=(code,), daemon=True).start()
         time.sleep(0.5)  # the last resort may be an MPI call, and hang

@@ -1,26 +1,34 @@
-"""Whether the others live: ranks send each other pulses, and one that hears none any more does not stay behind.
+"""Whether the others live: ranks send each other pulses, and one that is lost or silent for long does not stay without notice.
 
 Root exchanges pulses with the first rank of every other node and with the ranks of its own; the first rank of a node with
 the others there. So root hears of nodes, not of a hundred thousand ranks. A thread sends and listens: the main thread may be
-in a long fit. What it counts is its own beats, not the clock: a job that was suspended as a whole goes on.
+in a long fit. What it counts is its own looks, not the clock: a job that was suspended as a whole goes on.
+
+On a busy machine a rank may be silent for a minute and yet get on. So who is silent is given up at once only if the system
+says that the process has ended or that the connection is broken (`life`), and never while its process computes.
 """
 
+import math
 import os
 import threading
+import time
 from collections.abc import Callable, Mapping
 from typing import Protocol, Self
 
-BEATS = 6
-"""Pulses in the time after which who sends none is given up."""
+SILENCE = 120.0
+"""Seconds without a pulse after which a rank is given up by default, also if nothing else says that it is lost.
 
-SILENCE = 15.0
-"""That time by default, s.
-
-Where the network is cut MPICH itself ends a process with a segmentation fault, some 25 to 30 s later. Until then a rank has
-to notice (one beat more at most), to report it and, on root, to save what is finished.
+Twice as long as a rank may have to wait for its processor. A cut of the network has to be noticed earlier: MPICH itself ends a
+process with a segmentation fault some 25 to 30 s after it.
 """
 
-_LOOKS = 20  # at what came, between two beats
+BEATS = 6
+"""Pulses in this time at least."""
+
+_LONGEST = 2.5  # s between two pulses
+_LOOKS = 20  # at what came, from one beat to the next
+_CERTAIN = 2  # beats without a pulse after which a rank that the system calls ended is given up: its goodbye may be on its way
+_CONTRADICTED = 3  # pulses of a rank that the system called ended, after which the system is not believed any more
 _ALIVE, _BYE = 1, 2
 
 
@@ -40,22 +48,38 @@ class Neighbour:
     """Another rank that this one hears, by its beats."""
 
     def __init__(self) -> None:
-        self.missed = 0
-        self.lost = False
+        self._missed = self._contradicted = 0
+        self._heard = False
+        self._lost = False
         self.gone = False  # has said goodbye
 
     def heard(self, tag: int) -> None:
         """A pulse came."""
-        self.missed = 0
+        self._heard = True
         self.gone = self.gone or tag == _BYE
 
-    def beat(self) -> bool:
-        """Another beat of ours without a pulse of theirs; whether it is given up now."""
-        self.missed += 1
-        if self.gone or self.lost or self.missed <= BEATS:
+    def beat(self, lives: bool | None, patience: float) -> bool:
+        """Another beat of ours; whether the rank is given up now.
+
+        Parameters
+        ----------
+        lives : bool or None
+            What the system says of it: it computes, it has ended, or nothing.
+        patience : float
+            Beats without a pulse that are borne.
+        """
+        heard, self._heard = self._heard, False
+        if self.gone or self._lost:
             return False
-        self.lost = True
-        return True
+        if heard:
+            self._missed = 0
+            self._contradicted += lives is False
+            return False
+        if not lives:
+            self._missed += 1
+        ended = lives is False and self._contradicted < _CONTRADICTED
+        self._lost = self._missed >= (_CERTAIN if ended else patience)
+        return self._lost
 
 
 class Pulses(Protocol):
@@ -71,6 +95,12 @@ class Pulses(Protocol):
     def pulses(self) -> list[tuple[int, int]]:
         """Rank and tag of each that came since the last call."""
 
+    def connect(self) -> None:
+        """Be connected with neighbours on other nodes; called once, and may take some seconds."""
+
+    def lives(self, rank: int) -> bool | None:
+        """What the system says of a neighbour: it computes (True), it has ended (False), or nothing."""
+
 
 class Watch:
     """The thread of one rank that knows who lives.
@@ -81,8 +111,8 @@ class Watch:
         Silence after which a rank is given up; 0 for never.
     on_loss : callable
         Gets the rank that was given up; called by the thread.
-    on_orphan : callable
-        Called once by the thread, when the process that started this one is gone.
+    on_orphan, is_orphan : callable
+        Called once by the thread when `is_orphan` says that what started this process is gone; None: that is not watched.
     """
 
     def __init__(
@@ -91,17 +121,18 @@ class Watch:
         seconds: float,
         on_loss: Callable[[int], object],
         on_orphan: Callable[[], object],
+        is_orphan: Callable[[], bool] | None = None,
     ) -> None:
         self._mail = mail
         self._neighbours = {rank: Neighbour() for rank in mail.neighbours}
-        self._period = seconds / BEATS
-        self._on_loss, self._on_orphan = on_loss, on_orphan
-        self._parent = os.getppid()
+        self._period = min(seconds / BEATS, _LONGEST) if seconds else _LONGEST
+        self._patience = seconds / self._period if seconds else math.inf
+        self._on_loss, self._on_orphan, self._is_orphan = on_loss, on_orphan, is_orphan
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
 
     def __enter__(self) -> Self:
-        if self._period > 0.0 and self._neighbours:
+        if self._neighbours or self._is_orphan is not None:
             self._thread.start()
         return self
 
@@ -113,20 +144,33 @@ class Watch:
             self._send(_BYE)
 
     def _run(self) -> None:
+        if self._neighbours:
+            self._mail.connect()
+        due = -math.inf
         while not self._over.is_set():
-            self._send(_ALIVE)
-            for _ in range(
-                _LOOKS
-            ):  # MPI gets on only while it is called, a step of its protocol at a time
-                self._over.wait(self._period / _LOOKS)
-                for rank, tag in self._mail.pulses():
-                    self._neighbours[rank].heard(tag)
-            for rank, neighbour in self._neighbours.items():
-                if neighbour.beat() and not self._over.is_set():
-                    self._on_loss(rank)
-            if self._parent != os.getppid():
-                self._parent = os.getppid()
-                self._on_orphan()
+            # MPI gets on only while it is called, a step of its protocol at a time
+            for _ in range(_LOOKS):
+                now = time.monotonic()
+                if now >= due:  # by the clock: looks take long on a busy machine
+                    self._send(_ALIVE)
+                    due = now + self._period
+                if self._over.wait(self._period / _LOOKS):
+                    return
+                self._listen()
+            self._beat()
+
+    def _listen(self) -> None:
+        if self._neighbours:
+            for rank, tag in self._mail.pulses():
+                self._neighbours[rank].heard(tag)
+
+    def _beat(self) -> None:
+        for rank, neighbour in self._neighbours.items():
+            if neighbour.beat(self._mail.lives(rank), self._patience) and not self._over.is_set():
+                self._on_loss(rank)
+        if self._is_orphan is not None and self._is_orphan():
+            self._is_orphan = None
+            self._on_orphan()
 
     def _send(self, tag: int) -> None:
         for rank, neighbour in self._neighbours.items():

@@ -21,7 +21,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from hpcclear import cli
-from hpcclear.ensemble import simulate
+from hpcclear.ensemble import simulate, single
 from hpcclear.ranks import launcher, leading, stopping
 from hpcclear.ranks.schedule import Task
 from hpcclear.ranks.team import Ranks
@@ -105,6 +105,14 @@ def tell_when_it_listens(mark: pathlib.Path) -> None:
     stopping.StopSwitch.__enter__ = entered  # type: ignore[method-assign]
 
 
+class WatchedResponses(Watched):
+    """The worker of single responses, likewise."""
+
+    def __init__(self, payload: dict, ranks: Ranks) -> None:
+        super().__init__(Responses(payload, ranks), ranks.where.split("'")[1], payload)
+
+
+Responses = single.Responses
 make_evaluator = simulate.make_evaluator
 
 
@@ -138,6 +146,7 @@ def watch() -> None:
         return stage(self, name)
 
     simulate.make_evaluator = make_watched  # type: ignore[assignment]
+    single.Responses = WatchedResponses  # type: ignore[assignment,misc]
     Ranks.stage = watched_stage  # type: ignore[method-assign]
     Ranks.everywhere = watched_everywhere  # type: ignore[method-assign]
     leading.run_points = watched_run_points  # type: ignore[assignment]

@@ -1,0 +1,44 @@
+"""Kills of commands of every kind at any moment: the same command goes on, to the same bytes (`kills`)."""
+
+import random
+from collections import Counter
+
+import commands
+import pytest
+from kills import COMMANDS, trial, undisturbed
+
+from hpcclear.cli import cli
+
+pytestmark = pytest.mark.mpi
+ROUNDS = {
+    "bifurcation": 2, "map": 2, "wear": 2, "effects": 2, "identify": 2, "accuracy": 2, "plan": 2, "import": 2, "export": 2,
+}  # fmt: skip
+"""Times that a command is killed twice and then ends: 36 kills, with the four of the short profile 40."""
+
+
+@pytest.mark.parametrize(
+    ("name", "rounds", "kills"),
+    [("map", 1, 1), ("import", 1, 2), ("export", 1, 1)]
+    + [pytest.param(*row, 2, marks=pytest.mark.nightly) for row in ROUNDS.items()],
+)
+@pytest.mark.timeout(3600)
+def test_a_command_that_was_killed_goes_on_to_the_same_bytes(tmp_path, name, rounds, kills):
+    (tmp_path / "undisturbed").mkdir()
+    whole, dice = undisturbed(name, tmp_path / "undisturbed"), random.Random(name)
+    states, losses = Counter(), []
+    for turn in range(rounds):
+        found, lost = trial(whole, tmp_path / str(turn), kills, dice)
+        states, losses = states + found, losses + lost
+    commands.remove_orphans()
+    print(
+        f"{name}: {dict(states)}; {whole.work:.1f} s undisturbed; each kill cost "
+        f"{max((loss.samples for loss in losses), default=0)} samples at most"
+    )
+
+
+def test_every_command_that_simulates_or_writes_results_is_killed():
+    """Those that are left out answer within a second or write figures, which the same command renews."""
+    left_out = {
+        "check", "cite", "compare", "crate", "init", "laws", "merge", "plot", "report", "reproduce", "schema", "simulate",
+    }  # fmt: skip
+    assert set(COMMANDS) | left_out == set(cli.commands)
