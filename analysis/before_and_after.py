@@ -25,8 +25,12 @@ CASES = {
     "V-twin": (f"{LINKAGES}v_twin", {"C": (2e-5, 8e-5)}),
     "crank-rocker, masses": (f"{LINKAGES}crank_rocker", {"mass": (0.2, 0.4), "C": (5e-5, 3e-4)}),
     "crank-rocker, length": (f"{LINKAGES}crank_rocker", {"coupler": (0.115, 0.125), "C": (5e-5, 3e-4)}),
+    "Hunt-Crossley, load table": ("hunt_crossley", {"C": (3e-4, 1e-3)}),
+    "four-stroke, gas table": (f"{LINKAGES}four_stroke", {"rod": (0.35, 0.65), "piston": (0.3, 0.5), "C": (1e-5, 5e-5)}),
 }  # fmt: skip
 """Scenes of `jobs/`, and the ranges that their designs are drawn from, SI."""
+
+LOAD = ["effects.slider_load=[[0, -2000], [1.5, -300], [3.1, 0], [5.5, -300]]"]
 
 
 def work(designs: int) -> None:
@@ -35,7 +39,8 @@ def work(designs: int) -> None:
 
     for line in sys.stdin:
         name, ranges = CASES[line.rstrip("\n")]
-        scene = hpcclear.load_scene(ROOT / "jobs" / f"{name}.toml", [])
+        changes = LOAD if line.rstrip("\n").endswith("load table") else []
+        scene = hpcclear.load_scene(ROOT / "jobs" / f"{name}.toml", changes)
         dice = np.random.default_rng(1)
         points = {key: dice.uniform(*ends, designs) for key, ends in ranges.items()}
         start = time.process_time()
@@ -70,6 +75,7 @@ def main() -> None:
     parser.add_argument("commit", nargs="?")
     parser.add_argument("--pairs", type=int, default=7)
     parser.add_argument("--designs", type=int, default=256)
+    parser.add_argument("--only", help="cases whose names contain this")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     words = parser.parse_args()
     if words.worker:
@@ -78,7 +84,7 @@ def main() -> None:
         old = Worker(sources(words.commit, Path(place) / "before"), words.designs)
         new = Worker(ROOT, words.designs)
         print(f"{'scene':24s} {'before, s':>10s} {'ratio':>7s} {'quarters':>14s}")
-        for case in CASES:
+        for case in (one for one in CASES if (words.only or "") in one):
             old.seconds(case), new.seconds(case)  # compile
             pairs = [(old.seconds(case), new.seconds(case)) for _ in range(words.pairs)]
             before, after = np.array(pairs).T

@@ -9,10 +9,11 @@ from test_motion import CRANK, FULL, ROD, SLIDER_MASS, SPEED, dense_model
 from test_motion import scene_of as scene_of_effects
 
 from hpcclear.base.outcome import Status
+from hpcclear.base.pieces import periodic
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
-from hpcclear.dynamics.planar.curves import curve_at, periodic_cells
+from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.setup.parameters import parameters
@@ -134,28 +135,25 @@ def test_curves_are_the_monotone_cubics_of_scipy(seed):
     values = random.integers(-3, 4, len(rows)) * 10.0 ** random.uniform(-8, 8)
     three = np.concatenate([rows - at.TURN, rows, rows + at.TURN])
     smooth = PchipInterpolator(three, np.tile(values, 3))
-    cells = periodic_cells(tuple(zip(rows, values, strict=True))).reshape(-1, 4)
-    width = at.TURN / at.CELLS
-    angle = np.arange(at.CELLS) * width
-    angle = np.where(angle < rows[0], angle + at.TURN, angle)
+    curve = periodic(tuple(zip(rows, values, strict=True)), at.TURN)
+    angle = np.linspace(0.0, at.TURN, 5001)
+    there = np.where(angle < rows[0], angle + at.TURN, angle)
     size = np.abs(values).max()
-    np.testing.assert_allclose(cells[:, 0], smooth(angle), rtol=0, atol=1e-13 * size)
-    slope = smooth.derivative()(angle)
+    np.testing.assert_allclose(curve.at(angle), smooth(there), rtol=0, atol=1e-11 * size)
+    slope = smooth.derivative()(there)
     np.testing.assert_allclose(
-        cells[:, 1], slope * width, rtol=0, atol=1e-12 * np.abs(slope).max() * width
+        curve.derivative().at(angle), slope, rtol=0, atol=1e-9 * np.abs(slope).max()
     )
+    area = smooth.integrate(rows[0], rows[0] + at.TURN)
+    assert curve.mean() * at.TURN == pytest.approx(area, abs=1e-11 * size)
 
 
 def test_straight_lines_between_rows():
-    """Exact but in the four cells that hold a row; there off by an eighth of the kink's slope over a cell, at most."""
-    width = at.TURN / at.CELLS
+    """Exact everywhere, corners included."""
     angle = np.linspace(-1.0, 7.0, 20_001)
     expected = np.interp(angle, *np.array(ROWS).T, period=at.TURN)
-    error = np.abs(curve_at(ROWS, angle, interpolation="linear") - expected)
-    holds = [np.abs((angle - row + np.pi) % at.TURN - np.pi) < width for row, _ in ROWS]
-    assert error[~np.any(holds, axis=0)].max() < 1e-13
-    assert 0 < error.max() < 0.5 * width * 5
-    # rows at the borders of cells have their kinks
+    found = curve_at(ROWS, angle, interpolation="linear")
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
     even = tuple((k * at.TURN / 8, float(k % 3)) for k in range(8))
     expected = np.interp(angle, *np.array(even).T, period=at.TURN)
     assert np.abs(curve_at(even, angle, interpolation="linear") - expected).max() < 1e-12

@@ -21,6 +21,7 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text, text_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws import laws
+from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import (
     Bending,
@@ -313,7 +314,7 @@ def test_the_kernel_by_hand_computes_the_same():
     effects = flags_of(BARE, linkage)
     accelerations = linkage.module(effects).accelerations
     text = one_text(accelerations, f"compared_{W}", effects=effects, W=W)
-    njit(text)(hers, values, np.zeros(at.TABLES))
+    njit(text)(hers, values, packed((), ()))
     written = slice(at.ACC * W, (at.RATE_NOW + at.GAP_RATE + 1 + 1) * W)
     np.testing.assert_allclose(mine[written], hers[written], rtol=1e-11, atol=1e-11)
     np.testing.assert_array_equal(mine[: at.ACC * W], hers[: at.ACC * W])

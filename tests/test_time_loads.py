@@ -7,6 +7,7 @@ from test_loads import INERTIA, PIN, START, angle_of, machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.linkage.compiled import module_text
 from hpcclear.dynamics.setup.problem import problem_of
@@ -176,7 +177,7 @@ def test_scenes_without_such_loads_read_no_clock():
     for loads, there in (({}, False), ({"kick": kick}, True)):
         problem = problem_of(machine(loads))
         text = module_text(problem.linkage._text(problem.linkage._on), ())
-        assert ("table_until" in text) == there
+        assert (f"work[{at.BEGAN} * W + i]" in text) == there
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         ),
         *_speeds(scene),
         *_assembly(scene),
+        *_tables(scene),
         ("scene hash", scene.hash[:16]),
         ("MPI", _mpi(ranks)),
     ]
@@ -74,6 +75,20 @@ def _speeds(scene: Scene) -> list[tuple[str, str]]:
         (words[unit], f"{path}: {turning(scene.number(path), unit)}")
         for path in scene.numeric_paths()
         if (unit := scene.unit(path)) in words
+    ]
+
+
+def _tables(scene: Scene) -> list[tuple[str, str]]:
+    """Every curve that is looked up, a row each: how many rows it has, and at how many of them steps end."""
+    from hpcclear.dynamics.planar.problem import linkage_of
+    from hpcclear.dynamics.setup.problem import problem_of
+
+    problem = problem_of(scene)
+    return [
+        ("table", f"{name}: {len(curve.starts)} pieces; integration steps end at {len(stops)} rows")
+        for name, curve, stops in zip(
+            linkage_of(scene).curve_rows, problem.curves, problem.stops, strict=True
+        )
     ]
 
 

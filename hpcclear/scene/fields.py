@@ -22,7 +22,7 @@ from hpcclear.scene.wanted import hint
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
-LONGEST_CURVE = 10_000
+LONGEST_CURVE = 100_000
 
 
 def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:

@@ -23,7 +23,7 @@ class Numerics(Table):
     beta: Annotated[float, Quantity("1/s", least=0)] = 250.0
     """Baumgarte feedback on constraint position, 1/s; used by that formulation, and by ideal loops of linkages."""
     interpolation: Literal["smooth", "linear"] = "smooth"
-    """Interpolation between the rows of tables against the crank angle: monotone cubic ("smooth") or linear."""
+    """Interpolation between the rows of tables of loads and torques: monotone cubic ("smooth") or linear, with corners."""
     method: Literal[
         "auto", "tsitouras", "dormand-prince", "fehlberg", "prince-dormand", "switching", "radau"
     ] = "auto"

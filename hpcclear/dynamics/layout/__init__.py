@@ -212,6 +212,9 @@ PROFILES = WRITTEN(
     WAVE_ROWS,
     "profile",
 )
+MAX_CURVES = 8
+PLACES = WRITTEN("of tabulated curves: shares of their lengths", "", MAX_CURVES)
+PLACE_RATES = WRITTEN("their rates", "1/s", MAX_CURVES)
 RATES = WRITTEN.end
 
 
@@ -250,6 +253,7 @@ def _mask(largest: int) -> int:
 
 JOINT_MASK = _mask(MAX_JOINTS - 1)
 COORDINATE_MASK = _mask(MAX_COORDINATES - 1)
+CURVE_MASK = _mask(MAX_CURVES - 1)
 MEASURE_MASK = _mask(max(one.rate for one in MEASURES))
 
 
@@ -317,8 +321,10 @@ STRICTER = OF_LANE(
 )
 STRICTER_WITHIN = OF_LANE("that within the range of stability")
 STRICTER_AT_EDGE = OF_LANE("and at the edge of it")
-MAX_CURVES = 8
 CURVES = OF_LANE("values of tabulated curves at the stage", size=MAX_CURVES)
+AHEAD = OF_LANE("shares of their lengths to the next place where a step ends", size=MAX_CURVES)
+BEHIND = OF_LANE("and to the one before; both 0 where they are not known", size=MAX_CURVES)
+RESUMED = OF_LANE("step proposed before it was shortened to end at such a place, or 0", "s")
 ACTIVE = OF_LANE("contact whose impact speed is kept (1), or flight (0)", "", EACH)
 INVERSE_IMPACT = OF_LANE("1 / d'_0", "s/m", EACH)
 PEAK = OF_LANE("largest contact force", "N", EACH)
@@ -335,10 +341,6 @@ BANK = WORK + PARAMETERS
 
 STAGES = BANK
 """First row of the explicit method's stage accelerations, behind them: row STAGES + s MAX_COORDINATES + k."""
-
-# ---- tabulated curves, one behind the other -----------------------------------------------------
-CELLS = 2048  # cubic cells over one turn, 4 coefficients each
-TABLES = 4 * MAX_CURVES * CELLS  # at most
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
 OF_BOOK = Rows()
@@ -454,7 +456,7 @@ class Method(NamedTuple):
 
     settings: Array
     weights: Array
-    tables: Array  # (TABLES,)
+    tables: Array  # as `layout.curves.packed`
     measures: Array  # as `measures_of`
     numbers: Integers
 
@@ -471,16 +473,17 @@ class Rules(NamedTuple):
     largest: int  # the objective is made of the largest value of its rate
     begin: int  # places of open joints, from `begin` on
     end: int  # and before `end`
+    curves: int  # tabulated ones, at whose rows steps may end
 
 
-def rules_of(effects: Effects) -> Rules:
-    """Those of a set of effects."""
+def rules_of(effects: Effects, curves: int = 0) -> Rules:
+    """Those of a set of effects, and of so many tabulated curves."""
     e = effects
     turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
     flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
     places = places_of(e)
-    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop])
+    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop, curves])
 
 
 class Stepped(NamedTuple):

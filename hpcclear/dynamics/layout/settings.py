@@ -57,5 +57,5 @@ def rules_in(numbers):
     r = RULES
     return at.Rules(
         numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4], numbers[r + 5],
-        numbers[r + 6], numbers[r + 7], numbers[r + 8],
+        numbers[r + 6], numbers[r + 7], numbers[r + 8], numbers[r + 9],
     )  # fmt: skip

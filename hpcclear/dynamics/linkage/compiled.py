@@ -42,14 +42,16 @@ def motion(effects, lanes, tables, W):
     """`accelerations` of the lanes at an address."""
     work = carray(lanes, at.BANK * W)
     par = beyond(work, at.WORK * W)
-    accelerations(effects, work, par, carray(tables, at.TABLES), W)
+    accelerations(effects, work, par, carray(tables, at.MAX_CURVES), W)
 '''
 
 BANK = 8
 """Lanes of an implicit step's motion."""
 
 _LOOK_UP = """    for i in range(W):
-{before}        work[{row} * W + i] = {function}(tables, {first}, at.CELLS, {place})
+{before}        work[{place_row} * W + i] = {place}
+        work[{rate_row} * W + i] = {rate}
+    look_up(work, tables, {curve}, W)
 """
 
 
@@ -58,11 +60,12 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     rows = ", ".join(f"at.{joint!r}" for joint in joints)
     looked_up = "".join(
         _LOOK_UP.format(
-            row=row,
-            first=4 * at.CELLS * (row - at.CURVES),
+            curve=row - at.CURVES,
+            place_row=at.RATE_NOW + at.PLACES + row - at.CURVES,
+            rate_row=at.RATE_NOW + at.PLACE_RATES + row - at.CURVES,
             before="".join(f"        {line}\n" for line in one.before),
-            function=one.function,
             place=one.place,
+            rate=one.rate,
         )
         for row, one in ((row, motion.look_ups[name]) for name, row in motion.curves.items())
     )
@@ -70,7 +73,7 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     called = [name for name in functions() if f" {name}(" in motion.source + looked_up]
     head = _HEAD.format(
         geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries),
-        elements=", ".join(called or ["table_value"]),
+        elements=", ".join(called or ["look_up"]),
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
     lane = f"@apart\n@lane_function\n{motion.source}"

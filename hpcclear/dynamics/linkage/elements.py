@@ -7,6 +7,17 @@ import numpy as np
 
 from hpcclear.base.bits import no_more
 from hpcclear.base.jit import lane_function
+from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.curves import (
+    CUBICS,
+    GRID,
+    HALVINGS,
+    HEAD,
+    LAST,
+    LAST_PIECE,
+    REPEATS,
+    STARTS,
+)
 
 _TINY = 1e-300  # keeps the direction of a spring without length defined (and zero)
 _FLAT = 1e-8  # pivots of loops over those of an open one, from which on inertia alone goes on: 1e-4 rad from flat
@@ -96,24 +107,39 @@ def held_inverse(pivot, scale):
 
 
 @lane_function
-def table_value(table, first, cells, angle):
-    """Value of a periodic table at an angle in rad: cubic cells on a uniform grid, 4 coefficients a cell, from `first` on."""
-    turns = angle * (0.5 / math.pi)
-    x = (turns - math.floor(turns)) * cells
-    cell = min(int(x), cells - 1)
-    s = x - cell
-    k = first + 4 * cell
-    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+def look_up(work, tables, curve, W):
+    """Values of a tabulated curve (`layout.curves`) at the places of all lanes, cubic between two rows; level beyond both ends
+    of one that does not repeat.
 
-
-@lane_function
-def table_until(table, first, cells, share):
-    """The same of a table that does not repeat, at a share of its length not below 0; level beyond its end."""
-    x = no_more(share, 1.0) * cells
-    cell = min(int(x), cells - 1)
-    s = x - cell
-    k = first + 4 * cell
-    return table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+    A loop over the lanes for each of its parts, the halvings among them, so that each is vectorised.
+    """
+    head = HEAD * curve
+    place, value = at.RATE_NOW + at.PLACES + curve, at.CURVES + curve
+    repeats, last = tables[head + REPEATS], tables[head + LAST]
+    grid, starts = int(tables[head + GRID]), int(tables[head + STARTS])
+    cubics, pieces = int(tables[head + CUBICS]), tables[head + LAST_PIECE]
+    for i in range(W):
+        x = work[place * W + i]
+        x = x - repeats * math.floor(x)
+        work[place * W + i] = x
+        interval = no_more(x * (last + 1.0), last)
+        interval = interval if interval > 0.0 else 0.0  # what is no number as well
+        work[value * W + i] = tables[grid + int(interval)]
+    step = 1 << int(tables[head + HALVINGS])
+    while step > 1:
+        step = step >> 1
+        for i in range(W):
+            k = work[value * W + i]
+            further = no_more(k + step, pieces)
+            there = tables[starts + int(further)] <= no_more(work[place * W + i], 1.0)
+            work[value * W + i] = further if there else k
+    for i in range(W):
+        k = int(work[value * W + i])
+        s = no_more(work[place * W + i], 1.0) - tables[starts + k]
+        c = cubics + 4 * k
+        work[value * W + i] = tables[c] + s * (
+            tables[c + 1] + s * (tables[c + 2] + s * tables[c + 3])
+        )
 
 
 def functions() -> dict[str, Callable[..., object]]:

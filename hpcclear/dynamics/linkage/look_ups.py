@@ -13,11 +13,11 @@ CLOCK = f"(work[{at.BEGAN} * W + i] + work[{at.STAGE_TIME} * W + i])"
 
 
 class LookUp(NamedTuple):
-    """Statements, the function that reads the table after them, and the place that it is given."""
+    """Statements, and after them the place, a share of the table's length, and its rate, 1/s."""
 
     before: tuple[str, ...]
-    function: str
     place: str
+    rate: str
 
 
 class LookUps:
@@ -44,19 +44,17 @@ class LookUps:
     def _of(self, part: Drive | Load) -> LookUp:
         main = self._forest.mechanism.period
         if isinstance(part, TableDrive):
-            share = main.seconds / part.seconds / main.turns
-            text = f"par[{at.SPEED} * W + i] * work[{at.STAGE_TIME} * W + i] * {share!r}"
-            return LookUp((), "table_value", text)
+            share = main.seconds / part.seconds / main.turns / at.TURN
+            rate = f"par[{at.SPEED} * W + i] * {share!r}"
+            return LookUp((), f"{rate} * work[{at.STAGE_TIME} * W + i]", rate)
         if isinstance(part, RunUp):
-            return LookUp((), "table_until", f"{CLOCK} * {1.0 / part.length!r}")
+            return _by_time(part.length)
         by = getattr(part, "by", None)
         if by is None:
             return self._by_angle(main.body, main.turns)
         if not by.seconds:
             return self._by_angle(by.body, 1)
-        length = at.TURN if by.repeats else 1.0
-        function = "table_value" if by.repeats else "table_until"
-        return LookUp((), function, f"{CLOCK} * {length / by.seconds!r}")
+        return _by_time(by.seconds)
 
     def _by_angle(self, body: str, turns: int) -> LookUp:
         """The angle of a body from the x axis, divided by the turns after which the table repeats."""
@@ -65,11 +63,16 @@ class LookUps:
         kin = Kinematics(
             self._forest, write, rows.coordinates, rows.velocities, rows.time, rows.curves
         )
-        angle = kin.angle(body)
-        if turns != 1:
-            angle = angle * named(repr(1.0 / turns))
-        text = write.text(angle)
+        share = named(repr(1.0 / (at.TURN * turns)))
+        text = write.text(kin.angle(body) * share)
+        rate = write.text(kin.spin(self._forest.frames[body]) * share)
         self.rows, self._free = write.rows, write.free
         self.read |= write.read
         self.inputs |= write.inputs
-        return LookUp(tuple(write.lines), "table_value", text)
+        return LookUp(tuple(write.lines), text, rate)
+
+
+def _by_time(seconds: float) -> LookUp:
+    """The time since the start of the sample, divided by that after which the table repeats or stays level."""
+    rate = repr(1.0 / seconds)
+    return LookUp((), f"{CLOCK} * {rate}", rate)

@@ -300,14 +300,14 @@ class Harmonic:
 class TableDrive:
     """The body's angle is prescribed by rows (time in s, angle in rad), the first at 0, the last where it repeats.
 
-    A cubic spline that is smooth where it repeats as well; `cells`: what the kernel reads of it (`curves.angle_cells`). The
+    A cubic spline that is smooth where it repeats as well; `pieces`: those of its `curves` (`planar.curves.angle_pieces`). The
     last angle is the first, or a turn further on or back.
     """
 
     name: str
     body: str
     rows: tuple[Pair, ...]
-    cells: Any = field(compare=False, repr=False)
+    pieces: Any = field(compare=False, repr=False)
     period: bool = False
     prescribed: ClassVar[bool] = True
     turns: ClassVar[int] = 1
@@ -367,11 +367,11 @@ class TorqueDrive:
 class RunUp(TorqueDrive):
     """A body whose angle is free turns at speeds given by rows (s, rad/s), smooth and level beyond, whatever torque that takes.
 
-    `cells`: of its `curves`, as the kernel reads them.
+    `pieces`: those of its `curves`.
     """
 
     rows: tuple[Pair, ...] = ()
-    cells: Any = field(default=None, compare=False, repr=False)
+    pieces: Any = field(default=None, compare=False, repr=False)
     curves: ClassVar[tuple[str, ...]] = ("speed", "rise")
 
     @property

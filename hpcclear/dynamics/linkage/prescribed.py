@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
@@ -54,7 +54,7 @@ class Prescribed:
     margin: Array
     """Shape (t,): smallest singular value of the constraints, rows scaled to 1: 0 at a dead centre."""
 
-    def taken(self, which: slice) -> "Prescribed":
+    def taken(self, which: Integers) -> "Prescribed":
         """The same at some of the instants."""
         parts = ("times", "q", "v", "a", "power", "loss", "load_power", "margin")
         holds = {name: values[which] for name, values in self.holds.items()}

@@ -1,11 +1,8 @@
-"""The motion that a table of angles prescribes, as a function for numpy: the same cells that the kernel reads."""
+"""The motion that a table of angles prescribes, as a function for numpy: the same pieces that the kernel reads."""
 
 from collections.abc import Callable
 
-import numpy as np
-
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import TableDrive
 
@@ -22,16 +19,5 @@ def words_of(mechanism: Mechanism) -> dict[str, Given]:
 
 
 def _given(drive: TableDrive) -> Given:
-    cells = drive.cells.reshape(3, at.CELLS, 4)
-
-    def given(time: Array) -> tuple[Array, Array, Array]:
-        place = np.mod(time, drive.seconds) * (at.CELLS / drive.seconds)
-        cell = np.minimum(np.asarray(place).astype(int), at.CELLS - 1)
-        s = place - cell
-        found = []
-        for part in cells:
-            c0, c1, c2, c3 = np.moveaxis(part[cell], -1, 0)
-            found.append(c0 + s * (c1 + s * (c2 + s * c3)))
-        return found[0], found[1], found[2]
-
-    return given
+    angle, spin, turn = drive.pieces
+    return lambda time: (angle.at(time), spin.at(time), turn.at(time))

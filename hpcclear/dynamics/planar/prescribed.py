@@ -1,16 +1,17 @@
 """Linkages without clearance whose drives prescribe everything: time series and extremes, nothing integrated."""
 
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.linkage import Linkage
+from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Revolute, Slide, split
+from hpcclear.dynamics.linkage.parts import Revolute, Slide, TableDrive, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
 from hpcclear.dynamics.planar.path import rigid_acceleration
@@ -21,6 +22,9 @@ from hpcclear.dynamics.planar.turning import passage
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.points import Points
+
+BEND = 1e-6
+"""Part of a table's range from which on a sum is cut where no cubic follows it."""
 
 PER_REVOLUTION = 720
 """Instants of a revolution, if no number is requested."""
@@ -48,9 +52,14 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
             mechanism = mechanism_of(one.linkage)
             times = np.linspace(0.0, mechanism.period.seconds, PER_REVOLUTION, endpoint=False)
             held = prescribed_motion(mechanism, times, one.effects.gravity, _curves(one))
+            rows = passings(one, mechanism, np.append(times, mechanism.period.seconds))
+            largest = 0.0
+            if len(rows):
+                peaks = prescribed_motion(mechanism, rows, one.effects.gravity, _curves(one))
+                largest = float(np.abs(peaks.holds[f"{mechanism.period.name}_angle"]).max())
         except InputError:
             continue
-        moment = held.holds[f"{mechanism.period.name}_angle"]
+        moment = np.append(held.holds[f"{mechanism.period.name}_angle"], largest)
         acceleration = _followed_acceleration(linkage_of(one), held)
         deviation = float(np.std(acceleration))
         found[row] = np.abs(moment).max(), deviation, np.abs(acceleration).max()
@@ -59,11 +68,69 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
 
 def _curves(scene: Scene) -> dict[str, Any]:
     """Tabulated loads by name, each as a function of the angle or time that it goes by."""
-    interpolation = scene.numerics.interpolation
-    return {
-        name: partial(curve.at, interpolation=interpolation)
-        for name, curve in curves_of(scene.linkage).items()
-    }
+    curves = curves_of(scene.linkage, scene.numerics.interpolation)
+    return {name: curve.at for name, curve in curves.items()}
+
+
+def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
+    """When, from the first to the last of the instants (t,), a table is at a row around which it bends, s, ascending."""
+    found = [np.zeros(0)]
+    for drive in mechanism.drives:
+        if isinstance(drive, TableDrive):
+            stops = breaks(drive.pieces[-1], BEND)
+            found.append(_levels(stops, True, times / drive.seconds) * drive.seconds)
+    curves = curves_of(scene.linkage, scene.numerics.interpolation)
+    tabled = [load for load in mechanism.loads if load.name in curves]
+    by_time = {load.name for load in tabled if load.by is not None and load.by.seconds}  # type: ignore[union-attr]
+    coarse = prescribed_motion(mechanism, times) if len(tabled) > len(by_time) else None
+    for load in tabled:
+        curve, by = curves[load.name], load.by  # type: ignore[union-attr]
+        stops = breaks(curve, BEND)
+        if coarse is None or load.name in by_time:
+            found.append(_levels(stops, curve.repeats, times / curve.length) * curve.length)
+            continue
+        body = mechanism.period.body if by is None else by.body
+        turned = coarse.assembly.loops.forest.index("angle", body)
+        found.append(_crossed(stops, coarse.q[:, turned], coarse.v[:, turned], times, curve.length))
+    every = np.unique(np.concatenate(found))
+    return every[(every > times[0]) & (every < times[-1])]
+
+
+def _levels(stops: Array, repeats: bool, shares: Array) -> Array:
+    """Shares of a table's length at which it is at its rows (n,), between the least and the largest of some."""
+    if not repeats:
+        return stops
+    lengths = np.arange(np.floor(shares.min()), np.ceil(shares.max()) + 1.0)
+    return (lengths[:, None] + stops).ravel()
+
+
+def _crossed(stops: Array, angle: Array, spin: Array, times: Array, length: float) -> Array:
+    """When an angle (t,), between instants (t,) the cubic through its values and rates, is at rows of a table."""
+    levels = np.sort(_levels(stops, True, angle / length)) * length
+    a, b = angle[:-1], angle[1:]
+    first = np.searchsorted(levels, np.minimum(a, b))
+    count = np.searchsorted(levels, np.maximum(a, b), side="right") - first
+    k = np.repeat(np.arange(len(a)), count)
+    level = levels[first[k] + _within(count)]
+    h = np.diff(times)[k]
+    low, high = np.zeros(len(k)), np.ones(len(k))
+    rising = b[k] > a[k]
+    for _ in range(50):
+        s = 0.5 * (low + high)
+        there = _between(a[k], h * spin[k], b[k], h * spin[k + 1], s)
+        beyond = (there > level) == rising
+        low, high = np.where(beyond, low, s), np.where(beyond, s, high)
+    return np.asarray(times[k] + h * s) if len(k) else np.zeros(0)
+
+
+def _within(count: Array) -> Array:
+    """0, 1, ... for each of groups of so many."""
+    return np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+
+
+def _between(d0: Array, m0: Array, d1: Array, m1: Array, s: Array) -> Array:
+    c2, c3 = 3.0 * (d1 - d0) - 2.0 * m0 - m1, 2.0 * (d0 - d1) + m0 + m1
+    return np.asarray(d0 + s * (m0 + s * (c2 + s * c3)))
 
 
 def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
@@ -104,10 +171,12 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     walk = passage(mechanism, gravity, revolutions)
     times = times if walk is None else walk[1].passed(times)
     phase = cycle * times / period
-    inside = (times[:-1, None] + np.diff(times)[:, None] * _NODES).ravel()
-    every = np.sort(np.concatenate([times, inside]))
+    edges = np.union1d(times, passings(scene, mechanism, times))
+    inside = (edges[:-1, None] + np.diff(edges)[:, None] * _NODES).ravel()
+    every = np.sort(np.concatenate([edges, inside]))
     dense = prescribed_motion(mechanism, every, gravity, _curves(scene))
-    found = dense.taken(slice(None, None, 1 + len(_NODES)))
+    shown = np.searchsorted(edges, times)
+    found = dense.taken(shown * (1 + len(_NODES)))
     poses = Poses(found.assembly.loops.forest, {}, 0)
     base = values(mechanism, cartesian=True, gravity=gravity)
     par = np.zeros(max(poses.rows.values(), default=0) + 1)
@@ -121,7 +190,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     kinetic = 0.5 * (mass * (pose.vx**2 + pose.vy**2) + inertia * pose.spin**2).sum(axis=0)
     potential = gravity * (mass * pose.y).sum(axis=0)
     driving, lost, load = (
-        _work(power, times) for power in (dense.power, dense.loss, dense.load_power)
+        _work(power, edges)[shown] for power in (dense.power, dense.loss, dense.load_power)
     )
     total = kinetic + potential
     places = bodies_and_points(mechanism, pose)
@@ -141,7 +210,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
 
 
 def _work(power: Array, times: Array) -> Array:
-    """Work (t,) since the first of the instants (t,), of a power at these and at the nodes between them."""
+    """Work (t,) since the first of instants (t,), of a power at these and at the nodes between them."""
     between = np.append(power, np.zeros(len(_NODES))).reshape(len(times), -1)[:-1, 1:]
     return np.concatenate([[0.0], np.cumsum(between @ _WEIGHTS * np.diff(times))])
 

@@ -1,12 +1,14 @@
 """From the tables of a linkage to the mechanism as data."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.pieces import Pieces, level, periodic
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws.hertz_contact import (
     contact_stiffness,
     reduced_compliance,
@@ -15,14 +17,7 @@ from hpcclear.dynamics.laws.hertz_contact import (
 from hpcclear.dynamics.linkage import parts
 from hpcclear.dynamics.linkage.loads import KINDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
-from hpcclear.dynamics.planar.curves import (
-    angle_cells,
-    as_angles,
-    curve_at,
-    level_at,
-    level_cells,
-    periodic_cells,
-)
+from hpcclear.dynamics.planar.curves import angle_pieces, speed_pieces
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,
@@ -187,14 +182,14 @@ def _drive(drive: object) -> parts.Drive:
         )  # fmt: skip
     if isinstance(drive, PlanarTable):
         return parts.TableDrive(
-            drive.name, drive.body, drive.angle, angle_cells(drive.angle), drive.period
+            drive.name, drive.body, drive.angle, angle_pieces(drive.angle), drive.period
         )
     if isinstance(drive, PlanarRunUp):
         rows = drive.speed_by_time
         top = max(speed for _, speed in rows)
         return parts.RunUp(
             drive.name, drive.body, 0.0, rows[0][1], drive.flywheel_inertia, False, drive.period,
-            drive.turns, top, rows=rows, cells=level_cells(rows),
+            drive.turns, top, rows=rows, pieces=speed_pieces(rows),
         )  # fmt: skip
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
@@ -238,39 +233,20 @@ def _by(load: Any) -> parts.By | None:
     return None if load.angle_of is None else parts.By(load.angle_of)
 
 
-class Tabled(NamedTuple):
-    """A table of a drive or load: its rows, by angles (rad) of so many turns, or where there are none by the time (s)."""
-
-    rows: Any
-    turns: int
-    repeats: bool = True
-
-    def cells(self, interpolation: str) -> Array:
-        """As the kernel reads it."""
-        if self.turns:
-            return periodic_cells(self.rows, turns=self.turns, interpolation=interpolation)
-        if self.repeats:
-            return periodic_cells(as_angles(self.rows), interpolation=interpolation)
-        return level_cells(self.rows, interpolation)[0]
-
-    def at(self, place: Array, interpolation: str) -> Array:
-        """The same at places (n,)."""
-        if self.turns:
-            return curve_at(self.rows, place, self.turns, interpolation)
-        if self.repeats:
-            angle = place * (2 * np.pi / self.rows[-1][0])
-            return curve_at(as_angles(self.rows), angle, 1, interpolation)
-        return level_at(self.rows, place, interpolation)
-
-
-def curves_of(planar: Planar) -> dict[str, Tabled]:
-    """Tables of drives and loads, by name."""
+def curves_of(planar: Planar, interpolation: str = "smooth") -> dict[str, Pieces]:
+    """Tables of drives and loads by name, over the angle (rad) or time (s) that each goes by."""
     found, turns = {}, turns_of(planar)
     for row in (*planar.drives, *planar.loads):
         for entry in ("torque", "size"):
             if isinstance(curve := getattr(row, entry, None), tuple):
                 by_another = getattr(row, "angle_of", None) is not None
-                found[row.name] = Tabled(curve, 1 if by_another else turns)
+                length = at.TURN * (1 if by_another else turns)
+                found[row.name] = periodic(curve, length, interpolation)
             if (curve := getattr(row, f"{entry}_by_time", None)) is not None:
-                found[row.name] = Tabled(curve, 0, row.repeats)  # type: ignore[union-attr]
+                again = row.repeats  # type: ignore[union-attr]
+                found[row.name] = (
+                    periodic(curve, curve[-1][0], interpolation)
+                    if again
+                    else level(curve, interpolation)
+                )
     return found

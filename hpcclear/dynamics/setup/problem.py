@@ -2,8 +2,8 @@
 
 from functools import lru_cache
 
-from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.laws.objectives import rate_in_lanes
@@ -101,19 +101,16 @@ def implicit_method(scene: Scene) -> str:
     return "stiff" if stiff[there].any() else "never"
 
 
-def _cells_of_curves(scene: Scene, linkage: Linkage) -> tuple[Array, ...]:
-    """Cells of a linkage's curves, in the order of their rows."""
+def _curves_of_rows(scene: Scene, linkage: Linkage) -> tuple[Pieces, ...]:
+    """A linkage's curves, in the order of their rows."""
     driven = {
-        f"{drive.name}.{part}": cells
+        f"{drive.name}.{part}": pieces
         for drive in linkage.mechanism.drives
         if isinstance(drive, (TableDrive, RunUp))
-        for part, cells in zip(drive.curves, drive.cells, strict=True)
+        for part, pieces in zip(drive.curves, drive.pieces, strict=True)
     }
-    tables, interpolation = curves_of(scene.linkage), scene.numerics.interpolation
-    return tuple(
-        driven[name] if name in driven else tables[name].cells(interpolation)
-        for name in linkage.curve_rows
-    )
+    tables = curves_of(scene.linkage, scene.numerics.interpolation)
+    return tuple(driven[name] if name in driven else tables[name] for name in linkage.curve_rows)
 
 
 def check_objective(scene: Scene) -> None:
@@ -146,7 +143,7 @@ def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         implicit=implicit_method(scene),
         cycle=linkage.mechanism.period.advance,
         parameter_rows=parameter_rows(scene),
-        curves=_cells_of_curves(scene, linkage),
+        curves=_curves_of_rows(scene, linkage),
         chosen=scene.objective.joints,
         from_rest=getattr(linkage.mechanism.period, "expected_speed", None) is not None,
     )

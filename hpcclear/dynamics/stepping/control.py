@@ -31,20 +31,94 @@ def count_up(count, flag):
 
 
 @lane_function
-def choose_step(work, par, free, W):
-    """Take the step requested, or what is left of the revolution (prescribed speed)."""
-    if free:
+def choose_step(rules, work, par, W):
+    """Take the step requested, or what is left to a row of a table, or of the revolution (prescribed speed)."""
+    for i in range(W):
+        work[at.STEP * W + i] = work[at.NEXT_STEP * W + i]
+    if rules.curves > 0:
+        shorten_to_rows(rules, work, W)
+    if not rules.free:
         for i in range(W):
-            work[at.STEP * W + i] = work[at.NEXT_STEP * W + i]
-    else:
-        for i in range(W):
-            h = work[at.NEXT_STEP * W + i]
+            h = work[at.STEP * W + i]
             left = par[at.PERIOD * W + i] - work[at.TIME * W + i]
             # Stretched by round-off at most: a step cut to end at an impact must stay cut, or is tried for ever.
             ending = 1.0 if h * (1.0 + 1e-8) >= left else 0.0
             h = left if h * (1.0 + 1e-8) >= left else h
             work[at.ENDING * W + i] = ending
             work[at.STEP * W + i] = h
+
+
+ROW_REACH = 1e-7
+"""Part of a step that a row of a table may stand from its end: a corner of the load there does no harm."""
+
+
+ROUNDED = 1e-15
+"""Of a place, which is a number of lengths before whole ones are taken off."""
+
+
+@lane_function
+def shorten_to_rows(rules, work, W):
+    """End steps at the next row of each table where a step ends, as far off as the rate of its place says."""
+    for curve in range(rules.curves):
+        c = curve & at.CURVE_MASK
+        for i in range(W):
+            rate = work[(at.RATE_OLD + at.PLACE_RATES + c) * W + i]
+            ahead, behind = work[(at.AHEAD + c) * W + i], work[(at.BEHIND + c) * W + i]
+            left = (ahead if rate > 0.0 else behind) / max(abs(rate), 1e-300)
+            h = work[at.STEP * W + i]
+            work[at.STEP * W + i] = left if (left > 0.0) & (left < h) else h
+    for i in range(W):
+        asked = work[at.NEXT_STEP * W + i]
+        work[at.RESUMED * W + i] = asked if work[at.STEP * W + i] < asked else 0.0
+
+
+@lane_function
+def moved_on(work, c, i, W):
+    """By how much the place of table c has moved in a step: whole lengths are those that its rates say."""
+    moved = (
+        work[(at.RATE_NOW + at.PLACES + c) * W + i] - work[(at.RATE_OLD + at.PLACES + c) * W + i]
+    )
+    now = work[(at.RATE_NOW + at.PLACE_RATES + c) * W + i]
+    mean = 0.5 * (now + work[(at.RATE_OLD + at.PLACE_RATES + c) * W + i])
+    return moved + math.floor(work[at.STEP * W + i] * mean - moved + 0.5)
+
+
+@lane_function
+def row_reach(work, c, moved, i, W):
+    """How near the end of a step a row is taken to be there: no nearer than places are rounded."""
+    rate = abs(work[(at.RATE_NOW + at.PLACE_RATES + c) * W + i])
+    lengths = (work[at.BEGAN * W + i] + work[at.TIME * W + i]) * rate
+    return ROW_REACH * abs(moved) + ROUNDED * (lengths + 100.0)
+
+
+@lane_function
+def flag_rows(rules, work, W):
+    """Mark accepted lanes whose step ends at or beyond such a row."""
+    for curve in range(rules.curves):
+        c = curve & at.CURVE_MASK
+        for i in range(W):
+            moved = moved_on(work, c, i, W)
+            reach = row_reach(work, c, moved, i, W)
+            on = 1.0 if moved >= work[(at.AHEAD + c) * W + i] - reach else 0.0
+            left = work[(at.BEHIND + c) * W + i] - reach
+            back = 1.0 if (moved < 0.0) & (-moved >= left) else 0.0
+            flag_accepted(work, max(on, back), i, W)
+
+
+@lane_function
+def commit_rows(rules, work, W):
+    """Places of tables, and how far the rows are at which steps end, after a step."""
+    for curve in range(rules.curves):
+        c = curve & at.CURVE_MASK
+        for i in range(W):
+            yes = work[at.ACCEPT * W + i] == 1.0
+            moved = moved_on(work, c, i, W)
+            keep(work, at.AHEAD + c, work[(at.AHEAD + c) * W + i] - moved, yes, i, W)
+            keep(work, at.BEHIND + c, work[(at.BEHIND + c) * W + i] + moved, yes, i, W)
+        for row in (at.PLACES + c, at.PLACE_RATES + c):
+            for i in range(W):
+                yes = work[at.ACCEPT * W + i] == 1.0
+                keep(work, at.RATE_OLD + row, work[(at.RATE_NOW + row) * W + i], yes, i, W)
 
 
 @lane_function
@@ -70,6 +144,8 @@ def judge_step(work, settings, W):
         asked = work[at.NEXT_STEP * W + i]
         cut = accept * work[at.ENDING * W + i]
         proposal = max(proposal, asked) if cut == 1.0 else proposal
+        # nor does one that ends at a row of a table
+        proposal = max(proposal, accept * work[at.RESUMED * W + i])
         # the implicit method has its own control
         proposal = asked if work[at.STIFF * W + i] == 1.0 else proposal
         attempts = work[at.ATTEMPTS * W + i] + running
@@ -131,6 +207,8 @@ def flag_gaps(rules, work, par, last, tolerance, W):
             turned = 1.0 if work[(at.QS + last) * W + i] > end else 0.0
             stalled = 1.0 if work[(at.VS + last) * W + i] <= 0.0 else 0.0
             flag_accepted(work, max(turned, stalled), i, W)
+    if rules.curves > 0:
+        flag_rows(rules, work, W)
     special = 0.0
     for i in range(W):
         special = count_up(special, work[at.SPECIAL * W + i])
@@ -258,6 +336,8 @@ def commit_coordinate(work, stages, k, i, W):
 def commit(effects, work, stages, n, W):
     """Make the tried step the new state on the lanes that accepted it. Returns how many reached a revolution's end."""
     commit_measures(effects, work, W)
+    if effects.rules.curves > 0:
+        commit_rows(effects.rules, work, W)
     latched = 1.0 * effects.rules.latched
     for joint in range(effects.rules.begin, effects.rules.end):
         p = place(joint)
@@ -301,6 +381,9 @@ def leave_rates(effects, work, lane, W, bank, stride, column):
     if effects.rules.responses:
         leave_rate(work, at.DRIVE_MOMENT, lane, W, bank, stride, column)
         leave_rate(work, at.FOLLOWED_SQUARE, lane, W, bank, stride, column)
+    for curve in range(effects.rules.curves):
+        leave_rate(work, at.PLACES + curve, lane, W, bank, stride, column)
+        leave_rate(work, at.PLACE_RATES + curve, lane, W, bank, stride, column)
     if effects.rules.profile:
         for rate in range(at.RATES):
             leave_rate(work, rate, lane, W, bank, stride, column)

@@ -92,7 +92,8 @@ class Lanes:
         sliding = None if self._memory is None else 1
         effects = problem.effects._replace(sliding=sliding)
         self._observed = None if observed is None else observed._replace(sliding=sliding)
-        self._rules = at.rules_of(effects._replace(impacts=(observed or effects).impacts))
+        measured = effects._replace(impacts=(observed or effects).impacts)
+        self._rules = at.rules_of(measured, len(problem.curves))
         measures = at.measures_of(observed or problem.effects)
         self._method = at.Method(
             problem.settings().rows,

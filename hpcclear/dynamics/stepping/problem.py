@@ -1,13 +1,17 @@
 """What is common to the samples of a run, as numbers: linkage, effects, method, tolerances, tables."""
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
+from hpcclear.base.pieces import Pieces, breaks
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.layout.settings import STRICT
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Settings, Start
 from hpcclear.dynamics.linkage.linkage import Linkage
@@ -22,6 +26,9 @@ TORN = 0.25
 THROWN_BACK = 0.0873
 """How far (5 degrees) from its start a body that a torque drives may turn back, rad, in its first revolution from rest:
 the first impacts in its joints throw it."""
+
+FOLLOWED = 0.1
+"""Times the root of the relative tolerance: what part of a table's range may escape a step between two rows that end steps."""
 
 IMPLICIT_USE = {"never": 0, "stiff": 1, "always": 2}
 """When lanes take implicit steps: never, where their motion is stiff, always."""
@@ -56,8 +63,8 @@ class Problem:
     """By how much the angle of the driven body changes in a revolution, rad: negative clockwise, 0 of one that swings."""
     parameter_rows: int = at.OWN
     """Parameters of a sample."""
-    curves: tuple[Array, ...] = ()
-    """Cubic cells of its tables, 4 coefficients each."""
+    curves: tuple[Pieces, ...] = ()
+    """Its tables."""
     chosen: tuple[int, ...] = ()
     """Places of the joints whose gaps count for f; none for all."""
     from_rest: bool = False
@@ -114,7 +121,13 @@ class Problem:
         outcome.status[valid & torn] = Status.TORN_THROUGH
         return outcome
 
-    @property
+    @cached_property
     def tables(self) -> Array:
-        """The tabulated curves as the kernel reads them, one behind the other, shape (curves * 4 * CELLS,)."""
-        return np.concatenate([np.zeros(0), *self.curves])
+        """The tabulated curves as the kernel reads them (`layout.curves.packed`)."""
+        return packed(self.curves, self.stops)
+
+    @cached_property
+    def stops(self) -> tuple[Array, ...]:
+        """Where steps end in each curve, shares of its length: at rows around which it bends (`base.pieces.breaks`)."""
+        tolerance = FOLLOWED * math.sqrt(self.rtol)
+        return tuple(breaks(curve, tolerance) for curve in self.curves)

@@ -26,6 +26,7 @@ from hpcclear.dynamics.layout.settings import (
     WIDTH,
     rules_in,
 )
+from hpcclear.dynamics.stepping.rows import next_rows, stop_at_rows
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 from hpcclear.dynamics.stepping.stops import (
     integrate_gap,
@@ -48,12 +49,14 @@ def change_sample(lane, W, n, status, block, queue, settings):
 
 
 @scalar_function
-def end_of_step(rules, lane, W, n, block, settings):
+def end_of_step(rules, lane, W, n, block, settings, tables):
     """What the end of a special lane's step shows: it may be cut. Returns OK or why the lane ends."""
     work = block.work
     status = failure(lane, W, n, work, block.stages, settings)
     if status == OK and work[at.ACCEPT * W + lane] == 1.0:
-        if rules.latched:
+        if rules.curves > 0:  # first: contacts are latched at the ends of steps that stay
+            stop_at_rows(rules, lane, W, work, tables)
+        if rules.latched and work[at.ACCEPT * W + lane] == 1.0:
             stop_at_impacts(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0:
             stop_at_kinks(rules, lane, W, work, settings)
@@ -62,17 +65,19 @@ def end_of_step(rules, lane, W, n, block, settings):
         if work[at.ACCEPT * W + lane] == 1.0:
             for p in range(rules.begin, rules.end):
                 integrate_gap(lane, W, work, p)
+            for c in range(rules.curves):
+                next_rows(lane, W, work, tables, c)
     return status
 
 
 @scalar_function
-def answer(numbers, rules, block, queue, settings):
+def answer(numbers, rules, block, queue, settings, tables):
     """Do what is requested of one lane; by how much the number of running lanes changes is left in `FOUND`."""
     asked, lane, W, n = numbers[ASKED], numbers[LANE], numbers[WIDTH], numbers[COORDINATES]
     ends = True
     status = UNFINISHED
     if asked == END_OF_STEP:
-        status = end_of_step(rules, lane, W, n, block, settings)
+        status = end_of_step(rules, lane, W, n, block, settings, tables)
         ends = status != OK
     elif asked == END_OF_REVOLUTION:
         if rules.turning:
@@ -88,7 +93,9 @@ def answer(numbers, rules, block, queue, settings):
 
 
 @scalar_function
-def special(numbers, work, stages, par, book, settings, queued, starts, out, finished, counters):
+def special(
+    numbers, work, stages, par, book, settings, tables, queued, starts, out, finished, counters
+):
     """`answer` for arrays at addresses."""
     of = carray(numbers, NUMBERS)
     W = of[WIDTH]
@@ -107,11 +114,11 @@ def special(numbers, work, stages, par, book, settings, queued, starts, out, fin
         carray(finished, slots),
         counts,
     )
-    answer(of, rules_in(of), block, queue, entries)
+    answer(of, rules_in(of), block, queue, entries, carray(tables, at.MAX_CURVES))
 
 
 _NUMBERS, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
-SIGNATURE = types.void(_COUNTS, *[_NUMBERS] * 8, *[_COUNTS] * 2)
+SIGNATURE = types.void(_COUNTS, *[_NUMBERS] * 9, *[_COUNTS] * 2)
 
 
 @cache
@@ -121,12 +128,12 @@ def special_code() -> Any:
 
 
 @lane_function
-def ask(address, asked, lane, numbers, block, queue, settings):
+def ask(address, asked, lane, numbers, block, queue, method):
     """Have `special` do one thing for one lane. Returns the change of the number of running lanes."""
     numbers[ASKED] = asked
     numbers[LANE] = lane
     arrays = (
-        numbers, block.work, block.stages, block.par, block.book, settings,
+        numbers, block.work, block.stages, block.par, block.book, method.settings, method.tables,
         queue.par, queue.start, queue.out, queue.finished, queue.counters,
     )  # fmt: skip
     call_at(address, arrays)

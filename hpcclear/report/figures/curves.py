@@ -1,11 +1,13 @@
 """Tables of a scene as they are drawn: loads and torques against the crank angle, motions against time."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.report.figures import labels, style
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
@@ -29,7 +31,11 @@ class Tabulated(NamedTuple):
     """Angle in rad, or time in s, and value in SI."""
     unit: str
     turns: int
-    """Of a revolution; 0 of a motion, whose rows are times."""
+    """Turns after which it repeats; 0 of rows over the time."""
+    over: str
+    """What its rows go by."""
+    acting: Pieces | None = None
+    """The curve that acts; None of a motion."""
 
 
 def tabulated(scene: Scene) -> list[Tabulated]:
@@ -43,14 +49,39 @@ def tabulated(scene: Scene) -> list[Tabulated]:
     if isinstance(scene.mechanism, Planar):
         for table in ("drives", "loads"):
             for row in getattr(scene.mechanism, table):
-                for name, unit in (("size", "N"), ("torque", "N*m"), ("angle", "rad")):
-                    key = f"mechanism.{table}.{row.name}.{name}"
-                    entries.append((key, getattr(row, name, None), unit))
-    return [
-        Tabulated(key, rows, unit, 0 if unit == "rad" else turns)
-        for key, rows, unit in entries
-        if isinstance(rows, tuple)
-    ]
+                entries += [
+                    (f"mechanism.{table}.{row.name}.{name}", getattr(row, name, None), unit)
+                    for name, unit in _ENTRIES.items()
+                ]
+    rows_of = {row.name: row for row in getattr(scene.mechanism, "loads", ())}
+    found = []
+    for key, rows, unit in entries:
+        if isinstance(rows, tuple):
+            load = rows_of.get(key.split(".")[2]) if key.startswith("mechanism.loads.") else None
+            found.append(_tabulated(scene, key, rows, unit, turns, load))
+    return found
+
+
+_ENTRIES = {
+    "size": "N", "torque": "N*m", "angle": "rad", "speed_by_time": "rad/s", "size_by_time": "N", "torque_by_time": "N*m",
+}  # fmt: skip
+
+
+def _tabulated(scene: Scene, key: str, rows: Rows, unit: str, turns: int, load: Any) -> Tabulated:
+    interpolation = scene.numerics.interpolation
+    if unit == "rad":
+        return Tabulated(key, rows, unit, 0, "time")
+    if key.endswith("_by_time"):
+        repeats = getattr(load, "repeats", False)
+        how = "smooth" if unit == "rad/s" else interpolation
+        curve = periodic(rows, rows[-1][0], how) if repeats else level(rows, how)
+        return Tabulated(key, rows, unit, 0, "time", curve)
+    body = getattr(load, "angle_of", None)
+    turns = turns if body is None else 1
+    over = "crank angle" if body is None else f"angle of {body}"
+    return Tabulated(
+        key, rows, unit, turns, over, periodic(rows, 2.0 * np.pi * turns, interpolation)
+    )
 
 
 @style.drawn
@@ -73,24 +104,33 @@ def draw(figure: "Figure", curves: list[Tabulated], top: float, height: float) -
         axes = figure.add_axes((0.17, bottom + 0.42 * height, 0.79, 0.42 * height))
         places, values = np.array(curve.rows).T
         shown = labels.scale(curve.unit, values)
+        factor = np.degrees(1.0) if curve.turns else 1.0
         if curve.turns:
-            turn = 2.0 * np.pi * curve.turns
-            places = np.mod(places, turn)
-            order = np.argsort(places, kind="stable")
-            places, values = places[order], values[order]
-            # beyond both ends, so that the seam is seen as the kernel closes it
-            places = np.concatenate([places[-1:] - turn, places, places[:1] + turn])
-            values = np.concatenate([values[-1:], values, values[:1]])
+            places = np.mod(places, 2.0 * np.pi * curve.turns)
             axes.set_xlim(0.0, 360.0 * curve.turns)
             axes.set_xticks(np.arange(0.0, 360.0 * curve.turns + 1.0, 90.0 * curve.turns))
-            places, label = np.degrees(places), "crank angle (°)"
         else:
-            axes.set_xlim(places[0], places[-1])
-            label = "time (s)"
-        mark = "." if len(curve.rows) <= _FEW else ""
-        axes.plot(places, shown.factor * values, marker=mark, ms=3.0, lw=0.9, color=style.CYCLE[2])
+            axes.set_xlim(0.0, places[-1])
+        if curve.acting is not None:
+            lines = _drawn(curve.acting)
+        else:
+            lines = places, values
+        color = style.CYCLE[2]
+        axes.plot(factor * lines[0], shown.factor * lines[1], lw=0.9, color=color)
+        if len(curve.rows) <= _FEW:
+            axes.plot(factor * places, shown.factor * values, ".", ms=3.0, color=color)
+        label = f"{curve.over} ({'°' if curve.turns else 's'})"
         axes.set_xlabel(label, fontsize=style.SMALL, labelpad=1.0)
         axes.tick_params(labelsize=style.SMALL)
         axes.set_title(
             labels.literal(shown.label(curve.key)), fontsize=style.SMALL, pad=2.0, loc="left"
         )
+
+
+def _drawn(curve: Pieces) -> tuple[Array, Array]:
+    """Places and values of a curve over its length, some within each piece however short it is."""
+    ends = np.append(curve.starts, 1.0)
+    share = (ends[:-1, None] + np.diff(ends)[:, None] * np.arange(8) / 8.0).ravel()
+    last = np.nextafter(1.0, 0.0)
+    places = np.append(share, last) * curve.length
+    return places, curve.at(places)

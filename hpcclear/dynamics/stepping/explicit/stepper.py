@@ -24,38 +24,38 @@ from hpcclear.dynamics.stepping.special import END_OF_REVOLUTION, END_OF_STEP, N
 
 
 @lane_function
-def load_lanes(special, numbers, block, queue, settings, W):
+def load_lanes(special, numbers, block, queue, method, W):
     """Give samples to lanes that rest. Returns how many run."""
     running = 0.0
     for i in range(W):
         if block.work[at.RUNNING * W + i] == 0.0:
-            ask(special, NEXT_SAMPLE, i, numbers, block, queue, settings)
+            ask(special, NEXT_SAMPLE, i, numbers, block, queue, method)
         running += block.work[at.RUNNING * W + i]
     return running
 
 
 @lane_function
-def judge_steps(special, rules, n, numbers, block, queue, settings, W):
+def judge_steps(special, rules, n, numbers, block, queue, method, W):
     """Accept, cut or reject every lane's step. Returns the change of the number of running lanes."""
-    work = block.work
+    work, settings = block.work, method.settings
     change = 0.0
     judge_step(work, settings, W)
     if flag_gaps(rules, work, block.par, n - 1, settings[GAP_TOLERANCE], W) > 0.0:
         for i in range(W):
             if work[at.SPECIAL * W + i] == 1.0:
-                change += ask(special, END_OF_STEP, i, numbers, block, queue, settings)
+                change += ask(special, END_OF_STEP, i, numbers, block, queue, method)
     return change
 
 
 @lane_function
-def end_revolutions(special, numbers, block, queue, settings, W):
+def end_revolutions(special, numbers, block, queue, method, W):
     """Close the revolutions that ended. Returns the change of the number of running lanes."""
     work = block.work
     change = 0.0
     for i in range(W):
         ends = work[at.ACCEPT * W + i] * work[at.ENDING * W + i] * work[at.RUNNING * W + i]
         if ends == 1.0:
-            change += ask(special, END_OF_REVOLUTION, i, numbers, block, queue, settings)
+            change += ask(special, END_OF_REVOLUTION, i, numbers, block, queue, method)
     return change
 
 
@@ -75,23 +75,23 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
         narrow_vectors()
     block, queue, method = borrowed_all(block, queue, method, W)
     settings, numbers, work = method.settings, method.numbers, block.work
-    running = load_lanes(codes.special, numbers, block, queue, settings, W)
+    running = load_lanes(codes.special, numbers, block, queue, method, W)
     while budget > 0 and running > 0.0:
         budget -= 1
-        choose_step(work, block.par, rules.free, W)
+        choose_step(rules, work, block.par, W)
         stiff = settle_methods(memory, settings, work, W)
         if stiff < running:
             ask_explicit(codes.explicit, block, method)
         if stiff > 0.0:
             ask_implicit(codes.implicit, numbers, block, method, memory)
-        running += judge_steps(codes.special, rules, n, numbers, block, queue, settings, W)
+        running += judge_steps(codes.special, rules, n, numbers, block, queue, method, W)
         if rules.profile:
             run_motion(numbers[PROFILE], work, method.tables)
         peaks_inside(rules, work, block.par, W)
         ended = commit(at.Stepped(rules, method.measures), work, block.stages, n, W)
         full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
         if ended > 0.0:
-            running += end_revolutions(codes.special, numbers, block, queue, settings, W)
+            running += end_revolutions(codes.special, numbers, block, queue, method, W)
         if full:
             break
     return running > 0.0

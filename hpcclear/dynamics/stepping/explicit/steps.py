@@ -56,6 +56,9 @@ def adopt_fresh(effects, work, stages, n, W):
                 stages[k * W + i] = work[(at.ACC + k) * W + i]
             for r in range(at.PROFILES if effects.rules.profile else at.ANGLES):
                 work[(at.RATE_OLD + r) * W + i] = work[(at.RATE_NOW + r) * W + i]
+            for c in range(effects.rules.curves):
+                for r in (at.PLACES + c, at.PLACE_RATES + c):
+                    work[(at.RATE_OLD + r) * W + i] = work[(at.RATE_NOW + r) * W + i]
             work[at.FRESH * W + i] = 0.0
             work[at.EVALUATIONS * W + i] += 1.0
 
@@ -158,7 +161,7 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
         of[WIDTH] & 127,
     )
     effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
-    curves, senses = carray(tables, at.TABLES), entries[SENSES]
+    curves, senses = carray(tables, at.MAX_CURVES), entries[SENSES]
     observing, motion = of[OBSERVING], of[MOTION]
     take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
 

@@ -209,6 +209,7 @@ def cut_at_kinks(effects, moved, W, work, m):
                 m[mem.STEP + i] = h
                 work[at.STEP * W + lane] = h
                 work[at.ENDING * W + lane] = 0.0
+                work[at.RESUMED * W + lane] = 0.0
                 m[mem.CONTINUES + i] = 0.0
                 work[at.EVALUATIONS * W + lane] += 3.0
                 flag(m, mem.ASKED, i, True)
@@ -343,7 +344,7 @@ def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
     of, effects, block = unpacked(numbers, work, stages, par, measures)
     W = of[WIDTH]
     moved = Moved(
-        of[OBSERVING_EIGHT], of[MOTION_OF_EIGHT], of[COORDINATES], carray(tables, at.TABLES)
+        of[OBSERVING_EIGHT], of[MOTION_OF_EIGHT], of[COORDINATES], carray(tables, at.MAX_CURVES)
     )
     eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, mem.MEMORY))
     settle_columns(block.work, W, eights)

@@ -209,6 +209,7 @@ def propose(lane, W, work, m, i, iterations):
             proposal = min(proposal, h)
         if work[at.ENDING * W + lane] == 1.0:
             proposal = max(proposal, work[at.NEXT_STEP * W + lane])
+        proposal = max(proposal, work[at.RESUMED * W + lane])
         if m[mem.RATE + i] <= CHEAP_CONTRACTION and h <= proposal <= KEPT_TO * h:
             proposal = h
         calm = h * m[mem.NORM + i] < CALM_STIFFNESS and proposal < 2.0 * h

@@ -1,0 +1,282 @@
+"""Short pulses in tables: the work of a load is the virtual work of the curve that is drawn, whatever the table goes by.
+
+An engine without clearance: its speed follows from the load, its piston's place is known in closed form.
+"""
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from hpcclear import load_scene, simulate
+from hpcclear.base.pieces import breaks, level, mean_of, periodic
+from hpcclear.dynamics.layout import curves as packing
+from hpcclear.dynamics.planar.curves import angle_pieces
+
+TURN = 2 * np.pi
+CRANK, ROD, INERTIA = 0.04, 0.145, 0.5
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+def engine(load, motor=None, **numerics):
+    """Crank, rod and piston without clearance under one load, the crank at 200 degrees and 3000 rpm with a flywheel."""
+    return load_scene(
+        {
+            "format_version": 2,
+            "mechanism": {
+                "kind": "planar",
+                "bodies": {
+                    "crank": {"length": CRANK, "mass": 0.9, "inertia": 6e-4, "mass_center": 0.0, "start_angle": "200 deg"},
+                    "rod": {"length": ROD, "mass": 0.55, "inertia": 1.9e-3, "mass_center": "48 mm"},
+                    "slider": {"mass": 0.35, "points": {"pin": [0, 0]}},
+                },
+                "joints": {
+                    "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+                    "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "rod.a"},
+                    "o3": {"kind": "revolute", "journal": "slider.pin", "bearing": "rod.b"},
+                    "way": {"kind": "slide", "point": "slider.pin", "line": "ground.o"},
+                },
+                "drives": {
+                    "motor": motor
+                    or {
+                        "kind": "torque", "body": "crank", "torque": 0.0, "initial_speed": "3000 rpm",
+                        "flywheel_inertia": INERTIA,
+                    }
+                },
+                "loads": {"gas": load},
+            },
+            "numerics": {"transient_revolutions": 0, "averaged_revolutions": 1, **numerics},
+        }
+    )  # fmt: skip
+
+
+def gas(rows):
+    """A force on the piston against +x, over the crank angle."""
+    return {"kind": "force", "place": "slider.pin", "direction": "180 deg", "size": rows}
+
+
+def lever(angle):
+    """-dx/da of the piston: work of the force over the angle."""
+    rise = CRANK * np.sin(angle)
+    return rise + rise * CRANK * np.cos(angle) / np.sqrt(ROD**2 - rise**2)
+
+
+def integral(rows, first, last, length, arm=np.ones_like, linear=False):
+    """Integral of a table that repeats, times an arm, summed from row to row: no sum of ours."""
+    x, y = np.array(rows, float).T
+    if x[-1] - x[0] > length * (1 - 1e-12):
+        x, y = x[:-1], y[:-1]
+    rounds = np.arange(np.floor(first / length) - 2, np.ceil(last / length) + 3)
+    wide, high = (x + rounds[:, None] * length).ravel(), np.tile(y, len(rounds))
+    curve = (lambda at: np.interp(at, wide, high)) if linear else PchipInterpolator(wide, high)
+    edges = np.union1d(np.linspace(first, last, 60), wide[(wide > first) & (wide < last)])
+    half = 0.5 * np.diff(edges)[:, None]
+    at = edges[:-1, None] + half * (NODES + 1)
+    return float((half * WEIGHTS * curve(at) * arm(at)).sum())
+
+
+def pulse(kind, width, at, size=60_000.0):
+    """Rows (deg, N) of a pulse that begins at an angle: triangle, rectangle, saw of five teeth, or a bell of 101 rows."""
+    top = size / width
+    if kind == "triangle":
+        rows = [(at, 0), (at + width / 2, top), (at + width, 0)]
+    elif kind == "rectangle":
+        edge = 0.01 * width
+        rows = [(at, 0), (at + edge, top / 2), (at + width - edge, top / 2), (at + width, 0)]
+    elif kind == "saw":
+        rows = [(at + width * k / 10, top * (k % 2)) for k in range(11)]
+    else:
+        share = np.linspace(0, 1, 101)
+        rows = [(at + width * s, top * np.sin(np.pi * s) ** 2) for s in share]
+    return [[float(np.radians(a)), float(v)] for a, v in [(0, 0), *rows, (350, 0)]]
+
+
+KINDS = ("triangle", "rectangle", "saw", "bell")
+WIDTHS = (30.0, 10.0, 3.0, 1.0, 0.3)  # deg
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_work_of_a_pulse_is_its_virtual_work(kind):
+    for number, width in enumerate(WIDTHS):
+        at = (5.0, 100.0, 203.0, 307.3, 61.7)[(number + KINDS.index(kind)) % 5]
+        rows = pulse(kind, width, at)
+        for rtol, off in ((1e-6, 1e-2), (1e-10, 1e-6)):
+            found = simulate(engine(gas(rows), rtol=rtol))
+            angle = found["crank_angle"].to_numpy()
+            right = integral(rows, angle[0], angle[-1], TURN, lever)
+            assert abs(right) > 1.0
+            assert float(found["load_work"][-1]) == pytest.approx(right, rel=off), (width, at, rtol)
+
+
+def test_the_peak_of_one_degree_is_felt():
+    """The flywheel's family: 8.963, 4.622, 3.021 and 2.559 J of peaks of 30, 10, 3 and 1 degrees."""
+    for width, right in ((30.0, 8.963), (10.0, 4.622), (3.0, 3.021), (1.0, 2.559)):
+        found = simulate(engine(gas(pulse("triangle", width, 5.0))))
+        assert float(found["load_work"][-1]) == pytest.approx(right, abs=2e-3)
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+def test_a_pulse_over_the_time_gives_a_wheel_its_momentum(interpolation):
+    """Of a wheel the momentum is the area of the pulse, wherever it stands in a table of two seconds or of an hour."""
+    for length, begin, width in ((2.001, 2.0, 1e-3), (2.0, 0.0301, 3e-5), (3600.0, 0.05, 1e-4)):
+        rows = [[0.0, 0.0], [begin, 0.0], [begin + width / 2, -4.0 / width], [begin + width, 0.0]]
+        rows += [[length, 0.0]] if begin + width < length else []
+        text = {"kind": "torque", "body": "wheel", "torque_by_time": rows}
+        scene = wheel(text, interpolation=interpolation, revolutions=3 if begin < 1 else 105)
+        found = simulate(scene)
+        lost = 2.0 / 1e-2  # area over inertia
+        speed = found["crank_speed"].to_numpy()
+        assert speed[-1] - speed[0] == pytest.approx(-lost, rel=1e-5)
+
+
+def wheel(load, interpolation="smooth", revolutions=2):
+    """A wheel that turns freely, fast enough to get over the pulse."""
+    return load_scene(
+        {
+            "format_version": 2,
+            "mechanism": {
+                "kind": "planar",
+                "bodies": {"wheel": {"mass": 1.0, "inertia": 1e-2, "points": {"o": [0.0, 0.0]}}},
+                "joints": {"pin": {"kind": "revolute", "journal": "wheel.o", "bearing": "ground.o"}},
+                "drives": {
+                    "motor": {"kind": "torque", "body": "wheel", "torque": 0.0, "initial_speed": 320.0}
+                },
+                "loads": {"jam": load},
+            },
+            "numerics": {
+                "transient_revolutions": 0, "averaged_revolutions": revolutions, "interpolation": interpolation,
+            },
+            "output": {"instants_per_revolution": 36},
+        }
+    )  # fmt: skip
+
+
+def test_prescribed_motions_feel_them_too():
+    """At a constant speed nothing is integrated in steps; the work is a sum between instants."""
+    motor = {"kind": "constant-speed", "body": "crank", "speed": "3000 rpm"}
+    for kind in KINDS:
+        for width in (3.0, 0.3, 0.03):
+            rows = pulse(kind, width, 100.1)
+            found = simulate(engine(gas(rows), motor))
+            angle = found["crank_angle"].to_numpy()
+            right = integral(rows, angle[0], angle[-1], TURN, lever)
+            assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-6), (kind, width)
+
+
+# ---- curves ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+def test_means_are_those_of_the_curve_that_acts(interpolation):
+    rng = np.random.default_rng(3)
+    for turns in (1, 2):
+        x = np.sort(rng.uniform(-TURN, TURN * (turns - 1), 9))
+        rows = tuple(zip(x, rng.normal(size=9), strict=True))
+        right = integral(rows, 0.0, TURN * turns, TURN * turns, linear=interpolation == "linear")
+        assert mean_of(rows, TURN * turns, interpolation) == pytest.approx(
+            right / TURN / turns, abs=1e-12
+        )
+
+
+def looked_up(table, curve, share):
+    """What the kernel reads, in plain Python."""
+    head = table[packing.HEAD * curve :][: packing.HEAD].astype(int)
+    k = int(
+        table[head[packing.GRID] + min(int(share * (head[packing.LAST] + 1)), head[packing.LAST])]
+    )
+    step = 1 << head[packing.HALVINGS]
+    while step > 1:
+        step >>= 1
+        further = min(k + step, head[packing.LAST_PIECE])
+        k = further if table[head[packing.STARTS] + further] <= share else k
+    c0, c1, c2, c3 = table[head[packing.CUBICS] + 4 * k :][:4]
+    s = share - table[head[packing.STARTS] + k]
+    return c0 + s * (c1 + s * (c2 + s * c3))
+
+
+def test_any_table_is_found_by_the_kernel_s_search():
+    """Even rows, random ones, ones that double their distance, ones in a thousandth of the length."""
+    rng = np.random.default_rng(5)
+    places = [
+        np.linspace(0.0, 1.0, 721),
+        np.sort(rng.uniform(0.0, 1.0, 40)),
+        2.0 ** -np.arange(40.0, -1.0, -1.0),
+        np.concatenate([[0.0], 0.4 + 1e-3 * np.sort(rng.uniform(0, 1, 50)), [0.9]]),
+    ]
+    rows = [tuple(zip(x, np.append(rng.normal(size=len(x) - 1), 0.0), strict=True)) for x in places]
+    rows = [((r[0][0], 0.0), *r[1:]) for r in rows]
+    curves = [periodic(one, 1.0) for one in rows] + [level(one) for one in rows]
+    table = packing.packed(curves, [breaks(curve, 1e-4) for curve in curves])
+    for number, curve in enumerate(curves):
+        near = np.concatenate([curve.starts, curve.starts + 1e-9, rng.uniform(0, 1, 200)])
+        for share in near[near < 1.0]:
+            expected = float(curve.at(share * curve.length))
+            assert looked_up(table, number, share) == pytest.approx(expected, abs=1e-6), number
+
+
+def test_steps_end_where_no_cubic_follows():
+    """At each row of a pulse, at few of a smooth curve however many rows it has, at none of a constant."""
+    degrees = np.array([0.0, 5.0, 5.5, 6.0, 350.0])
+    rows = tuple(zip(np.radians(degrees), (0.0, 0.0, 6e4, 0.0, 0.0), strict=True))
+    ends = np.degrees(breaks(periodic(rows, TURN), 1e-4) * TURN)
+    assert {5.0, 5.5, 6.0} <= set(np.round(ends, 9))
+    counts = []
+    for n in (360, 7200):
+        x = np.linspace(0.0, TURN, n, endpoint=False)
+        counts.append(
+            len(breaks(periodic(tuple(zip(x, np.exp(np.cos(x)), strict=True)), TURN), 1e-4))
+        )
+    assert max(counts) < 30
+    assert len(breaks(periodic(((0.0, 2.0), (1.0, 2.0)), TURN), 1e-4)) == 0
+    cam = tuple((float(t), float(np.sin(TURN * t))) for t in np.linspace(0, 1, 73))
+    assert len(breaks(angle_pieces(cam)[2], 1e-4)) < 60
+
+
+# ---- other variables and other steppers --------------------------------------------------------------
+
+
+def test_of_two_turns_a_pulse_stands_in_one():
+    """A table of 720 degrees whose pulse is in the second turn."""
+    motor = {
+        "kind": "torque", "body": "crank", "torque": 0.0, "initial_speed": "3000 rpm", "flywheel_inertia": INERTIA,
+        "turns": 2,
+    }  # fmt: skip
+    for width in WIDTHS[2:]:
+        rows = pulse("triangle", width, 5.0)
+        rows = [[0.0, 0.0], *([a + TURN, v] for a, v in rows[1:])]
+        found = simulate(engine(gas(rows), motor))
+        angle = found["crank_angle"].to_numpy()
+        assert angle[-1] - angle[0] == pytest.approx(2 * TURN)
+        right = integral(rows, angle[0], angle[-1], 2 * TURN, lever)
+        assert abs(right) > 1.0
+        assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-2)
+
+
+def test_a_pulse_over_another_body_s_angle():
+    """The rod's angle is -asin(CRANK sin(a)/ROD): it passes the pulse on its way up and on its way down."""
+    for width in WIDTHS[1:]:
+        rows = [
+            [float(np.radians(a)), v]
+            for a, v in ((0, 0), (2, 0), (2 + width / 2, 900.0 / width), (2 + width, 0))
+        ]
+        load = {"kind": "torque", "body": "rod", "angle_of": "rod", "torque": rows}
+        found = simulate(engine(load, rtol=1e-8))
+        rod = found["body_angle"].sel(body="rod").to_numpy()
+        right = np.array([integral(rows, rod[0], one, TURN) for one in rod[::40]])
+        work = found["load_work"].to_numpy()[::40]
+        largest = np.abs(right).max()
+        assert largest > 1.0
+        np.testing.assert_allclose(work, right, rtol=0, atol=1e-4 * largest)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "numerics", [{"formulation": "baumgarte"}, {"method": "radau"}], ids=["baumgarte", "radau"]
+)
+def test_other_steppers_feel_them_too(numerics):
+    for kind in KINDS:
+        for width in (10.0, 1.0):
+            rows = pulse(kind, width, 5.0)
+            found = simulate(engine(gas(rows), **numerics))
+            angle = found["crank_angle"].to_numpy()
+            right = integral(rows, angle[0], angle[-1], TURN, lever)
+            assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-2), (kind, width)
