@@ -13,6 +13,7 @@ import tomli_w
 import xarray as xr
 from commands import kill_once_it_saved, overrides, run
 from margins import at_least, fewest
+from scipy.interpolate import PchipInterpolator
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
@@ -48,7 +49,7 @@ from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
 from hpcclear.scene.record import record_of
-from hpcclear.scene.switches import Off, mean_of, switches
+from hpcclear.scene.switches import Off, switches
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
 from hpcclear.study.extent import certificate_extent, certificate_samples, samples_of
@@ -392,15 +393,43 @@ def test_tables_of_a_linkage_and_of_a_torque_are_tried_as_their_means():
     gas = next(one for one in switches(scene) if one.name == "variation of gas")
     (load,) = (one for one in Off(scene, [gas]).scene.mechanism.loads if one.name == "gas")
     (table,) = (one.size for one in scene.mechanism.loads if one.name == "gas")
-    assert load.size == pytest.approx(mean_of(table, 2))
+    assert load.size == pytest.approx(mean_that_acts(table, 2, "smooth"))
     free = load_scene(
         SCENE, [f'drive={{kind="torque", torque={STROKE}, initial_speed="3000 rpm"}}']
     )
     torque = next(one for one in switches(free) if one.name == "variation of torque")
     assert Off(free, [torque]).scene.drive.torque == pytest.approx(3.0)
-    assert mean_of(((0.0, 6.0), (2.0 * math.pi, 0.0)), 2) == pytest.approx(
-        3.0
-    )  # and back in the second turn
+
+
+def mean_that_acts(table, turns: int, interpolation: str) -> float:
+    """By scipy's monotone cubic, or straight lines, through three periods of a table."""
+    angle, value = np.array(table).T
+    period = 2.0 * math.pi * turns
+    if angle[-1] - angle[0] > 0.999999 * period:  # the first row again
+        angle, value = angle[:-1], value[:-1]
+    wide, values = np.concatenate([angle - period, angle, angle + period]), np.tile(value, 3)
+    if interpolation == "smooth":
+        return float(PchipInterpolator(wide, values).integrate(0.0, period)) / period
+    places = np.sort(np.concatenate([wide[(wide > 0.0) & (wide < period)], [0.0, period]]))
+    return float(np.trapezoid(np.interp(places, wide, values), places)) / period
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_load_without_its_variation_is_the_mean_of_the_curve_that_acts(seed, interpolation):
+    """Between few uneven rows the mean of the cubic is far from that of straight lines."""
+    rng = np.random.default_rng(seed)
+    for turns in (1, 2):
+        angles = np.sort(rng.uniform(0.0, 2.0 * math.pi * turns, 3 + seed))
+        table = np.column_stack([angles, rng.uniform(-900.0, 900.0, len(angles))]).tolist()
+        content = load_scene(JOBS / "linkages" / "four_stroke.toml").resolved()
+        content["mechanism"]["drives"]["motor"]["turns"] = turns
+        content["mechanism"]["loads"]["gas"]["size"] = table
+        content["numerics"]["interpolation"] = interpolation
+        scene = load_scene({key: value for key, value in content.items() if key != "study"})
+        gas = next(one for one in switches(scene) if one.name == "variation of gas")
+        (load,) = (one for one in Off(scene, [gas]).scene.mechanism.loads if one.name == "gas")
+        assert load.size == pytest.approx(mean_that_acts(table, turns, interpolation), rel=1e-9)
 
 
 def test_an_evaluation_in_implicit_steps_weighs_more():
