@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from mpi_programs import last_bits
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # tests share the cores with other processes
@@ -18,6 +19,10 @@ def pytest_addoption(parser):
         default=0,
         help="only statistical tests, with so many other seeds",
     )
+
+
+def pytest_configure():
+    last_bits.disturb()  # if this run has a seed
 
 
 @pytest.fixture(scope="module")

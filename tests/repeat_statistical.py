@@ -3,6 +3,7 @@
     python tests/repeat_statistical.py                              all, 50 other seeds each
     python tests/repeat_statistical.py --seeds 10 tests/test_mopso.py
     python tests/repeat_statistical.py -m "not full"                other words go to pytest
+    python tests/repeat_statistical.py --last-bits 5                five seeds for the last bits of f, see last_bits.py
 
 A test is statistical if it asks for the fixture `shift`. The table, tests/statistical.md, keeps the rows of tests that
 are not run this time, and names the tests that have never been run.
@@ -10,13 +11,16 @@ are not run this time, and names the tests that have never been run.
 
 import argparse
 import json
+import os
 import re
+import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi_programs import last_bits
 
 TABLE = Path(__file__).with_name("statistical.md")
 ROW = re.compile(r"^\| `(\S.*)` \| (.+) \|$", re.MULTILINE)
@@ -69,19 +73,55 @@ class Collector:
         return " | ".join([str(len(runs)), str(self.red[name]), *cells])
 
 
+def asking(*fixtures: str) -> list[str]:
+    """Test files that ask for one of some fixtures."""
+    pattern = re.compile(rf"\b({'|'.join(fixtures)})\b")
+    places = sorted(TABLE.parent.glob("test_*.py"))
+    return [str(path) for path in places if pattern.search(path.read_text(encoding="utf-8"))]
+
+
+def with_last_bits(seeds: int, words: list[str]) -> int:
+    """Run tests of studies and of statistics with disturbed last bits of f; print how often each was red."""
+    red: dict[str, int] = defaultdict(int)
+    for seed in range(1, seeds + 1):
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-rfE",
+            "--tb=no",
+            "--timeout",
+            "0",
+            *words,
+        ]
+        done = subprocess.run(
+            command,
+            env=os.environ | {last_bits.NAME: str(seed)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        print(f"seed {seed}: {done.stdout.strip().splitlines()[-1]}", flush=True)
+        for name in re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE):
+            red[name] += 1
+    for name, count in sorted(red.items()):
+        print(f"{name}: red with {count} of {seeds} seeds")
+    return int(bool(red))
+
+
 def main() -> int:
     """Run, renew the table, and say whether more than one in a thousand was red."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("--seeds", type=int, default=50)
+    parser.add_argument("--last-bits", type=int, default=0)
     known, words = parser.parse_known_args()
-    folder = TABLE.parent
     if not any(word.startswith("tests/") for word in words):
-        asking = [
-            p for p in sorted(folder.glob("test_*.py")) if re.search(r"\bshift\b", p.read_text())
-        ]
-        words += [str(path) for path in asking]
+        words += asking("shift", *(["carried_out"] if known.last_bits else []))
+    if known.last_bits:
+        return with_last_bits(known.last_bits, words)
     collector = Collector()
     pytest.main(
         ["-q", "--timeout", "0", "--other-seeds", str(known.seeds), *words], plugins=[collector]

@@ -13,6 +13,7 @@ import tomli_w
 import xarray as xr
 from commands import kill_once_it_saved, overrides, run
 from margins import at_least, fewest
+from scipy.interpolate import PchipInterpolator
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
@@ -28,10 +29,19 @@ from hpcclear.ensemble.certificate import (
     certificate,
     interaction,
 )
-from hpcclear.ensemble.trial import IMPLICIT, Drawn, Trial
+from hpcclear.ensemble.trial import IMPLICIT, ROUNDS, Drawn, Trial
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import effects_figure
-from hpcclear.report.figures.effects import saving, seconds_of, statement, statements
+from hpcclear.report.figures.effects import (
+    Saving,
+    caption,
+    label,
+    named,
+    saving,
+    seconds_of,
+    statement,
+    statements,
+)
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
@@ -39,7 +49,7 @@ from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
 from hpcclear.scene.record import record_of
-from hpcclear.scene.switches import Off, mean_of, switches
+from hpcclear.scene.switches import Off, switches
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
 from hpcclear.study.extent import certificate_extent, certificate_samples, samples_of
@@ -383,15 +393,43 @@ def test_tables_of_a_linkage_and_of_a_torque_are_tried_as_their_means():
     gas = next(one for one in switches(scene) if one.name == "variation of gas")
     (load,) = (one for one in Off(scene, [gas]).scene.mechanism.loads if one.name == "gas")
     (table,) = (one.size for one in scene.mechanism.loads if one.name == "gas")
-    assert load.size == pytest.approx(mean_of(table, 2))
+    assert load.size == pytest.approx(mean_that_acts(table, 2, "smooth"))
     free = load_scene(
         SCENE, [f'drive={{kind="torque", torque={STROKE}, initial_speed="3000 rpm"}}']
     )
     torque = next(one for one in switches(free) if one.name == "variation of torque")
     assert Off(free, [torque]).scene.drive.torque == pytest.approx(3.0)
-    assert mean_of(((0.0, 6.0), (2.0 * math.pi, 0.0)), 2) == pytest.approx(
-        3.0
-    )  # and back in the second turn
+
+
+def mean_that_acts(table, turns: int, interpolation: str) -> float:
+    """By scipy's monotone cubic, or straight lines, through three periods of a table."""
+    angle, value = np.array(table).T
+    period = 2.0 * math.pi * turns
+    if angle[-1] - angle[0] > 0.999999 * period:  # the first row again
+        angle, value = angle[:-1], value[:-1]
+    wide, values = np.concatenate([angle - period, angle, angle + period]), np.tile(value, 3)
+    if interpolation == "smooth":
+        return float(PchipInterpolator(wide, values).integrate(0.0, period)) / period
+    places = np.sort(np.concatenate([wide[(wide > 0.0) & (wide < period)], [0.0, period]]))
+    return float(np.trapezoid(np.interp(places, wide, values), places)) / period
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_load_without_its_variation_is_the_mean_of_the_curve_that_acts(seed, interpolation):
+    """Between few uneven rows the mean of the cubic is far from that of straight lines."""
+    rng = np.random.default_rng(seed)
+    for turns in (1, 2):
+        angles = np.sort(rng.uniform(0.0, 2.0 * math.pi * turns, 3 + seed))
+        table = np.column_stack([angles, rng.uniform(-900.0, 900.0, len(angles))]).tolist()
+        content = load_scene(JOBS / "linkages" / "four_stroke.toml").resolved()
+        content["mechanism"]["drives"]["motor"]["turns"] = turns
+        content["mechanism"]["loads"]["gas"]["size"] = table
+        content["numerics"]["interpolation"] = interpolation
+        scene = load_scene({key: value for key, value in content.items() if key != "study"})
+        gas = next(one for one in switches(scene) if one.name == "variation of gas")
+        (load,) = (one for one in Off(scene, [gas]).scene.mechanism.loads if one.name == "gas")
+        assert load.size == pytest.approx(mean_that_acts(table, turns, interpolation), rel=1e-9)
 
 
 def test_an_evaluation_in_implicit_steps_weighs_more():
@@ -661,11 +699,49 @@ def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
     timing = dataset.read(place / "e.timing.nc", "timing")
     seconds = seconds_of(timing)
     assert set(seconds) >= {"all on", "gravity", "friction in joints + gravity + slider load"}
-    assert all(0.0 < value < 10.0 for value in seconds.values())
+    assert {len(times) for times in seconds.values()} <= set(range(ROUNDS[0], ROUNDS[1] + 1))
+    assert all(0.0 < value < 10.0 for times in seconds.values() for value in times)
+    medians = {name: float(np.median(times)) for name, times in seconds.items()}
+    assert json.loads(timing.attrs[SECONDS_PER_SAMPLE]) == medians
     content = dataset.read(place / "e.nc", "effects")
     assert "seconds" not in " ".join([*content.variables, *content.attrs])
-    assert saving(content, 1, {}) == pytest.approx(1.0 - float(content["work"][1]))
-    assert saving(content, 1, {"all on": 4.0, "clearance in crank_rod": 1.0}) == 0.75
+    estimate = saving(content, 1, {})
+    assert estimate.share == pytest.approx(1.0 - float(content["work"][1]))
+    assert (np.isnan(estimate.half), estimate.rounds) == (True, 0)
+    assert "by evaluations" in estimate.words
+
+
+def test_savings_have_intervals_and_these_hold(certified, shift):
+    """A machine that slows down and speeds up changes all times of a round alike; what is left scatters by 5 %."""
+    content = dataset.read(certified[0] / "e.nc", "effects")
+    name = label(named(content, 1))
+    rng, held = np.random.default_rng([11, shift]), 0
+    for _ in range(200):
+        speed = 10.0 ** rng.uniform(-1.0, 1.0, 5)
+        scatter = 1.0 + 0.05 * rng.standard_normal((2, 5))
+        times = {"all on": speed * scatter[0], name: 0.6 * speed * scatter[1]}
+        found = saving(content, 1, times)
+        held += abs(found.share - 0.4) <= found.half
+    assert held >= fewest(200, 0.93)
+    drift = saving(content, 1, {"all on": [1.0, 3.0, 9.0], name: [0.6, 1.8, 5.4]})
+    assert drift[:2] == pytest.approx((0.4, 0.0), abs=1e-12)
+    old = xr.Dataset(attrs={SECONDS_PER_SAMPLE: json.dumps({"all on": 4.0, name: 1.0})})
+    assert saving(content, 1, seconds_of(old)).words == "about 75 %"
+
+
+@pytest.mark.parametrize(
+    ("share", "half", "words", "faster"),
+    [
+        (0.571, 0.021, "57.1 % ± 2.1 %", "2.2 to 2.5"),
+        (0.03, 0.05, "none significant (3.0 % ± 5.0 %)", "0.98 to 1.1"),
+        (-0.03, 0.05, "none significant (-3.0 % ± 5.0 %)", "0.93 to 1"),
+        (-1.5, 0.2, "none, it takes 150 % ± 20 % longer", "0.37 to 0.43"),
+        (0.5, float("nan"), "about 50 %, by evaluations", "2"),
+    ],
+)
+def test_savings_are_printed_with_their_intervals(share, half, words, faster):
+    found = Saving(share, half, 0 if np.isnan(half) else 5)
+    assert (found.words, found.speed_up) == (words, faster)
 
 
 def test_what_cannot_be_told_says_what_would_tell(certified):
@@ -696,7 +772,8 @@ def test_figure_and_page(certified):
     assert effects_figure(content) is not None
     page = write_report(place).read_text(encoding="utf-8")
     assert "Without clearance in crank_rod f changes by" in page
-    assert "the run time saved" in page
+    assert "paired measurements with its 95 % confidence interval" in page
+    assert "run time saved, estimated from evaluations" in caption(content, None)
     page_numbers.check(place)
 
 
@@ -755,7 +832,7 @@ def test_a_linkage_is_certified(tmp_path):
 def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
     """On a mechanism that is a formula, which no effect changes but the clearance that it reads."""
     formula.replace_dynamics(monkeypatch.setattr)
-    monkeypatch.setattr(Trial, "seconds", lambda trial, variants: {"all on": 2.0})
+    monkeypatch.setattr(Trial, "seconds", lambda trial, variants: {"all on": [2.0, 3.0, 7.0]})
     settings = [
         "study.certificate={tolerance=0.05, samples=128}",
         'numerics.objective_joints=["crank_rod"]',
@@ -772,7 +849,7 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
         return run, (tmp_path / "effects.nc").read_bytes()
 
     first, written = once()
-    assert json.loads(first.times[SECONDS_PER_SAMPLE]) == {"all on": 2.0}
+    assert json.loads(first.times[SECONDS_PER_SAMPLE]) == {"all on": 3.0}
     content = dataset.read(tmp_path / "effects.nc", "effects")
     chosen = content.isel(variant=int(np.argmax(content["recommended"].to_numpy())))
     assert int(chosen["off"].sum()) == 2  # the other play, and contact damping

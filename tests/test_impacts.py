@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import overrides, run
+from margins import at_most, bootstrap
 from running import HUNT_CROSSLEY, LATCHED, SCENE, scene_with
 from scipy import signal
 from scipy.integrate import simpson
@@ -165,18 +166,30 @@ def test_levels_of_a_motion_that_does_not_repeat_are_those_of_welch():
     assert inside >= 12
 
 
-def test_levels_do_not_depend_on_the_instants_that_are_stored():
-    """A chaotic compressor with short impacts: what they have beyond half the rate of the stored instants is not folded."""
+def test_levels_do_not_depend_on_the_instants_that_are_stored(shift):
+    """A chaotic compressor with short impacts: next to nothing of what they have beyond half the rate is folded.
+
+    What is, falls on bands by chance: half of the loud ones differ by less than 0.02 dB (0.05 dB with half of the
+    `OVERSAMPLING`, 2 to 6 dB without), a few by 0.25 dB.
+    """
     scene = load_scene(COMPRESSOR).with_({"numerics.averaged_revolutions": 3})
-    few, many = (
-        simulate(scene.with_({"output.instants_per_revolution": one})) for one in (360, 1440)
-    )
-    bands = few["band"].to_numpy()
-    for name in ("frame_force_level", "contact_force_level"):
-        one, other = few[name], many[name].sel(band=bands, method="nearest")
-        loud = one > one.max("band") - 40.0
-        assert abs(one - other).where(loud).max() < 0.1
-        assert loud.sum() > 12
+    clearance = scene.number("joints.crank_rod.clearance")
+    found = {"frame_force_level": [], "contact_force_level": []}
+    for k in range(3):  # motions that part
+        other = {"joints.crank_rod.clearance": clearance * (1.0 + 1e-4 * (k + shift))}
+        few, many = (
+            simulate(
+                scene.with_({**other, "output.instants_per_revolution": instants}), checked=False
+            )
+            for instants in (360, 1440)
+        )
+        for name, differences in found.items():
+            one, same = few[name], many[name].sel(band=few["band"].to_numpy(), method="nearest")
+            loud = (one > one.max("band") - 40.0).to_numpy()
+            assert loud.sum() > 12
+            differences.append(abs(one.to_numpy() - same.to_numpy())[loud])
+    for differences in found.values():
+        at_most(bootstrap(np.median, np.concatenate(differences), side="lower"), 0.02)
 
 
 def test_half_widths_hold_as_often_as_they_say():

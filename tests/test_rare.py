@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from formula_study import contents, formula, on_two_ranks, scene_of
-from margins import fewest
+from margins import at_least, at_most, fewest
 from scipy import stats
 
 from hpcclear.base.errors import InputError
@@ -323,24 +323,38 @@ infill_designs = 6
 """
 
 
-def test_few_simulations_still_show_a_design_at_the_edge(carried_out):
-    """f is rough, so that weighted draws scatter much: of four designs at the edge those that nearly reach it stay open."""
+def share_of_rough(c: np.ndarray, m3: float) -> float:
+    """Exactly, of the rough f of the next test: its waves are so short that their phase is uniform, whatever c is."""
+    phases = 2.0 * np.pi * np.mod(np.arange(len(c)) * 0.6180339887498949, 1.0)
+    return float(np.mean(m3 + 0.02 * np.sin(phases) + 0.004 * (c - 5e-4) / 5e-5 > 0.21))
+
+
+def test_few_simulations_still_show_a_design_at_the_edge(carried_out, shift):
+    """f is rough, so that weighted draws scatter much: designs that nearly reach the edge stay open, one below is shown.
+
+    Which of them stay open, and their m2, which has no influence, are left to chance.
+    """
 
     def rough(column):
         c, m3 = (column[path] for path in ("joints.crank_rod.clearance", "mechanism.slider.mass"))
         return 1e-3 * (m3 + 0.02 * np.sin(1e9 * c) + 0.004 * (c - 5e-4) / 5e-5)
 
-    place = carried_out(scene_of(FEW), objective=rough)
-    found = dataset.read(place / "verification.nc", "verification")
-    texts = [str(text) for text in found["constraints"].to_numpy()]
-    best = found.sel(design="heavy alpha")
-    assert ": kept" in str(best["constraints"].item())
-    open_ = [k for k, text in enumerate(texts) if "cannot be told" in text]
-    assert len(open_) == len(edge.AIMS)
-    # the rod has no influence here: designs of one turn at the edge have the same
-    np.testing.assert_array_equal(found["m2"][open_], best["m2"])
-    kept = [k for k, text in enumerate(texts) if ": kept" in text]
-    assert float(best["m3"]) == found["m3"][kept].max() > 0.98 * found["m3"][open_].max()
+    scene = scene_of(FEW, f"study.seed={3 + shift}")
+    c = scene.required_study.random_input("C").law((np.arange(400_000) + 0.5) / 400_000)
+    found = dataset.read(carried_out(scene, objective=rough) / "verification.nc", "verification")
+    texts = dict(zip(found["design"].to_numpy(), found["constraints"].to_numpy(), strict=True))
+    mass = {name: float(found["m3"].sel(design=name)) for name in texts}
+    share = {name: share_of_rough(c, mass[name]) / 5e-4 for name in texts}
+    assert ": kept" in texts["heavy alpha"]
+    kept = [name for name, text in texts.items() if ": kept" in text]
+    assert mass["heavy alpha"] == max(mass[name] for name in kept)
+    # what is sought is a known part of the allowed probability, and the model may be wrong by a factor of two
+    at_most(share["heavy alpha"], 1.0)
+    at_least(share["heavy alpha"], 0.5 * edge.LAST[0])
+    open_ = [name for name, text in texts.items() if "cannot be told" in text and "cand" in name]
+    assert open_
+    # an interval that holds 1 within a factor of two; at the edge by the model, which may be as wrong
+    assert all(0.25 < share[name] < 4.0 for name in open_)
 
 
 def test_what_simulations_can_show_is_lower_the_more_they_scatter():

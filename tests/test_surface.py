@@ -1,6 +1,7 @@
 """What is public stays: the test compares with the surface of the last release, and generated changes turn it red."""
 
 import copy
+import inspect
 import json
 import os
 import shutil
@@ -12,6 +13,7 @@ import pytest
 import surface
 from patience import crowded
 
+import hpcclear
 from hpcclear import __version__
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -20,6 +22,14 @@ ROOT = Path(__file__).resolve().parent.parent
 def test_nothing_public_has_changed_since_the_last_release():
     """`python tests/surface.py` renews what is compared with, at a release or together with a changelog entry."""
     assert surface.changes(surface.stored(), surface.surface()) == []
+
+
+@pytest.mark.parametrize(("module", "function"), [("identify", "identify"), ("study", "run_study")])
+def test_a_module_that_is_called_has_the_parameters_of_its_function(module, function):
+    """On every Python: those before 3.13 leave out the first one of a static `__call__`."""
+    called = getattr(hpcclear, module)
+    assert inspect.signature(called) == inspect.signature(getattr(called, function))
+    assert next(iter(inspect.signature(called).parameters)) == "scene"
 
 
 SOURCES = {

@@ -1,10 +1,15 @@
 """Settings for an error of f, from what the accuracy command measured."""
 
+import itertools
+
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import report_data as data
+import xarray as xr
 
 from hpcclear.report import targets
+from hpcclear.report.figures import accuracy as figures
 from hpcclear.scene.loading import load_scene
 
 SCENE = load_scene("jobs/slider_crank.toml").to_toml()
@@ -38,7 +43,7 @@ def test_a_bias_is_never_taken_for_less_than_that_of_a_tighter_tolerance(found):
     assert "no measured setting reaches it" in targets.sentences(unknown)[0]
 
 
-def test_the_scenes_own_settings_are_placed_between_the_measured_ones(found):
+def test_the_scenes_own_settings_are_placed_at_the_measured_ones_below(found):
     own = targets.settings(found)
     assert own is not None
     assert "rtol 1e-6" in own.words
@@ -51,4 +56,66 @@ def test_the_scenes_own_settings_are_placed_between_the_measured_ones(found):
     assert loose is not None
     assert loose.error > own.error
     assert loose.error > 0.19  # the bias of that tolerance
+    for beyond in ("1e-02", "1e-12"):
+        other = SCENE.replace("rtol = 1e-06", f"rtol = {beyond}")
+        assert targets.settings(found.assign_attrs(scene=other)) is None, beyond
     assert targets.settings(found.assign_attrs(scene="[effects")) is None
+
+
+def generated(rng) -> xr.Dataset:
+    """Measured numbers of no regular order, and settings of a scene between them."""
+    content = data.accuracy()
+    drawn = {
+        "averaging_error": 1e-5,
+        "tolerance_bias": 1e-6,
+        "tolerance_seconds": 1e-3,
+        "turn_variance": 1e-6,
+    }
+    for name, least in drawn.items():
+        values = least * 10.0 ** rng.uniform(0.0, 4.0, content[name].shape)
+        content[name] = content[name].copy(data=values)
+    rtol = 10.0 ** rng.uniform(*np.log10([content["tolerance"].min(), content["tolerance"].max()]))
+    lines = {
+        "rtol = 1e-06": f"rtol = {rtol!r}",
+        "transient_revolutions = 5": f"transient_revolutions = {rng.integers(0, 40)}",
+        "averaged_revolutions = 5": f"averaged_revolutions = {rng.integers(1, 40)}",
+    }
+    text = SCENE
+    for line, other in lines.items():
+        assert line in text, line
+        text = text.replace(line, other)
+    return content.assign_attrs(scene=text)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_settings_lie_below_what_is_cheapest_and_none_are_placed_without_averaging(seed):
+    """Whatever was measured: a setting as cheap with as small an error is on the line; marks do not cover each other."""
+    content = generated(np.random.default_rng(seed))
+    own, best = targets.settings(content), targets.front(content)
+    assert own is not None
+    assert any(way.seconds <= own.seconds and way.error <= own.error for way in best)
+    first = content.drop_vars(
+        ["averaging_error", "averaging_floor", "turn_seconds", "transient", "averaged"]
+    )
+    assert targets.settings(first) is None
+    assert len(targets.sentences(first)) == len(targets.TARGETS)
+    for found in (content, first):
+        drawn = figures.total_figure(found)
+        names = [text.get_text() for text in drawn.legends[0].get_texts()]
+        assert ("your settings" in names) == (found is content)
+        foot = drawn.get_supxlabel().replace("\n", " ")
+        assert (
+            "follow when averaging is measured" in foot
+            if found is first
+            else "single runs and" in foot
+        )
+        axes = drawn.axes[0]
+        places = [
+            axes.transData.transform(line.get_xydata()[0])
+            for line in axes.lines
+            if line.get_label().startswith("for ")
+        ]
+        size = 6.0 * drawn.dpi / 72.0
+        apart = [np.hypot(*(a - b)) for a, b in itertools.combinations(places, 2)]
+        assert all(distance > size for distance in apart)
+        plt.close(drawn)

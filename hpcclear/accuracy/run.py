@@ -96,13 +96,16 @@ def run_accuracy(
     place = Place.of_directory(directory, options.fresh)
     key = {**run_key(scene, "accuracy"), "profile": profile.name}
     drawn: dict[str, Path] = {}
-    shown: dict[str, xr.DataArray] = {}
+    shown: dict[str, xr.Dataset] = {}
 
     def draw(content: xr.Dataset) -> None:
         """Figures of what is there, and was not when they were drawn."""
         for name, figure in accuracy_figures.FIGURES.items():
-            found = content.get(accuracy_figures.MAIN[name])
-            if found is not None and not (name in shown and found.identical(shown[name])):
+            first, *more = accuracy_figures.MAIN[name]
+            if first not in content:
+                continue
+            found = content[[first, *(one for one in more if one in content)]]
+            if not (name in shown and found.equals(shown[name])):
                 drawn[name] = style.save(figure(content), place.output / f"{name}.png")
                 shown[name] = found
 

@@ -16,12 +16,15 @@ from hpcclear.cli.printing import _load
 from hpcclear.cli.terminal import console, fitting, objective_of, table
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.effects import (
+    Saving,
+    Times,
     named,
     saving,
     seconds_of,
     shown,
     statements,
 )
+from hpcclear.report.figures.labels import paired
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import parse
@@ -67,12 +70,19 @@ def describe(found: "Finished", scene: Scene, file: Path) -> int:
             f"{float(content.attrs['confidence']):.0%} intervals, from averages over the same points",
         ),
         ("samples", f"{int(content['samples'].sum())}, {_failed(content)} failed"),
+        ("time", _rounds(saving(content, 1, seconds).rounds)),
     ]
     out.print(table("Effect screening", rows))
     out.print(table("Run", _load(found)))
     out.print(f"effects  {found.output}")
     out.file.write("\n" + plain(recommendation(content, scene, file, tolerance, seconds)))
     return Exit.DONE
+
+
+def _rounds(count: int) -> str:
+    if count == 0:
+        return "estimated from evaluations of the equations of motion"
+    return f"processor time of a sample, 95 % intervals from {count} paired measurements"
 
 
 def _times(place: Path) -> xr.Dataset | None:
@@ -87,7 +97,7 @@ def _failed(content: xr.Dataset) -> str:
     return str(count) if count else "none"
 
 
-def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> Table:
+def _changes(content: xr.Dataset, seconds: Times, tolerance: str) -> Table:
     """A row a variant: what is off, changes with confidence intervals, time, verdict."""
     what = f"Changes in % with effects disabled, against all enabled; tolerance {tolerance}"
     made = Table(title=what, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
@@ -105,10 +115,23 @@ def _changes(content: xr.Dataset, seconds: dict[str, float], tolerance: str) -> 
             shown(float(one["change"][r]), float(one["limit"][r])).removesuffix(" %") for r in kept
         ]
         verdict = ("yes", "no", "?")[int(one["decision"])]
-        share = saving(content, k, seconds)
-        row = [" + ".join(named(content, k)), *changes, f"{-100 * share:+.0f}", verdict]
+        row = [
+            " + ".join(named(content, k)),
+            *changes,
+            _longer(saving(content, k, seconds)),
+            verdict,
+        ]
         made.add_row(*(fitting(text) for text in row))
     return made
+
+
+def _longer(saved: Saving) -> str:
+    """How much longer a sample takes, in per cent."""
+    share = -100 * saved.share
+    if not np.isfinite(saved.half):
+        return f"{share:+.0f}"
+    text = paired(share, 100 * saved.half)
+    return text if text.startswith("-") else f"+{text}"
 
 
 def _is_reported(content: xr.Dataset, response: int) -> bool:
@@ -116,7 +139,7 @@ def _is_reported(content: xr.Dataset, response: int) -> bool:
 
 
 def recommendation(
-    content: xr.Dataset, scene: Scene, file: Path, tolerance: str, seconds: dict[str, float]
+    content: xr.Dataset, scene: Scene, file: Path, tolerance: str, seconds: Times
 ) -> str:
     """The tables of the scene that change, as TOML to paste, with what they save."""
     chosen = int(np.argmax(content["recommended"].to_numpy()))
@@ -125,11 +148,12 @@ def recommendation(
     reduced = parse(content.attrs["reduced_scene"], "reduced scene")
     whole = scene.resolved()
     changed = {key: value for key, value in reduced.items() if whole.get(key) != value}
-    share = saving(content, chosen, seconds)
+    saved = saving(content, chosen, seconds)
     gone = [key for key in whole if key not in reduced]
     lines = [
         f"# Within {tolerance}, without {', '.join(named(content, chosen))}: "
-        f"saves {100 * share:.0f} %, {1 / max(1 - share, 1e-9):.1f} times faster.",
+        f"run time saved: {saved.words}"
+        + (f", {saved.speed_up} times as fast." if saved.share > 0.0 else "."),
         f"# These tables stand in place of those of {file}"
         + (f"; [{'], ['.join(gone)}] goes." if gone else "."),
     ]

@@ -24,7 +24,7 @@ from hpcclear.ensemble.session import Finished, Options, Place, Session
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
-from hpcclear.results.names import SECONDS_PER_SAMPLE
+from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 
@@ -75,7 +75,7 @@ def run_effects(
             content = _certified(trial, plan, session)
             with ranks.stage("effects: cost"):
                 variants = [tuple(np.flatnonzero(row).tolist()) for row in content["off"].values]
-                times = {SECONDS_PER_SAMPLE: json.dumps(trial.seconds(variants))}
+                times = times_of(trial.seconds(variants))
         session.close(times)
     return session.finished(content, began)
 
@@ -106,6 +106,12 @@ def _certified(trial: Trial, plan: Plan, session: Session) -> xr.Dataset:
 
 RESPONSES = ("mean", "deviation", "peak force")
 """Labels along the dimension ``response``."""
+
+
+def times_of(seconds: Mapping[str, Sequence[float]]) -> dict[str, str]:
+    """Attributes of the file of times, from what `Trial.seconds` measured: medians of the rounds, and all of them."""
+    medians = {name: float(np.median(times)) for name, times in seconds.items()}
+    return {SECONDS_PER_SAMPLE: json.dumps(medians), SECONDS_BY_ROUND: json.dumps(seconds)}
 
 
 def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, str]) -> xr.Dataset:

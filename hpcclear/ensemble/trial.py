@@ -46,6 +46,9 @@ IMPLICIT = 2.5
 """Cost weight of an evaluation in implicit steps, eight samples per batch:
 by processor times 3.6 for a film, 2.1 for bristles, 2.2 in the median of 28 variants of random scenes (0.5 to 8)."""
 
+ROUNDS, LONG_ENOUGH = (4, 8), 2.0
+"""Times that each variant's processor time is measured, at least and at most; and the time after which the least will do, s."""
+
 Simulate = Callable[[Scene, Points], Records]
 
 
@@ -269,20 +272,25 @@ class Trial:
 
         return answered(certificate(plan), answer)
 
-    def seconds(self, variants: Sequence[Variant], rounds: int = 3) -> dict[str, float]:
-        """Processor time of a sample of each, by names, measured here in turn: the least of some rounds, s."""
+    def seconds(self, variants: Sequence[Variant]) -> dict[str, list[float]]:
+        """Processor time of a sample of each, by names, measured here in turn: one after the other in every round, s."""
         replicates = max(2 * DEFAULT_LANES // self.drawn.size, 1)
         points = self.drawn.points(0, 2 ** int(np.log2(replicates)))
-        least = dict.fromkeys(variants, np.inf)
-        for _ in range(rounds):
-            for off in variants:
-                evaluator = evaluator_of(self.simulated(off), self._seen_by(off, points))
+        scenes = {off: (self.simulated(off), self._seen_by(off, points)) for off in variants}
+        for scene, seen in scenes.values():
+            evaluator_of(scene, seen).advance(0.0)  # compiles
+        found: dict[Variant, list[float]] = {off: [] for off in variants}
+        began = time.process_time()
+        for number in range(ROUNDS[1]):
+            for off in list(scenes)[
+                :: 1 - 2 * (number % 2)
+            ]:  # there and back: a steady drift cancels
+                evaluator = evaluator_of(*scenes[off])
                 evaluator.submit(np.arange(len(points)), points.values)
-                began = time.process_time()
+                start = time.process_time()
                 while evaluator.pending:
                     evaluator.advance(0.2)
-                spent = time.process_time() - began
-                least[off] = min(least[off], spent / len(points))
-            if sum(least.values()) * len(points) > 2.0:
-                break  # long enough for noise not to count
-        return {" + ".join(self.names(off)) or ALL_ON: float(value) for off, value in least.items()}
+                found[off].append((time.process_time() - start) / len(points))
+            if number + 1 >= ROUNDS[0] and time.process_time() - began > LONG_ENOUGH:
+                break
+        return {" + ".join(self.names(off)) or ALL_ON: times for off, times in found.items()}

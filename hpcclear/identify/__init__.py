@@ -9,6 +9,7 @@
 """
 
 import sys
+from inspect import signature
 from types import ModuleType
 
 from hpcclear.identify.api import identify
@@ -20,6 +21,8 @@ class _Identify(ModuleType):
     """This package, which can be called: ``hpcclear.identify(scene, unknown, signal)`` stands beside ``hpcclear.map``."""
 
     __call__ = staticmethod(identify)
+    # Python before 3.13 would leave out the first parameter
+    __signature__ = signature(identify)
 
 
 sys.modules[__name__].__class__ = _Identify

@@ -78,9 +78,25 @@ def sentences(found: xr.Dataset) -> list[str]:
     own = settings(found)
     if own is not None:
         words.append(
-            f"Your settings ({own.words}): error of {own.error * 100:.2g} %, {seconds(own.seconds)} of one core per design."
+            f"Your settings ({own.words}): error of at most {own.error * 100:.2g} %, "
+            f"{seconds(own.seconds)} of one core per design."
         )
     return words
+
+
+def caption(found: xr.Dataset) -> str:
+    """Return what the line and the marks of the figure of total errors are, of the panels that are there."""
+    if "averaging_error" not in found:
+        return (
+            f"Line: the cheapest means over {REPLICAS} replicas. Error: bias of the integration tolerance and standard error "
+            "of the mean, squares added. Single runs and your settings follow when averaging is measured. Black marks: the "
+            "cheapest for an error."
+        )
+    return (
+        f"Line: the cheapest of the measured settings, single runs and means over {REPLICAS} replicas. Error: bias of the "
+        "integration tolerance and error of averaging with its transient, squares added; of your settings that of the "
+        "measured ones just below. Black marks: the cheapest for an error."
+    )
 
 
 def seconds(value: float) -> str:
@@ -89,7 +105,11 @@ def seconds(value: float) -> str:
 
 
 def settings(found: xr.Dataset) -> Way | None:
-    """Return what the scene's own settings cost and reach; None if the file does not have them, or not as numbers."""
+    """Return what the scene's own settings cost and reach.
+
+    None if the file does not have them as numbers, the panel of averaging is not there, or their tolerance is not between
+    those that were measured.
+    """
     try:
         scene = scene_of_text(str(found.attrs["scene"]), "scene")
     except (InputError, KeyError):
@@ -107,32 +127,36 @@ def settings(found: xr.Dataset) -> Way | None:
     return _own(found, scene)
 
 
-def _own(found: xr.Dataset, scene: Scene) -> Way:
-    """A single run at the tolerance and over the revolutions of a scene, between those that were measured."""
-    numerics = scene.numerics
-    tolerance = np.log(found["tolerance"].to_numpy())
-    order = np.argsort(tolerance)
-    at = np.log(numerics.rtol)
-    bias, price = (
-        float(np.interp(at, tolerance[order], values[order]))
-        for values in (_largest_bias(found), found["tolerance_seconds"].to_numpy())
-    )
+def _own(found: xr.Dataset, scene: Scene) -> Way | None:
+    """A single run at the tolerance and over the revolutions of a scene.
+
+    Its error is that of the next looser tolerance, shorter transient and shorter average that were measured: no more is known,
+    and so it is not below the cheapest of these.
+    """
+    numerics, tolerance = scene.numerics, found["tolerance"].to_numpy()
     waited, averaged = numerics.transient_revolutions, numerics.averaged_revolutions
-    words = f"rtol {_short(numerics.rtol)}, {waited} transient and {averaged} averaged revolutions"
-    error = float(np.hypot(bias, _averaging(found, waited, averaged)))
-    return Way(price * (waited + averaged), error, words)
-
-
-def _averaging(found: xr.Dataset, transient: int, averaged: int) -> float:
-    """Error of an average, from the measured ones: the nearest shorter transient, interpolated in the logarithms."""
-    if "averaging_error" not in found:
-        return float(np.sqrt(np.nanmedian(found["turn_variance"]) / averaged))
-    waited = found["transient"].to_numpy()
-    error = found["averaging_error"].isel(transient=int((waited <= transient).sum()) - 1).to_numpy()
-    counts = found["averaged"].to_numpy().astype(float)
-    return float(
-        np.exp(np.interp(np.log(averaged), np.log(counts), np.log(np.maximum(error, 1e-16))))
+    near = 1.0 + 1e-9  # as it was written and as it was measured
+    looser = np.flatnonzero(tolerance * near >= numerics.rtol)
+    if "averaging_error" not in found or not len(looser) or numerics.rtol * near < tolerance.min():
+        return None
+    order = np.argsort(tolerance)
+    price = np.interp(
+        np.log(numerics.rtol),
+        np.log(tolerance[order]),
+        found["tolerance_seconds"].to_numpy()[order],
     )
+    bias = _largest_bias(found)[looser[np.argmin(tolerance[looser])]]
+    row = int((found["transient"].to_numpy() <= waited).sum()) - 1
+    column = int((found["averaged"].to_numpy() <= averaged).sum()) - 1
+    words = f"rtol {_short(numerics.rtol)}, {waited} transient and {averaged} averaged revolutions"
+    error = float(np.hypot(bias, _averaging(found)[row, column]))
+    return Way(float(price) * (waited + averaged), error, words)
+
+
+def _averaging(found: xr.Dataset) -> Array:
+    """Errors of averages by transient and revolutions: at least those of every longer run, as less would be luck."""
+    error = found["averaging_error"].transpose("transient", "averaged").to_numpy()[::-1, ::-1]
+    return np.asarray(np.maximum.accumulate(np.maximum.accumulate(error, 0), 1)[::-1, ::-1])
 
 
 def _largest_bias(found: xr.Dataset) -> Array:
@@ -156,10 +180,9 @@ def _ways_of(found: xr.Dataset, k: int, bias: float) -> Iterator[Way]:
         yield Way(price * (count + wait), float(np.hypot(bias, np.sqrt(variance / count))), words)
     if "averaging_error" not in found:
         return
-    # of no more than every longer run reaches: less would be luck
-    error = found["averaging_error"].transpose("transient", "averaged").to_numpy()[::-1, ::-1]
-    error = np.maximum.accumulate(np.maximum.accumulate(error, 0), 1)[::-1, ::-1]
-    for row, transient in zip(error, found["transient"].to_numpy().tolist(), strict=True):
+    for row, transient in zip(
+        _averaging(found), found["transient"].to_numpy().tolist(), strict=True
+    ):
         for one, averaged in zip(row, found["averaged"].to_numpy().tolist(), strict=True):
             words = f"rtol {rtol}, {transient} transient and {averaged} averaged revolutions"
             yield Way(price * (transient + averaged), float(np.hypot(bias, one)), words)

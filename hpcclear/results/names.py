@@ -40,6 +40,9 @@ DESIGN_VARIABLES = {
 SECONDS_PER_SAMPLE = "seconds_per_sample"
 """Attribute of the file of times: processor time of a sample by the names of the effects that are off, as JSON."""
 
+SECONDS_BY_ROUND = "seconds_per_sample_by_round"
+"""The same as lists, a number a round: those of a round were measured one after the other."""
+
 ALL_ON = "all on"
 """Name of the whole scene there."""
 

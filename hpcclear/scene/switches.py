@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.pieces import mean_of
 from hpcclear.scene.driving import PlanarTorque, speed_entry
 from hpcclear.scene.fields import Curve
 from hpcclear.scene.guides import SliderGuide
@@ -164,8 +165,7 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         yield Switch("gravity", {"effects.gravity": 0.0})
     if effects.slider_load is not None:
         yield Switch("slider load", {"effects.slider_load": None})
-        turns = turns_of(scene.linkage)
-        yield from _mean("slider load", "effects.slider_load", effects.slider_load, turns)
+        yield from _mean(scene, "slider load", "effects.slider_load", effects.slider_load)
     for key, (words, _) in scene.joint_frictions().items():
         yield Switch(words, {key: None})
     if isinstance(mechanism, Planar):
@@ -173,21 +173,18 @@ def _outside(scene: Scene) -> Iterator[Switch]:
             key = f"mechanism.loads.{load.name}"
             yield Switch(f"{load.kind} {load.name}", {key: None})
             for entry in ("size", "torque"):
-                curve = getattr(load, entry, None)
-                yield from _mean(load.name, f"{key}.{entry}", curve, turns_of(mechanism))
+                curve, other = getattr(load, entry, None), getattr(load, "angle_of", None)
+                yield from _mean(scene, load.name, f"{key}.{entry}", curve, 1 if other else None)
 
 
-def _mean(name: str, key: str, curve: Curve | None, turns: int) -> Iterator[Switch]:
-    """Replace a load that is tabulated over so many turns by its mean."""
+def _mean(
+    scene: Scene, name: str, key: str, curve: Curve | None, turns: int | None = None
+) -> Iterator[Switch]:
+    """Replace a load that is tabulated over some turns, those of the scene by default, by the mean of the curve that acts."""
     if isinstance(curve, tuple):
-        yield Switch(f"variation of {name}", {key: mean_of(curve, turns)})
-
-
-def mean_of(curve: tuple[tuple[float, float], ...], turns: int = 1) -> float:
-    """Mean of a table ((angle, value), ...) that repeats after so many turns, straight between its rows."""
-    angle, value = np.array(curve).T
-    period = 2.0 * np.pi * turns
-    return float(np.trapezoid([*value, value[0]], [*angle, angle[0] + period]) / period)
+        length = 2.0 * np.pi * (turns_of(scene.linkage) if turns is None else turns)
+        mean = mean_of(curve, length, scene.numerics.interpolation)
+        yield Switch(f"variation of {name}", {key: mean})
 
 
 def _drives(scene: Scene) -> Iterator[Switch]:
@@ -206,9 +203,8 @@ def _drives(scene: Scene) -> Iterator[Switch]:
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)
-        turns = turns_of(scene.linkage)
         if drive.torque is not None:
-            yield from _mean(f"torque{whose}", f"{key}.torque", drive.torque, turns)
+            yield from _mean(scene, f"torque{whose}", f"{key}.torque", drive.torque)
 
 
 class Off:

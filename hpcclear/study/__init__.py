@@ -18,6 +18,7 @@ command resumes from them and ends with the same bytes.
 
 import sys
 from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
 
@@ -137,6 +138,8 @@ class _Study(ModuleType):
     """This package, which can be called: ``hpcclear.study(scene, directory, ranks=4)`` stands beside ``hpcclear.map``."""
 
     __call__ = staticmethod(run_study)
+    # Python before 3.13 would leave out the first parameter
+    __signature__ = signature(run_study)
 
 
 sys.modules[__name__].__class__ = _Study

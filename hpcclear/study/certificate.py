@@ -1,16 +1,14 @@
 """The effect screening as a stage of a study: which effects it could do without."""
 
-import json
 from collections.abc import Callable
 
 import numpy as np
 
 from hpcclear.base.arrays import Records
-from hpcclear.ensemble.effects import effects_dataset
+from hpcclear.ensemble.effects import effects_dataset, times_of
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.report.figures.effects import statements
-from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.study.run import Result, StudyRun
@@ -51,7 +49,7 @@ def certify(run: StudyRun, extent: Extent) -> None:
     run.write(content, "effects.nc")
     with run.ranks.stage("effects: cost"):
         seconds = trial.seconds(found.variants)
-    run.times[SECONDS_PER_SAMPLE] = json.dumps(seconds)
+    run.times.update(times_of(seconds))
     for text in statements(content, seconds):
         run.notify(text)
 

@@ -18,6 +18,7 @@ import time
 import zlib
 from collections.abc import Iterable
 
+import last_bits
 import numpy as np
 
 from hpcclear import cli
@@ -198,6 +199,7 @@ def sabotage() -> None:
 if __name__ == "__main__":
     if "TEST_BEGAN" in os.environ:
         tell_when_it_listens(pathlib.Path(f"{os.environ['TEST_BEGAN']}{RANK}"))
+    last_bits.disturb()
     watch()
     sabotage()
     cli.main()

@@ -318,37 +318,55 @@ def total_figure(found: xr.Dataset) -> "Figure":
         [1e3 * way.seconds for way in best], [way.error for way in best], color=style.CYCLE[0],
         drawstyle="steps-post", label="cheapest settings",
     )  # fmt: skip
-    label = "recommended"
-    for target in targets.TARGETS:
-        way = targets.cheapest(found, target)
-        if way is None:
-            continue
-        panel.plot(
-            1e3 * way.seconds, way.error, ls="none", marker="*", ms=8.0, color="black", mfc="white",
-            label=label, zorder=4,
-        )  # fmt: skip
-        panel.annotate(
-            f"{target * 100:g} %", (1e3 * way.seconds, way.error), xytext=(5, 4),
-            textcoords="offset points", fontsize=style.SMALL,
-        )  # fmt: skip
-        label = "_"  # one entry of the legend
     if (own := targets.settings(found)) is not None:
         panel.plot(
-            1e3 * own.seconds, own.error, ls="none", marker="s", ms=5.0, color=style.PALETTE["vermilion"],
-            label="your settings", zorder=4,
+            1e3 * own.seconds, own.error, ls="none", marker="s", ms=9.0, color=style.PALETTE["vermilion"],
+            mfc="none", label="your settings", zorder=4,
+        )  # fmt: skip
+    _with_room(panel)
+    for way, aims, mark in zip(*_recommended(panel, found), _TARGET_MARKS, strict=False):
+        panel.plot(
+            1e3 * way.seconds, way.error, ls="none", marker=mark, ms=_MARK, color="black", mfc="white",
+            label="for " + ", ".join(f"{aim * 100:g}" for aim in aims) + " %", zorder=5,
         )  # fmt: skip
     panel.set_xlabel("core time of one design (ms)")
     panel.set_ylabel("relative error of $f$ (–)")
     style.settle([panel])
-    for axis in (panel.xaxis, panel.yaxis):
-        _decades(axis)
+    _decades(panel.yaxis)
+    _plain(panel)
     _legend_above(figure, panel)
-    _foot(
-        figure,
-        found,
-        "Error: bias of the integration tolerance and error of averaging, squares added.",
-    )
+    _foot(figure, found, targets.caption(found))
     return figure
+
+
+def _with_room(panel: "Axes") -> None:
+    """Limits of logarithmic axes wide enough for a tick, 1, 2 or 5 of the time and a power of ten of the error."""
+    box = panel.dataLim
+    panel.set_xlim(0.7 * box.x0, 1.8 * box.x1)
+    panel.set_ylim(0.3 * box.y0, 3.4 * box.y1)
+
+
+_TARGET_MARKS, _MARK = "*Dp", 6.0
+"""Marks of recommended settings, and their size in points."""
+
+
+def _recommended(panel: "Axes", found: xr.Dataset) -> tuple[list[targets.Way], list[list[float]]]:
+    """Recommended settings and the targets of each; settings whose marks would cover each other are one, the more accurate."""
+    kept: list[targets.Way] = []
+    aims: list[list[float]] = []
+    for target in reversed(targets.TARGETS):
+        way = targets.cheapest(found, target)
+        if way is None:
+            continue
+        if kept:
+            places = panel.transData.transform([(1e3 * w.seconds, w.error) for w in (way, kept[0])])
+            apart = np.hypot(*(places[1] - places[0])) * 72.0 / panel.figure.dpi
+            if apart < 1.5 * _MARK:
+                aims[0].insert(0, target)
+                continue
+        kept.insert(0, way)
+        aims.insert(0, [target])
+    return kept, aims
 
 
 FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
@@ -363,12 +381,12 @@ FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
 """The figures of a dataset, by the name of their file."""
 
 MAIN = {
-    "total": "spent_error",
-    "spending": "spent_error",
-    "integration": "error",
-    "averaging": "averaging_error",
-    "surrogate": "r2",
-    "random_inputs": "moment_error",
-    "parallel": "strong_seconds",
+    "total": ("spent_error", "averaging_error"),
+    "spending": ("spent_error",),
+    "integration": ("error",),
+    "averaging": ("averaging_error",),
+    "surrogate": ("r2",),
+    "random_inputs": ("moment_error",),
+    "parallel": ("strong_seconds",),
 }
-"""The variable that each of them shows: it can be drawn as soon as that is there."""
+"""The variables that each of them shows: it can be drawn as soon as the first is there, and again with each other one."""

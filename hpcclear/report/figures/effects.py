@@ -1,16 +1,21 @@
 """Which effects a scene can do without (kind ``effects``): a bar each, cost beside change, and the sentences that say it."""
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from hpcclear.report.figures import style
-from hpcclear.results.names import ALL_ON, SECONDS_PER_SAMPLE
+from hpcclear.base.student import student
+from hpcclear.report.figures import labels, style
+from hpcclear.results.names import ALL_ON, SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+CONFIDENCE = 0.95
+"""Confidence level of what is saved."""
 
 
 def named(content: xr.Dataset, variant: int) -> list[str]:
@@ -24,20 +29,66 @@ def label(names: list[str]) -> str:
     return " + ".join(names) if names else ALL_ON
 
 
-def seconds_of(timing: xr.Dataset | None) -> dict[str, float]:
-    """Processor time of a sample of each variant, s, by `label`; empty where it was not measured."""
-    found: dict[str, float] = json.loads(
-        "{}" if timing is None else timing.attrs.get(SECONDS_PER_SAMPLE, "{}")
+Times = Mapping[str, Sequence[float]]
+"""Processor times of a sample, s, round by round, of each variant by `label`."""
+
+
+class Saving(NamedTuple):
+    """Share of a sample's run time that a variant saves, negative if it takes longer."""
+
+    share: float
+    half: float
+    """Half-width of its 95 % confidence interval, from round to round; NaN where it is an estimate."""
+    rounds: int
+    """Rounds that it was measured in; 0: it is estimated from evaluations."""
+
+    @property
+    def significant(self) -> bool:
+        """Whether it is not zero as far as was measured; of an estimate whether it is a per cent at least."""
+        return abs(self.share) > (self.half if np.isfinite(self.half) else 0.005)
+
+    @property
+    def words(self) -> str:
+        """The share with its half-width."""
+        if not np.isfinite(self.half):
+            return f"about {100 * self.share:.0f} %" + ("" if self.rounds else ", by evaluations")
+        share, _, half = labels.paired(100 * abs(self.share), 100 * self.half).partition(" ± ")
+        sign = "-" if self.share < 0.0 and float(share) else ""
+        if not self.significant:
+            return f"none significant ({sign}{share} % ± {half} %)"
+        return f"none, it takes {share} % ± {half} % longer" if sign else f"{share} % ± {half} %"
+
+    @property
+    def speed_up(self) -> str:
+        """How many times as fast it is, between the ends of its confidence interval."""
+        half = self.half if np.isfinite(self.half) else 0.0
+        ends = [f"{1.0 / max(1.0 - self.share + off, 1e-9):.2g}" for off in (half, -half)]
+        return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
+
+
+def seconds_of(timing: xr.Dataset | None) -> Times:
+    """Processor times of a sample of each variant; empty where they were not measured."""
+    attrs = {} if timing is None else timing.attrs
+    if SECONDS_BY_ROUND in attrs:
+        found: Times = json.loads(attrs[SECONDS_BY_ROUND])
+        return found
+    once = json.loads(attrs.get(SECONDS_PER_SAMPLE, "{}"))  # of an earlier version
+    return {name: [value] for name, value in once.items()}
+
+
+def saving(content: xr.Dataset, variant: int, seconds: Times) -> Saving:
+    """What a variant saves: measured in pairs with the whole scene, else by evaluations."""
+    here, whole = (
+        np.array(seconds.get(label(names), ())) for names in (named(content, variant), [])
     )
-    return found
-
-
-def saving(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> float:
-    """Share of a sample's time that a variant saves, negative if it takes longer: measured, else by evaluations."""
-    here, whole = seconds.get(label(named(content, variant))), seconds.get(label([]))
-    if here is None or not whole:
-        return 1.0 - float(content["work"][variant])
-    return 1.0 - here / whole
+    count = len(here)
+    if count == 0 or len(whole) != count or not whole.all():
+        return Saving(1.0 - float(content["work"][variant]), np.nan, 0)
+    shares = 1.0 - here / whole
+    half = np.nan
+    if count > 1:
+        half = student(CONFIDENCE, count - 1) * float(shares.std(ddof=1)) / np.sqrt(count)
+    return Saving(float(shares.mean()), float(half), count)
 
 
 def shown(value: float, limit: float) -> str:
@@ -51,13 +102,14 @@ def shown(value: float, limit: float) -> str:
     return f"{number} ± {limit:.{digits}f} %"
 
 
-def statement(content: xr.Dataset, variant: int, seconds: dict[str, float]) -> str:
+def statement(content: xr.Dataset, variant: int, seconds: Times) -> str:
     """What leaving an effect out changes and saves, in a sentence."""
     one = content.isel(variant=variant)
-    share = saving(content, variant, seconds)
     change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
     text = f"Without {label(named(content, variant))} f changes by {change.replace(' ± ', ' % ± ')}"
-    saved = f"{100 * share:.0f} %" if share >= 0.005 else "none"
+    if change == "-":
+        text = f"Without {label(named(content, variant))} the change of f is not known"
+    saved = saving(content, variant, seconds).words
     return f"{text}, run time saved: {saved}{_verdict(one, float(content.attrs['tolerance']))}."
 
 
@@ -81,16 +133,18 @@ def _verdict(one: xr.Dataset, tolerance: float) -> str:
     return f"; undecided with {count} samples, about {float(f'{more:.1g}'):.0f} would suffice"
 
 
-def statements(content: xr.Dataset, seconds: dict[str, float]) -> list[str]:
+def statements(content: xr.Dataset, seconds: Times) -> list[str]:
     """A sentence for each effect by itself, for pairs that are more than their sum, and for what may be left out."""
     singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
     chosen = int(np.argmax(content["recommended"].to_numpy()))
     tolerance = f"{100 * float(content.attrs['tolerance']):g} %"
     last = f"No effect can be neglected within {tolerance}."
     if chosen:
-        share = saving(content, chosen, seconds)
         names = ", ".join(named(content, chosen))
-        last = f"Within {tolerance} these effects can be neglected: {names}. This saves {100 * share:.0f} %."
+        last = (
+            f"Within {tolerance} these effects can be neglected: {names}. "
+            f"Run time saved: {saving(content, chosen, seconds).words}."
+        )
     return [*(statement(content, k, seconds) for k in singles), *distinguished(content), last]
 
 
@@ -144,17 +198,39 @@ def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Fi
         100 * float(effects.attrs["tolerance"]), color=style.PALETTE["orange"], ls="--", lw=0.9
     )
     panel.set_yticks(places, [_wrapped(named(effects, k), k == chosen) for k in rows])
-    panel.set_xlabel("change of $f$ (%)")
-    cost.barh(
-        places, [100 * saving(effects, k, seconds) for k in rows], color=style.PALETTE["blue"],
-        height=0.6,
-    )  # fmt: skip
+    panel.set_xlabel("|change of mean $f$| (%)")
+    saved = [saving(effects, k, seconds) for k in rows]
+    shares = np.array([100 * one.share for one in saved])
+    cost.barh(places, shares, color=style.PALETTE["blue"], height=0.6)
+    for place, share, one in zip(places, shares, saved, strict=True):
+        if np.isfinite(one.half):
+            ends = [share - 100 * one.half, share + 100 * one.half]
+            cost.plot(ends, [place, place], color=style.PALETTE["black"], lw=0.9)
     cost.set_xlim(
         -50, 100
     )  # what takes longer than half as much again is no saving, however much longer
-    cost.set_xlabel("time saved (%)")
+    cost.set_xlabel("run time saved (%)")
     style.settle(axes, 3)
     return figure
+
+
+def caption(effects: xr.Dataset, timing: xr.Dataset | None) -> str:
+    """What `effects_figure` shows."""
+    seconds = seconds_of(timing)
+    rounds = max(
+        (saving(effects, k, seconds).rounds for k in range(1, effects.sizes["variant"])), default=0
+    )
+    cost = (
+        f"run time saved, mean of {rounds} paired measurements"
+        + (" with its 95 % confidence interval" if rounds > 1 else "")
+        if rounds
+        else "run time saved, estimated from evaluations of the equations of motion"
+    )
+    return (
+        "Size of the change of the mean of f with each effect off, with its "
+        f"{100 * float(effects.attrs['confidence']):g} % confidence interval; dashed: the tolerance. Green: within it in all "
+        f"judged results, red: needed, grey: undecided. “Left out”: the effects that can be neglected together. Right: {cost}."
+    )
 
 
 def _wrapped(names: list[str], recommended: bool) -> str:

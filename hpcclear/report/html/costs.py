@@ -41,7 +41,7 @@ def accuracy(content: Content) -> list[object] | None:
     total = gallery.picture(
         figures.total_figure,
         found,
-        "Total error of f of one design against core time: bias of the tolerance and error of averaging.",
+        f"Total error of f of one design against core time. {targets.caption(found)}",
     )
     drawn = {
         name: gallery.picture(figures.FIGURES[name], found, caption)

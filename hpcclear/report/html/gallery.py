@@ -58,7 +58,7 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
         yield from _of_file(one.draw, content.get(one.kind), one.caption + fit)
     certificate, times = content.get("effects"), content.get("timing")
     if certificate is not None:
-        about = "Change of f with each effect off, with confidence interval and tolerance, and the run time saved."
+        about = effects.caption(certificate, times)
         yield about, lambda: _shown(effects.effects_figure(certificate, times), about)
     front = content.get("front")
     if front is not None:

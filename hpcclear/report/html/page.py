@@ -4,7 +4,7 @@ import base64
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -108,8 +108,10 @@ def _policy() -> str:
     return "; ".join(rules)
 
 
-def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
-    """All sections in the page's order, those with nothing to show among them.
+def _sections(
+    content: Content, troubles: list[str], wanted: Sequence[str] | None = None
+) -> Iterator[Section]:
+    """All sections in the page's order, or those wanted, those with nothing to show among them.
 
     One that cannot be made or filled into its template is left out, and said in `troubles` and on the page.
     """
@@ -135,6 +137,8 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
         ("time", "Run time of the ranks", "parts.html", origin.timing),
     )
     for name, title, template, make in makers:
+        if wanted is not None and name not in wanted:
+            continue
         if content.samples and (name in _OF_SAMPLES or not content.responses):
             continue
         # figures are limited one by one
@@ -145,6 +149,8 @@ def _sections(content: Content, troubles: list[str]) -> Iterator[Section]:
     yield Section("missing", "Results not available", "list.html", _missing(content, troubles))
 
 
+MOST_DRAWN = 4
+"""Files of samples whose own figures stand on a page: each takes a second and up to 1 MB."""
 _OF_SAMPLES = ("statistics", "summary", "trust")
 """Sections on samples alone."""
 _EACH = (*_OF_SAMPLES, "figures", "effects", "reproduce")
@@ -154,11 +160,26 @@ _EACH = (*_OF_SAMPLES, "figures", "effects", "reproduce")
 def _several(content: Content, troubles: list[str]) -> Iterator[Section]:
     """The comparison of several samples, then the sections of each, which name its file."""
     yield _section("comparison", "Comparison", "parts.html", sections.compared, content)
+    drawn = len(content.samples) <= MOST_DRAWN
+    if not drawn:
+        yield Section("figures", "Figures of single files", "parts.html", _on_demand(content))
+    each = [name for name in _EACH if drawn or name != "figures"]
     for k, (name, one) in enumerate(content.each_of_samples(), 1):
-        for section in _sections(one, troubles):
-            if section.name in _EACH:
+        for section in _sections(one, troubles, each):
+            if section.name in each:
                 heading = f"{name}: {section.title[0].lower()}{section.title[1:]}"
                 yield replace(section, name=f"{section.name}-{k}", title=heading)
+
+
+def _on_demand(content: Content) -> list[object]:
+    """How the figures of one of many files are drawn."""
+    first = Path(next(iter(content.samples)))
+    name = first if first.parent != Path() else content.directory / first
+    return [
+        f"The figures of single files are drawn for up to {MOST_DRAWN} files; here are {len(content.samples)}. "
+        f"To draw those of one file: hpcclear plot {name}.nc -o figures. "
+        f"To write a page of its own with them: hpcclear report {name}.nc -o {name}.html."
+    ]
 
 
 _FOLDED = ("paper", "time")
