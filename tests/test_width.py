@@ -1,4 +1,4 @@
-"""Vectors of 256 or 512 bits: by the processor, by the environment, and that no result depends on it."""
+"""Vectors of 128, 256 or 512 bits: by the processor, by the environment, and that no result depends on it."""
 
 import inspect
 import os
@@ -39,12 +39,22 @@ def test_processors_that_slow_their_clock_have_narrow_vectors(name, sign, monkey
     assert width.features() == f"+avx512f,{sign}prefer-256-bit"
 
 
-@pytest.mark.parametrize(("asked", "sign"), [("256", "+"), ("512", "-")])
-def test_a_width_may_be_set(asked, sign, monkeypatch):
+@pytest.mark.parametrize(
+    ("asked", "preference"),
+    [("128", "+prefer-128-bit"), ("256", "+prefer-256-bit"), ("512", "-prefer-256-bit")],
+)
+def test_a_width_may_be_set(asked, preference, monkeypatch):
     known = llvm.FeatureMap({"avx512f": True})
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
     monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", asked)
-    assert width.features() == f"+avx512f,{sign}prefer-256-bit"
+    assert width.features() == f"+avx512f,{preference}"
+
+
+def test_narrow_vectors_may_be_set_on_any_processor(monkeypatch):
+    known = llvm.FeatureMap({"avx2": True})
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
+    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "128")
+    assert width.features() == "+avx2,+prefer-128-bit"
 
 
 @pytest.mark.parametrize(
@@ -52,7 +62,7 @@ def test_a_width_may_be_set(asked, sign, monkeypatch):
 )
 def test_another_width_is_refused(monkeypatch, tmp_path, named):
     """Also where the user names the processor to Numba, and the width would say nothing."""
-    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "128")
+    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "64")
     for name, value in named.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(InputError, match="256 or 512"):
@@ -86,7 +96,7 @@ def test_no_result_depends_on_it(tmp_path):
         written = [path for path in sorted(out.glob("*.nc")) if "timing" not in path.name]
         files[bits] = [path.read_bytes() for path in written]
         assert len(files[bits]) == 3
-    assert files["256"] == files["512"]
+    assert files["128"] == files["256"] == files["512"]
 
 
 @wide

@@ -1,4 +1,4 @@
-"""How wide the vectors are that the compiler uses on a processor with AVX-512: 256 or 512 bits.
+"""How wide the vectors are that the compiler uses: 128, 256 or, on a processor with AVX-512, 512 bits.
 
 LLVM takes 256 bits on many processors that have 512: those slow their clock for wide vectors, or did so when its table was
 written. With 512 the kernel took two thirds of the time on the two processors of `docs/performance.md`, so only those that are
@@ -11,12 +11,12 @@ import llvmlite.binding as llvm
 
 from hpcclear.base.errors import InputError
 
-WIDTHS = (256, 512)
+WIDTHS = (128, 256, 512)
 
 SLOWED = ("skylake-avx512", "cascadelake", "cooperlake", "cannonlake")
 """Processors, as LLVM calls them, whose clock falls with wide vectors (Intel's first generations of AVX-512)."""
 
-_PREFERENCE = {256: "+prefer-256-bit", 512: "-prefer-256-bit"}
+_PREFERENCE = {128: "+prefer-128-bit", 256: "+prefer-256-bit", 512: "-prefer-256-bit"}
 
 
 def asked_width() -> int | None:
@@ -25,13 +25,13 @@ def asked_width() -> int | None:
     Raises
     ------
     InputError
-        If it is set to anything but 256 or 512.
+        If it is set to anything but 128, 256 or 512.
     """
     asked = os.environ.get("HPCCLEAR_VECTOR_BITS", "")
     if asked not in ("", *map(str, WIDTHS)):
         raise InputError(
             "HPCCLEAR_VECTOR_BITS", asked, "is not a vector width",
-            "Set it to 256 or 512, or leave it unset: the width then goes by the processor",
+            "Set it to 128, 256 or 512, or leave it unset: the width then goes by the processor",
         )  # fmt: skip
     return int(asked) if asked else None
 
@@ -46,7 +46,7 @@ def features() -> str | None:
     """
     asked = asked_width()
     known = llvm.get_host_cpu_features()
-    if not known.get("avx512f", False):
+    if asked != 128 and not known.get("avx512f", False):
         return None
     usual = 256 if llvm.get_host_cpu_name() in SLOWED else 512
     return f"{known.flatten()},{_PREFERENCE[asked or usual]}"
