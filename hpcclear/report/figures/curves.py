@@ -35,7 +35,7 @@ class Tabulated(NamedTuple):
     over: str
     """What its rows go by."""
     acting: Pieces | None = None
-    """The curve that acts; None of a motion."""
+    """The curve that acts; a motion has no such entry."""
 
 
 def tabulated(scene: Scene) -> list[Tabulated]:
