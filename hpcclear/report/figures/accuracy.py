@@ -340,7 +340,7 @@ def total_figure(found: xr.Dataset) -> "Figure":
 
 
 def _with_room(panel: "Axes") -> None:
-    """Limits of logarithmic axes wide enough for a tick, 1, 2 or 5 of the time and a power of ten of the error."""
+    """Set ranges of logarithmic axes wide enough for a tick, 1, 2 or 5 of the time and a power of ten of the error."""
     box = panel.dataLim
     panel.set_xlim(0.7 * box.x0, 1.8 * box.x1)
     panel.set_ylim(0.3 * box.y0, 3.4 * box.y1)
