@@ -208,7 +208,7 @@ VERIFICATION: Columns = {
     "life_deviation_lower": number(("design",), "objective", "lower end of its confidence interval"),
     "life_deviation_upper": number(("design",), "objective", "upper end of its confidence interval"),
     "same_as": text(("design",), "earlier design that is statistically indistinguishable in mean and standard deviation"),
-    "equivalent": text(("design",), "designs of its case that are statistically indistinguishable in mean and standard deviation"),
+    "equivalent": text(("design",), "designs of its case, statistically indistinguishable in mean and standard deviation"),
     "accuracy_missed": text(("design",), "quantities whose confidence interval is wider than study.accuracy requests"),
     "dominated": flag(("design",), "whether another design of its case is significantly better in mean and standard deviation"),
     "mean_within": number(("design",), "1",
