@@ -64,8 +64,8 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
         joint = [float(own.get(f"halved_together{end}", np.nan)) for end in ("", "_error")]
-        each = Falls.of(falls[0], lambda _: (joint[0], joint[1]))
-        yield Line("tighten first", _first(list(map(str, names)), each, falls[1], prices))
+        singly = Falls.of(falls[0], lambda _: (joint[0], joint[1]))
+        yield Line("tighten first", _first(list(map(str, names)), singly, falls[1], prices))
 
 
 def to_tighten(

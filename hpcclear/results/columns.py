@@ -222,8 +222,8 @@ VERIFICATION: Columns = {
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "verdicts on the constraints of its case"),
     "constraint_excess": number(("design",), "1",
-        "largest violation of a constraint by the estimates, relative to the threshold; at most 0 without a violation; "
-        "where all simulations exceed a limit, with their distance from it, relative to the limit"),
+        "largest violation of a constraint, relative to the threshold, at most 0 without; of limits always exceeded with the "
+        "relative distance"),
     "samples": count(("design",), "number of simulations"),
     "rare_samples": count(("design",), "number of additional simulations that decide rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
