@@ -1,5 +1,8 @@
 """What makes the scatter of a design: contributions of inputs against exact ones, tolerances against brute force, and lines."""
 
+import itertools
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,6 +10,7 @@ from margins import most
 from scipy.stats import qmc
 
 from hpcclear.report import scatter
+from hpcclear.scene.correlation import Correlation
 from hpcclear.statistics.sensitivity.contributions import contributions
 
 
@@ -103,3 +107,75 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     assert "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%" in tolerances.text
     assert "other" not in shares.text + tolerances.text
     assert list(scatter.lines({}, best)) == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_inputs_halved_together_bring_what_brute_force_says(seed):
+    """Two to six inputs in random blocks of correlation, with slopes, squares and products."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(2, 7))
+    mixing = np.linalg.cholesky(correlated(rng, size)[0])
+    x = rng.standard_normal((16, 1024, size)) @ mixing.T
+    slopes, bent = rng.normal(size=size), rng.normal(size=(size, size)) * (0.3 if seed % 2 else 0.0)
+
+    def of(x):
+        return x @ slopes + np.einsum("...i,ij,...j->...", x, bent, x)
+
+    found = contributions(x, of(x), range(size))
+    chosen, _ = scatter.to_tighten(found.halved, found.halved_error, np.array([]))
+    less = x.copy()
+    less[..., chosen] *= 0.5
+    exact = 1.0 - of(less).std() / of(x).std()
+    value, error = found.halved.together(chosen)
+    assert value == pytest.approx(exact, abs=4.0 * error + 2e-3)
+    words = scatter._first([f"x{k}" for k in range(size)], found.halved, found.halved_error, np.array([]))  # fmt: skip
+    assert abs(float(re.search(r"by (\d+)%", words)[1]) / 100.0 - exact) < 0.02
+    if seed % 2 == 0:  # the sum of all scatters half as much, however its parts are correlated
+        assert found.halved.together(range(size))[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def correlated(rng: np.random.Generator, size: int) -> tuple[np.ndarray, list[int]]:
+    """A correlation matrix of random blocks, and the block of each input."""
+    block = rng.integers(0, max(size // 2, 1), size).tolist()
+    one = np.array([[i == j for i in block] for j in block])
+    signs = np.outer(*2 * [rng.choice([-1.0, 1.0], size)])
+    return np.where(np.eye(size) > 0.0, 1.0, one * signs * rng.uniform(0.3, 0.8)), block
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_inputs_of_independent_blocks_are_in_groups_of_their_own(seed):
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(2, 9))
+    matrix, block = correlated(rng, size)
+    names = [f"x{k}" for k in range(size)]
+    table = Correlation(inputs=names, matrix=matrix.tolist())
+    some = [name for name in rng.permutation([*names, "alone"]).tolist() if rng.random() < 0.8]
+    groups = table.groups(some)
+    own = [block[names.index(name)] if name in names else -1 for name in some]
+    for i, j in itertools.permutations(range(len(some)), 2):
+        assert (groups[i] == groups[j] != 0) == (own[i] == own[j])
+    assert sorted({0, *groups}) == list(range(max(groups, default=0) + 1))
+
+
+def test_a_chain_of_correlations_is_one_group_as_long_as_no_link_lacks():
+    matrix = np.eye(4)
+    matrix[[0, 1, 1, 2], [1, 0, 2, 1]] = 0.4
+    chain = Correlation(inputs=["a", "b", "c", "d"], matrix=matrix.tolist())
+    assert chain.groups(["d", "c", "b", "a"]) == [0, 1, 1, 1]
+    assert chain.groups(["a", "c", "d"]) == [0, 0, 0]
+
+
+def test_two_blocks_are_listed_as_two():
+    each = {name: (("design", "input"), [[0.3, 0.3, 0.2, 0.2, 0.1]]) for name in ("contribution", "halved")}  # fmt: skip
+    errors = {f"{name}_error": (("design", "input"), [[0.01] * 5]) for name in each}
+    content = xr.Dataset(
+        {
+            **each, **errors, "unexplained": ("design", [0.0]), "group": (("design", "input"), [[1, 1, 2, 2, 0]]),
+            "halved_together": ("design", [0.4321]), "halved_together_error": ("design", [0.004]),
+        },
+        {"design": ["case alpha"], "input": list("abcde")},
+    )  # fmt: skip
+    best = xr.Dataset(coords={"design": "case alpha"})
+    shares, _, first = scatter.lines({"contributions": content}, best)
+    assert "a+b (correlated) 30% ± 2%, c+d (correlated) 20% ± 2%, e 10% ± 2%" in shares.text
+    assert "them together lowers the standard deviation of f by 43% ± 1%" in first.text

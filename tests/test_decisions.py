@@ -231,3 +231,27 @@ def test_check_states_what_a_rare_failure_costs():
     assert "12288 decide a design near it by importance sampling" in text
     few = study.model_copy(update={"verification": Verification(samples=1024)})
     assert "samples allows 1024, too few to decide" in next(verdicts.costs(few, "m"))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_of_designs_that_always_fail_the_one_nearest_to_the_limit_violates_least(seed):
+    """Random levels, scatters and limits: all probabilities are 1, or the scatter is a thousandth of the distance."""
+    rng = np.random.default_rng(seed)
+    limit = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-4, 4))
+    kept = Constraint(statistic="exceedance", limit=limit, most=float(10.0 ** rng.uniform(-3, -1)))
+    levels = np.sort(abs(limit) * 10.0 ** rng.uniform(-1, 1, 6))
+    scatter = levels * 10.0 ** rng.uniform(-3, -1.5)
+    values = [
+        (limit + level + own * np.clip(rng.standard_normal((16, 32)), -3.0, 3.0))
+        for level, own in zip(levels, scatter, strict=True)
+    ]
+    assert all((one > limit).all() for one in values)
+    beyond = np.array([[goals.beyond(kept, one)] for one in values])
+    nearest = np.argsort([one.mean() - 3.0 * one.std() for one in values])
+    broken = goals.excess([kept], np.ones((6, 1)), beyond)
+    steered = [goals.steered([kept], one, {}) for one in values]
+    for found in (broken, steered):
+        assert int(np.argmin(found)) == nearest[0]
+        assert len(set(np.round(found, 9))) == 6  # no plateau on which a search stands still
+    inside = limit + abs(limit) * rng.standard_normal((16, 32))
+    assert goals.beyond(kept, inside) == 0.0

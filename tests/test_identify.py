@@ -18,6 +18,7 @@ from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.ensemble import single
+from hpcclear.identify import answer, training
 from hpcclear.identify.advice import advice, noise_of
 from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter
@@ -254,7 +255,7 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     values = machine(ensemble, layout, truth, np.random.default_rng(7))
     variance = np.full(len(values), 0.5 * 0.05 / 20)
     prepared = prepare(ensemble, [layout], Sensor(), SPEED, variance, 1, 32)
-    found = prepared, [judged(prepared, values, 1, 400)]
+    found = [(prepared, judged(prepared, values, 1, 400))]
     wanted = Settings((UNKNOWN, other), "a.csv")
     gains = advice(ensemble, ["crank_moment"], Sensor(), SPEED, 0.1, 1)
     content = identified_dataset(ensemble, found, np.zeros(1), gains, wanted, 1, {})
@@ -374,6 +375,63 @@ def test_growth_has_a_rate_and_a_time_to_the_limit_with_intervals():
 def test_dates_that_are_none_are_refused(dates, reason):
     with pytest.raises(InputError, match=reason):
         seconds_of(dates, 2)
+
+
+def record(path: Path, noise: float, samples: int, change: float, form: str, seed: int) -> Path:
+    """A table of the machine by formula at 0.4 of the bounds; `change`: of its third harmonic."""
+    rng = np.random.default_rng(seed)
+    turns = np.arange(20 * samples + 1) / samples
+    mean = Spectrum.unpacked(spectra_of(np.array([[0.4, 0.5]]), rng)[0, 0], 20).mean
+    mean[3] += change
+    values = (mean * np.exp(2j * np.pi * turns[:, None] * np.arange(ORDERS + 1))).real.sum(axis=1)
+    values = values * (form != "zero") + noise * rng.standard_normal(len(turns))
+    axis = {"time [s]": turns / SPEED} if form == "time" else {"crank_angle [deg]": 360.0 * turns}
+    return table(path, {**axis, "crank_moment [N m]": values})
+
+
+def test_each_record_is_judged_as_if_it_were_alone(made, scene, tmp_path, monkeypatch):
+    """Good ones and one of another machine, beside loose, coarse, dead, free-running ones: verdicts stay to the last bit."""
+    monkeypatch.setattr(answer, "simulated", lambda *_, **__: made[0])
+    bare = scene.with_({"study": None})
+    kinds = {
+        "good": (0.2, 256, 0.0, ""), "other machine": (0.2, 256, 0.8, ""), "loose": (20.0, 256, 0.0, ""),
+        "coarse": (0.2, 40, 0.0, ""), "dead": (0.0, 256, 0.0, "zero"), "free": (0.2, 256, 0.0, "time"),
+    }  # fmt: skip
+    files = {
+        name: record(tmp_path / f"{name}.csv", *its, k)
+        for k, (name, its) in enumerate(kinds.items())
+    }
+
+    def judge(*names):
+        return hpcclear.identify(bare, UNKNOWN, [files[name] for name in names], progress="quiet")
+
+    alone = [judge(name) for name in ("good", "other machine")]
+    company = judge(*kinds)
+    for k, one in enumerate(alone):
+        for name in ("interval", "doubt", "explained", "posterior", "widening"):
+            np.testing.assert_array_equal(company[name][k], one[name][0], name)
+        known = np.isfinite(company["measured"][k])
+        assert company["feature"].values[known].tolist() == one["feature"].values.tolist()
+    low, _, high = alone[0]["interval"].values[0, 0]
+    assert low < 10e-6 + 0.4 * 140e-6 < high < low + 40e-6
+    assert company["explained"].values[[0, 1, 4]].tolist() == [1, 0, 0]
+    assert np.ptp(company["interval"].values[2, 0]) > 2.0 * (high - low)
+    text = "\n".join(f"{line.label} {line.text}" for line in lines(company))
+    assert f"from the {int(company['explained'].sum())} of 6 records" in text
+
+
+def test_a_record_that_is_not_explained_has_no_part_in_the_growth():
+    rng = np.random.default_rng(3)
+    times = DAY * np.arange(4.0)
+    particles = (50e-6 + 1e-6 * np.arange(4.0))[:, None, None] + 1e-7 * rng.standard_normal(
+        (4, 500, 1)
+    )
+    particles[3] = 140e-6  # a dead sensor: narrow and wrong
+    good = np.array([True, True, True, False])
+    rate, left = history(times, particles, 100e-6, rng, good)
+    assert rate[1, 0] * DAY == pytest.approx(1e-6, rel=0.1)
+    assert left[1, 0] == pytest.approx(47 * DAY, rel=0.1)  # from the last record on
+    assert history(times, particles, None, rng, np.array([True, False, False, False])) is None
 
 
 # -- the command ------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from hpcclear.identify.inputs import Inputs
 from hpcclear.identify.judgement import Prepared, Verdict, features_of, judged, prepare
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.settings import Settings
-from hpcclear.identify.signals import names_of, revolutions_of
+from hpcclear.identify.signals import Sensor, names_of, revolutions_of
 from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -89,13 +89,16 @@ def _identified(
         [read_measured(path, name, units[name], frequency, turns, sense) for name in settings.names]
         for path in settings.signals
     ]
-    layouts = _layouts(tables, settings) if tables else []  # refuses before anything is simulated
+    layouts = [_layouts(row, settings) for row in tables]  # refuses before anything is simulated
     quiet = session.options.style == "quiet"
     ensemble = simulated(
         plain, inputs, every, settings.size(), seed, session.ranks, session.opened(), quiet
     )
     with session.ranks.stage("posterior"):
-        found = _verdicts(ensemble, tables, layouts, settings, seed) if tables else None
+        found = [
+            _verdict(ensemble, row, own, settings.sensor, seed)
+            for row, own in zip(tables, layouts, strict=True)
+        ]
         gains = None
         if settings.advise:
             share = settings.noise or NOISE
@@ -113,32 +116,22 @@ def _driven(scene: Scene) -> tuple[float, int, list[str]]:
     return frequency, -1 if angle[-1] < angle[0] else 1, names_of(response)
 
 
-Found = tuple[Prepared, list[Verdict]]
+Found = Sequence[tuple[Prepared, Verdict]]
+"""Of each record its models and what it says."""
 
 
-def _layouts(tables: Sequence[Sequence[Measured]], settings: Settings) -> list[Layout]:
-    """The features that all tables have."""
-    return [
-        Layout.of(one, settings.sensor, _noise(one, settings.noise)) for one in _narrowest(tables)
-    ]
+def _layouts(row: Sequence[Measured], settings: Settings) -> list[Layout]:
+    """The features that the signals of a record have."""
+    return [Layout.of(one, settings.sensor, _noise(one, settings.noise)) for one in row]
 
 
-def _verdicts(
-    ensemble: Ensemble, tables: Sequence[Sequence[Measured]], layouts: Sequence[Layout], settings: Settings,
-    seed: int,
-) -> Found:  # fmt: skip
-    """What each table says, by models for the noisiest of them."""
-    pairs = [features_of(row, layouts) for row in tables]
-    variance: Array = np.max(np.array([own for _, own in pairs]), axis=0)
-    made = prepare(ensemble, layouts, settings.sensor, tables[0][0].frequency, variance, seed)
-    return made, [judged(made, values, seed) for values, _ in pairs]
-
-
-def _narrowest(tables: Sequence[Sequence[Measured]]) -> list[Measured]:
-    """Of each signal the record with the fewest harmonics; all are read as not synchronised if one is."""
-    found = [min(column, key=lambda one: one.highest) for column in zip(*tables, strict=True)]
-    alike = all(one.synchronised for row in tables for one in row)
-    return [Measured(one.name, one.spectrum, alike, one.frequency, one.highest) for one in found]
+def _verdict(
+    ensemble: Ensemble, row: Sequence[Measured], layouts: Sequence[Layout], sensor: Sensor, seed: int
+) -> tuple[Prepared, Verdict]:  # fmt: skip
+    """What a record says, by models for its own features and noise: the same whatever the other records are."""
+    values, variance = features_of(row, layouts)
+    made = prepare(ensemble, layouts, sensor, row[0].frequency, variance, seed)
+    return made, judged(made, values, seed)
 
 
 def _noise(measured: Measured, share: float | None) -> float | None:
@@ -150,7 +143,7 @@ def _noise(measured: Measured, share: float | None) -> float | None:
 
 
 def identified(
-    ensemble: Ensemble, found: Found | None, times: Array, gains: Advice | None, settings: Settings, seed: int,
+    ensemble: Ensemble, found: Found, times: Array, gains: Advice | None, settings: Settings, seed: int,
     attributes: Mapping[str, object],
 ) -> xr.Dataset:  # fmt: skip
     """Return the dataset of kind ``identify``; `times` (records,), s."""
@@ -167,26 +160,21 @@ def identified(
         "prior_lower": np.array([one.lower for one in inputs.unknowns]),
         "prior_upper": np.array([one.upper for one in inputs.unknowns]),
     }
-    if found is not None:
-        prepared, verdicts = found
-        names = [str(path) for path in settings.signals]
+    if found:
+        particles = np.stack([verdict.particles for _, verdict in found])
+        features = list(dict.fromkeys(label for made, _ in found for label in made.labels))
         coords |= {
-            "record": np.array(names, str),
-            "particle": np.arange(len(verdicts[0].particles)),
-            "feature": np.array(prepared.labels, str),
+            "record": np.array([str(path) for path in settings.signals], str),
+            "particle": np.arange(particles.shape[1]),
+            "feature": np.array(features, str),
         }
-        particles = np.stack([one.particles for one in verdicts])
-        data |= _of_verdicts(verdicts, particles, len(units))
-        data |= {
-            "elapsed": times,
-            "widening": prepared.calibration.widening,
-            "coverage": prepared.calibration.coverage,
-        }
+        data |= _of_records(found, particles, features, len(units)) | {"elapsed": times}
         grown = history(
             times,
             particles[:, :, : len(units)],
             limit,
             np.random.default_rng([seed, 0x6869]),
+            np.array([verdict.explained for _, verdict in found]),
         )
         if grown is not None:
             data |= {"rate": grown.rate, "time_to_limit": grown.time}
@@ -200,16 +188,23 @@ def identified(
     return with_units(dataset.dataset("identify", coords, data, further), units)
 
 
-def _of_verdicts(verdicts: Sequence[Verdict], particles: Array, unknowns: int) -> dict[str, Any]:
-    """Variables over the records."""
+def _of_records(
+    found: Found, particles: Array, features: Sequence[str], unknowns: int
+) -> dict[str, Any]:
+    """Variables over the records; NaN where a record lacks a feature of another."""
+    verdicts = [verdict for _, verdict in found]
+    places = [[features.index(label) for label in made.labels] for made, _ in found]
+    fit = np.full((3, len(found), len(features)), np.nan)
+    for row, (one, own) in enumerate(zip(verdicts, places, strict=True)):
+        fit[:, row, own] = one.measured, one.predicted, one.deviation
     return {
         "posterior": particles,
         "interval": np.stack([one.interval.T for one in verdicts]),
+        "widening": np.stack([made.calibration.widening for made, _ in found]),
+        "coverage": np.stack([made.calibration.coverage for made, _ in found]),
         "correlation": np.array([largest_correlation(one[:, :unknowns]) for one in particles]),
         "explained": np.array([one.explained for one in verdicts], np.int8),
         "doubt": np.array([one.doubt for one in verdicts]),
-        "worst_feature": np.array([one.worst for one in verdicts]),
-        "measured": np.stack([one.measured for one in verdicts]),
-        "predicted": np.stack([one.predicted for one in verdicts]),
-        "predicted_deviation": np.stack([one.deviation for one in verdicts]),
+        "worst_feature": np.array([own[v.worst] for v, own in zip(verdicts, places, strict=True)]),
+        **dict(zip(("measured", "predicted", "predicted_deviation"), fit, strict=True)),
     }

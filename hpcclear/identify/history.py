@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 
 DAY = 86400.0
@@ -45,8 +45,9 @@ def seconds_of(dates: tuple[str, ...], count: int) -> Array:
 
 
 def history(
-    times: Array, particles: Array, limit: float | None, rng: np.random.Generator
-) -> History | None:
+    times: Array, particles: Array, limit: float | None, rng: np.random.Generator,
+    explained: Booleans | None = None,
+) -> History | None:  # fmt: skip
     """Return the rate of growth, by least squares through posteriors of several dates; None for fewer than two dates.
 
     Parameters
@@ -58,7 +59,12 @@ def history(
     limit : float, optional
         SI; without it times are NaN.
     rng : Generator
+    explained : ndarray of bool, shape (m,), optional
+        Records that count: the posterior of a record that the model does not explain is not that of the machine.
     """
+    last = times[-1]
+    if explained is not None:
+        times, particles = times[explained], particles[explained]
     if len(times) < 2:
         return None
     drawn = np.stack([rng.permuted(one, axis=0) for one in particles])
@@ -71,7 +77,7 @@ def history(
     level = (weight[:, None] * drawn).sum(axis=0) / total
     left = np.full_like(rate, np.nan)
     if limit is not None:
-        now = level + rate * (times[-1] - centre)
+        now = level + rate * (last - centre)
         with np.errstate(divide="ignore", invalid="ignore"):
             left = np.where(now >= limit, 0.0, np.where(rate > 0.0, (limit - now) / rate, np.inf))
     levels = (0.025, 0.5, 0.975)

@@ -166,9 +166,9 @@ def _column(columns: list[Column], name: str, path: Path) -> Column:
 def _frequency(time: Array, values: Array, nominal: float) -> float:
     """Frequency of the crank, Hz: the one near the nominal at which the revolutions are most alike."""
     span = float(time[-1] - time[0])
-    if span * nominal < FEWEST:
-        return nominal
     own = values - values.mean()
+    if span * nominal < FEWEST or not own.any():
+        return nominal
     orders = np.arange(1, 13)
 
     def power(frequency: float) -> float:

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures import labels
+from hpcclear.report.merit import standing
 
 SAME = 0.01
 """Relative difference up to which a variable of two designs is called the same."""
@@ -15,10 +16,17 @@ NAMED = 3
 
 
 def words(ours: xr.Dataset, best: xr.Dataset) -> str:
-    """Return the designs that are equivalent to the best, and the range of their variables."""
+    """Return the designs that are equivalent to the best and satisfy the constraints, and the range of their variables."""
     twins = others(ours, best)
+    if not satisfies(best):
+        return "none: the constraints are not shown to be satisfied"
     if not twins:
-        return "none: every other design differs significantly"
+        left = (
+            ""
+            if all(map(satisfies, _each(ours)))
+            else " or is not shown to satisfy the constraints"
+        )
+        return f"none: every other design differs significantly{left}"
     shown = f"{_listed(twins)}: statistically indistinguishable, choose by cost"
     spans = _spans(ours.isel(design=np.isin(ours["design"], [best["design"].item(), *twins])))
     return f"{shown} ({spans})" if spans else shown
@@ -30,6 +38,8 @@ FLAT = 0.01
 
 def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     """Return the designs whose merit (n,) is within `FLAT` of the best, what they share, and the lightest; "" if none."""
+    if not satisfies(best):
+        return ""  # there is no recommended design
     least = float(merit.min())
     near = np.isfinite(merit) & (merit - least <= FLAT * abs(least))
     own = [*again(ours, best), str(best["design"].item())]
@@ -67,9 +77,24 @@ def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
 
 
 def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
-    """Return other designs that are statistically indistinguishable from the best."""
-    same = again(ours, best)
+    """Return other designs that are statistically indistinguishable from the best; all satisfy the constraints, or none is."""
+    if not satisfies(best):
+        return []
+    same = [
+        *again(ours, best),
+        *(str(one["design"].item()) for one in _each(ours) if not satisfies(one)),
+    ]
     return [name for name in _twins(ours, best) if name not in same]
+
+
+def satisfies(one: xr.Dataset) -> bool:
+    """Return whether a design significantly satisfies all constraints of its case."""
+    text = str(one["constraints"].item()) if "constraints" in one else ""
+    return standing(text) in ("", "kept")
+
+
+def _each(ours: xr.Dataset) -> list[xr.Dataset]:
+    return [ours.isel(design=k) for k in range(ours.sizes["design"])]
 
 
 def _listed(names: list[str]) -> str:
@@ -101,14 +126,12 @@ def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     """As the file states, else those whose confidence intervals overlap."""
     names = [str(name) for name in ours["design"].to_numpy()]
     own = str(best["design"].item())
-    if "same_as" in ours:
-        first = [
-            str(same) or name for same, name in zip(ours["same_as"].to_numpy(), names, strict=True)
-        ]
-        group = first[names.index(own)]
-        return [
-            name for name, one in zip(names, first, strict=True) if one == group and name != own
-        ]
+    if "equivalent" in ours:
+        stated = str(best["equivalent"].item()).split("; ")
+        return [name for name in names if name in stated]
+    if "same_as" in ours:  # of an earlier version: each design states the first before it only
+        first = dict(zip(names, map(str, ours["same_as"].to_numpy()), strict=True))
+        return [one for one in names if one != own and (first[one] == own or first[own] == one)]
     if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
         return []
     alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")

@@ -267,6 +267,10 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     level = float(verified.attrs.get("confidence", np.nan))
     text = f"{count} simulations of the recommended design"
     text += " by randomised quasi-Monte Carlo" if verified.attrs.get("method") == "qmc" else ""
+    if weighted := int(best.get("rare_samples", 0)):
+        text += (
+            f" and {weighted} weighted ones (importance sampling) for its probabilities of failure"
+        )
     if np.isfinite(level):
         paired = np.isfinite(float(best.get("mean_tolerance", np.nan)))
         covered = (
@@ -275,6 +279,8 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
             else "sampling error only"
         )
         text += f"; {level:.0%} confidence intervals, which cover {covered}"
+    if missed := str(best["accuracy_missed"].item()) if "accuracy_missed" in best else "":
+        text += f". Requested accuracy not reached: {missed}"
     errors = _surrogate_errors(best)
     if len(errors) == 2:
         text += f". Surrogate error: mean {errors[0]:+.1%}, standard deviation {errors[1]:+.1%}"

@@ -119,7 +119,7 @@ def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
         for k in range(verified.sizes["design"])
         if counts(one := verified.isel(design=k))
         and str(one["design"].item()).startswith(f"{case} ")
-        and standing(str(one["constraints"].item()) if "constraints" in one else "") != "broken"
+        and alike.satisfies(one)
     ]
     weights = {str(one["design"].item()): sum(map(float, masses(one))) for one in own}
     known = {name: weight for name, weight in weights.items() if np.isfinite(weight) and weight}

@@ -47,11 +47,20 @@ def _records(content: xr.Dataset) -> list[Line]:
             found.append(Line(_short(name), before + interval(content, k, u)))
         if content.sizes["unknown"] > 1 and int(content["explained"][k]):
             found.append(Line("together", before + _together(content, k)))
-    share = content["coverage"].to_numpy()
+        found.append(Line("calibration", before + _calibration(content, k)))
+    return found
+
+
+def _calibration(content: xr.Dataset, record: int) -> str:
+    share, factor = (
+        np.broadcast_to(content[name].to_numpy(), content["interval"].shape[:2])[
+            record
+        ]  # one row in older files
+        for name in ("coverage", "widening")
+    )
     shown = " and ".join(f"{one:.0%}" for one in share)
-    factor = " and ".join(f"{one:.2g}" for one in content["widening"].to_numpy())
-    text = f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {factor}"
-    return [*found, Line("calibration", text)]
+    wider = " and ".join(f"{one:.2g}" for one in factor)
+    return f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
 
 
 def _together(content: xr.Dataset, record: int) -> str:
@@ -98,12 +107,14 @@ def interval(content: xr.Dataset, record: int, unknown: int) -> str:
 def _growth(content: xr.Dataset) -> list[Line]:
     if "rate" not in content:
         return []
-    found = []
+    found, used = [], int(content["explained"].sum())
+    every = content.sizes["record"]
+    of = f", from the {used} of {every} records that the model explains" if used < every else ""
     for u, name in enumerate(content["unknown"].to_numpy()):
         unit = str(content["unit"].to_numpy()[u])
         low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
         found.append(
-            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high})")
+            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
         )
         if "limit" in content.attrs:
             days = [_days(float(one)) for one in content["time_to_limit"][:, u]]

@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
+from hpcclear.statistics.sensitivity.contributions import Falls
 
 HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
@@ -36,15 +37,16 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     if not len(rows):
         return
     names = own["input"].to_numpy()[rows]
-    together = own["together"].to_numpy()[rows] != 0
+    groups = (own["group"] if "group" in own else own["together"]).to_numpy()[rows]
     shares, falls = (
         (own[kind].to_numpy()[rows], own[f"{kind}_error"].to_numpy()[rows])
         for kind in ("contribution", "halved")
     )
-    parts = [(str(names[k]), *(one[k] for one in shares)) for k in np.flatnonzero(~together)]
-    if together.any():
-        joined = "+".join(map(str, names[together])) + " (correlated)"
-        parts.append((joined, *(one[together][0] for one in shares)))
+    parts = [(str(names[k]), *(one[k] for one in shares)) for k in np.flatnonzero(groups == 0)]
+    for group in dict.fromkeys(groups[groups > 0].tolist()):
+        its = groups == group
+        joined = "+".join(map(str, names[its])) + " (correlated)"
+        parts.append((joined, *(one[its][0] for one in shares)))
     text = (
         f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}"
     )
@@ -61,22 +63,34 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     )
     prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
-        yield Line("tighten first", _first(list(map(str, names)), *falls, prices))
+        joint = [float(own.get(f"halved_together{end}", np.nan)) for end in ("", "_error")]
+        singly = Falls.of(falls[0], lambda _: (joint[0], joint[1]))
+        yield Line("tighten first", _first(list(map(str, names)), singly, falls[1], prices))
 
 
-def _first(names: list[str], falls: np.ndarray, errors: np.ndarray, prices: np.ndarray) -> str:
-    """Which inputs to tighten first, three at most: those that bring most, or most for what it costs where that is known."""
+def to_tighten(
+    falls: np.ndarray, errors: np.ndarray, prices: np.ndarray
+) -> tuple[list[int], bool]:  # fmt: skip
+    """Return which inputs to tighten first, three at most, and whether by their prices: those that bring most, or most for
+    what it costs where that is known; `falls`, their `errors` and `prices` (n,)."""
     brings = falls > np.maximum(HALF_WIDTH * errors, WORTH)
-    known = prices.size and bool((prices[brings] > 0.0).all())
+    known = prices.size > 0 and bool((prices[brings] > 0.0).all())
     merit = falls / np.where(prices > 0.0, prices, 1.0) if known else falls
-    chosen = [k for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED]
+    return [int(k) for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED], known
+
+
+def _first(names: list[str], falls: Falls, errors: np.ndarray, prices: np.ndarray) -> str:
+    """Which inputs to tighten first, and by how much the scatter then falls."""
+    chosen, known = to_tighten(falls, errors, prices)
     if not chosen:
         return "none: no single input makes a significant part of the scatter"
-    left = 1.0 - (1.0 - (1.0 - falls[chosen]) ** 2).sum()  # variances of inputs add up
-    together = 1.0 - np.sqrt(max(left, 0.0))
     listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
+    fall, error = falls.together(chosen)
+    if not np.isfinite(fall):
+        return listed  # a file of an earlier version lacks it
     text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "
-    return text + f"{together:.0%}" + (", most for its cost" if known else "")
+    text += f"{fall:.0%} ± {_upwards(HALF_WIDTH * error, 0.01):.0%}"
+    return text + (", most for its cost" if known else "")
 
 
 def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
@@ -116,9 +130,11 @@ def share(name: str, value: float, half_width: float) -> str:
     """Return a share with its half-width; one that is no larger than it is stated as not different from 0."""
     if value > half_width:
         places = 0 if half_width >= COARSE else 1
-        step = 10.0 ** -(places + 2)
-        shown = (
-            max(np.ceil(half_width / step - 1e-9), 1.0) * step
-        )  # up: it is no narrower than it is
+        shown = _upwards(half_width, 10.0 ** -(places + 2))
         return f"{name} {value:.{places}%} ± {shown:.{places}%}"
     return f"{name} below {max(half_width, value):.1%}"
+
+
+def _upwards(half_width: float, step: float) -> float:
+    """A half-width in whole steps, no narrower than it is."""
+    return float(max(np.ceil(half_width / step - 1e-9), 1.0) * step)

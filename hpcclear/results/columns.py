@@ -208,6 +208,8 @@ VERIFICATION: Columns = {
     "life_deviation_lower": number(("design",), "objective", "lower end of its confidence interval"),
     "life_deviation_upper": number(("design",), "objective", "upper end of its confidence interval"),
     "same_as": text(("design",), "earlier design that is statistically indistinguishable in mean and standard deviation"),
+    "equivalent": text(("design",), "designs of its case, statistically indistinguishable in mean and standard deviation"),
+    "accuracy_missed": text(("design",), "quantities whose confidence interval is wider than study.accuracy requests"),
     "dominated": flag(("design",), "whether another design of its case is significantly better in mean and standard deviation"),
     "mean_within": number(("design",), "1",
         "relative half-width of the confidence interval of the mean, error of the tolerance included"),
@@ -220,7 +222,8 @@ VERIFICATION: Columns = {
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "verdicts on the constraints of its case"),
     "constraint_excess": number(("design",), "1",
-        "largest violation of a constraint by the estimates, relative to the threshold; at most 0 without a violation"),
+        "largest violation of a constraint, relative to the threshold, at most 0 without; of limits always exceeded with the "
+        "relative distance"),
     "samples": count(("design",), "number of simulations"),
     "rare_samples": count(("design",), "number of additional simulations that decide rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
@@ -247,9 +250,13 @@ CONTRIBUTIONS: Columns = {
     "halved": number(("design", "input"), "1",
         "relative reduction of the standard deviation if the scatter of an input is halved", required=True),
     "halved_error": number(("design", "input"), "1", "standard error of it", required=True),
+    "halved_together": number(("design",), "1",
+        "relative reduction of the standard deviation if the scatter of the inputs to tighten first is halved at once"),
+    "halved_together_error": number(("design",), "1", "standard error of it"),
     "halving_cost": number(("design", "input"), "1", "additional cost of halving the scatter of an input"),
     "unexplained": number(("design",), "1", "share of the variance that no input or pair explains", required=True),
     "unexplained_error": number(("design",), "1", "standard error of it"),
+    "group": count(("design", "input"), "number of the group of correlated inputs that share one contribution; 0 for none"),
     "together": flag(("input",), "whether the input is correlated with others and shares one contribution with them"),
 }
 

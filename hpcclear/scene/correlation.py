@@ -71,6 +71,22 @@ class Correlation(Table):
         np.fill_diagonal(found, 1.0)
         return found
 
+    def groups(self, names: Sequence[str]) -> list[int]:
+        """Return the number of the group of each of some inputs, from 1 on in their order; 0 of independent ones.
+
+        Inputs are in one group where a chain of correlated inputs among them joins them.
+        """
+        own = [name for name in self.inputs if name in names]
+        joined = np.array(self.matrix)[np.ix_(*2 * [[self.inputs.index(n) for n in own]])] != 0.0
+        for _ in own:  # every step doubles the length of the chains
+            joined = joined @ joined
+        blocks = {
+            name: frozenset(np.flatnonzero(row)) for name, row in zip(own, joined, strict=True)
+        }
+        several = [blocks[name] for name in names if len(blocks.get(name, ())) > 1]
+        order = list(dict.fromkeys(several))
+        return [order.index(blocks[n]) + 1 if blocks.get(n) in order else 0 for n in names]
+
     def together(self, names: Sequence[str], chances: Sequence[Array]) -> list[Array]:
         """Probabilities that vary together, from independent ones.
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.report.scatter import to_tighten
 from hpcclear.results import dataset
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.points import Points
@@ -17,6 +18,7 @@ from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
 _NAMES = ("contribution", "contribution_error", "halved", "halved_error")
+_OF_ALL = ("halved_together", "halved_together_error", "unexplained", "unexplained_error")
 
 
 def inputs_of(run: StudyRun) -> list[str]:
@@ -44,11 +46,16 @@ def of_designs(
     -------
     dict of arrays
         ``contribution``, ``halved`` and their ``_error``, (n, inputs), as `hpcclear.statistics.sensitivity.contributions` has
-        them, NaN for inputs that do not belong to a design's case; ``unexplained`` and ``unexplained_error``, (n,).
+        them, and ``group``, 0 of independent inputs; NaN for inputs that do not belong to a design's case;
+        ``halving_cost``, (n, inputs), NaN where it is not known; ``halved_together`` of the inputs to tighten first,
+        ``unexplained``, and their ``_error``, (n,).
     """
     names = inputs_of(run)
-    result: Result = {name: np.full((len(choices), len(names)), np.nan) for name in _NAMES}
-    result["unexplained"], result["unexplained_error"] = np.full((2, len(choices)), np.nan)
+    result: Result = {
+        name: np.full((len(choices), len(names)), np.nan) for name in (*_NAMES, "group")
+    }
+    result |= {name: np.full(len(choices), np.nan) for name in _OF_ALL}
+    result["halving_cost"] = _prices(run, choices, names)
     for row, (choice, one) in enumerate(zip(choices, made, strict=True)):
         f = one[0]
         random = run.study.case(choice.case).random
@@ -57,19 +64,22 @@ def of_designs(
         count = f.size // REPLICATES  # plain draws in as many parts
         values = points.values[: REPLICATES * count, own].reshape(REPLICATES, count, len(own))
         its = f.ravel()[: REPLICATES * count].reshape(REPLICATES, count)
-        found = contributions(values, its, _groups(run, random))
+        together = run.study.correlation
+        groups = [0] * len(random) if together is None else together.groups(random)
         columns = [names.index(name) for name in random]
+        result["group"][row, columns] = groups
+        apart = [group or -k for k, group in enumerate(groups, 1)]
+        found = contributions(values, its, apart)
         parts = (found.share, found.share_error, found.halved, found.halved_error)
         for name, part in zip(_NAMES, parts, strict=True):
             result[name][row, columns] = part
-        result["unexplained"][row], result["unexplained_error"][row] = found.rest, found.rest_error
+        first = to_tighten(found.halved, found.halved_error, result["halving_cost"][row, columns])[
+            0
+        ]
+        both = (*found.halved.together(first), found.rest, found.rest_error)
+        for name, number in zip(_OF_ALL, both, strict=True):
+            result[name][row] = number
     return result
-
-
-def _groups(run: StudyRun, random: Sequence[str]) -> list[int]:
-    """A number for each input, the same for those that vary together."""
-    joined = () if run.study.correlation is None else run.study.correlation.inputs
-    return [len(random) if name in joined else k for k, name in enumerate(random)]
 
 
 def _prices(run: StudyRun, choices: Sequence[Choice], names: Sequence[str]) -> Array:
@@ -91,12 +101,11 @@ def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
     """Write contributions.nc; `found` of `of_designs`, (n, ...) each."""
     names = inputs_of(run)
     coords = {"design": np.array([one.name for one in choices]), "input": np.array(names)}
-    joined = () if run.study.correlation is None else run.study.correlation.inputs
-    data = {name: found[name] for name in (*_NAMES, "unexplained", "unexplained_error")}
-    prices = _prices(run, choices, names)
-    if np.isfinite(prices).any():
-        data["halving_cost"] = prices
-    data["together"] = np.array([name in joined for name in names], np.int8)
+    data = {name: found[name] for name in (*_NAMES, *_OF_ALL)}
+    if np.isfinite(found["halving_cost"]).any():
+        data["halving_cost"] = found["halving_cost"]
+    data["group"] = np.nan_to_num(found["group"]).astype(np.int64)
+    data["together"] = np.array((data["group"] > 0).any(axis=0), np.int8)
     run.write(
         dataset.dataset("contributions", coords, data, objective=run.scene.objective),
         "contributions.nc",

@@ -76,21 +76,38 @@ def accurate(goal: Goal, one: GoalValue, accuracy: MomentAccuracy, part: float =
     return bool(half <= share * (abs(one.value) if relative else 1.0))
 
 
-def excess(kept: Sequence[Constraint], values: Array) -> Array:
+def excess(kept: Sequence[Constraint], values: Array, further: Array | float = 0.0) -> Array:
     """By how much constraints are broken, relative to their thresholds, the worst of them; (n, constraints) to (n,).
 
-    At most 0 where all are kept, NaN where one is not known, -inf without any.
+    At most 0 where all are kept, NaN where one is not known, -inf without any. `further` is added, (n, constraints): of
+    `beyond`, since probabilities of 1 are all alike.
     """
     if not kept:
         return np.full(len(values), -np.inf)
     most = np.array([one.most for one in kept])
-    return np.asarray(((values - most) / np.where(most != 0.0, abs(most), 1.0)).max(axis=1))
+    broken = (values - most) / np.where(most != 0.0, abs(most), 1.0)
+    return np.asarray((broken + further).max(axis=1))
 
 
 def shortfall(goal: Goal, most: float, values: Array) -> Array:
-    """By how much reliability indices of probabilities of failure fall short of what a constraint needs, f (n, s) to (n,)."""
+    """By how much reliability indices of probabilities of failure fall short of what a constraint needs, f (n, s) to (n,);
+    where all values fail, how far they lie beyond the limit counts."""
     assert goal.limit is not None  # by validation
-    return np.asarray(tail.of_share(most) - tail.index(values, goal.limit))
+    index = np.maximum(tail.index(values, goal.limit), -tail.ALL)
+    return np.asarray(tail.of_share(most) - index + tail.beyond(values, goal.limit))
+
+
+def beyond(goal: Goal, values: Array) -> float:
+    """How far even the lowest values of f (k, replicates, n), NaN where failed, lie above the limit of a probability, over the
+    limit; 0 of other constraints and of too few values."""
+    if goal.statistic != "exceedance":
+        return 0.0
+    assert goal.limit is not None  # by validation
+    own = values[goal.place] if values.ndim == 3 else values
+    known = own[np.isfinite(own)]
+    return (
+        float(tail.beyond(known[None], goal.limit)[0]) if len(known) >= replicates.FEWEST else 0.0
+    )
 
 
 def steered(kept: Sequence[Constraint], values: Array, design: Mapping[str, float]) -> float:

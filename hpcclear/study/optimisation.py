@@ -102,15 +102,13 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
         run.ranks.raise_if_stopped()
         return problem.searched(problem.physical(coordinates))
 
-    def nearest(coordinates: Array) -> Array:
-        """Where no design keeps the constraints: how much it breaks them, and the first objective."""
-        values, broken = function(coordinates)
-        return np.column_stack([broken, values[:, 0]])
+    def broken(coordinates: Array) -> Array:
+        return np.asarray(function(coordinates)[1])[:, None]
 
     front = _minimised(run, problem, function, len(problem.case.goals), rng)
     if len(front.values):
         return front
-    near = _minimised(run, problem, nearest, 2, rng)
+    near = _minimised(run, problem, broken, 1, rng)  # no design keeps the constraints: the nearest
     return replace(near, values=np.asarray(function(near.points)[0]))
 
 

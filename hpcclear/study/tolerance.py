@@ -331,7 +331,9 @@ def reached(run: StudyRun, true: Result, names: Sequence[str]) -> tuple[str, lis
             f"Chaotic motion hides the error of the integration tolerance: its standard error is {_percents(doubt)}."
         )
     missed = [
-        name for name, row in zip(names, within, strict=True) if not (row <= 1.0001 * wanted).all()
+        name
+        for name, row in zip(names, within, strict=True)
+        if not (row <= verification.ROUND_OFF * wanted).all()
     ]
     if run.study.paired and missed and not (share > limit).any():
         remarks.append(

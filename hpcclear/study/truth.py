@@ -318,7 +318,8 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
         then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``taken`` (by the tolerance), ``counted``, ``standing``
         and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
-        `hpcclear.study.goals.steered`; ``samples``, ``failed``, ``beyond_hertz``.
+        `hpcclear.study.goals.steered`; ``beyond`` (n, constraints): of `hpcclear.study.goals.beyond`; ``samples``, ``failed``,
+        ``beyond_hertz``.
     """
     settings = run.study.verification
     most = max(len(case.goals) + len(case.kept) for case in run.study.cases)
@@ -352,6 +353,7 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         row["taken"] = [0.0] * len(certain) + missing
         row["counted"] = [float(values.size)] * len(certain) + missing
         row["excess"] = goals.steered(kept, whole, choice.design)
+        row["beyond"] = [goals.beyond(goal, whole) for goal in kept] + missing
         row["sure_lower"] = [one.lower for one in certain] + missing
         row["sure_upper"] = [one.upper for one in certain] + missing
         rows.append(row)

@@ -7,17 +7,21 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.objectives import ORDINALS
+from hpcclear.report.merit import USUAL
 from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import verdicts
-from hpcclear.study.goals import excess, most_of, names_of
+from hpcclear.study.goals import excess, most_of, names_of, wanted
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.problem import problem_of
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.verdicts import Standing
+
+ROUND_OFF = 1.0001
+"""Half-width over the one requested up to which an accuracy is reached."""
 
 ON_BOUND = 5e-3
 """Share of a variable's range within which a design sits on its bound."""
@@ -75,6 +79,8 @@ class Table:
         Number of each in what was simulated.
     same_as : list of str
         The first design before it that it is statistically indistinguishable from; empty if there is none.
+    equivalent : list of str
+        All designs of its case that it is statistically indistinguishable from, separated by "; ".
     dominated : list of bool
         Whether another design of its case is significantly better in all that the case makes small.
     """
@@ -82,6 +88,7 @@ class Table:
     choices: list[Choice]
     rows: list[int]
     same_as: list[str]
+    equivalent: list[str]
     dominated: list[bool]
 
 
@@ -93,7 +100,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     study's confidence it is the best in the others. Each design of the front is significantly better than each
     other in one of them. They are chosen among the designs that significantly satisfy all constraints, if there are any.
     """
-    table = Table([], [], [], [])
+    table = Table([], [], [], [], [])
     for case in run.study.cases:
         rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
         _name_case(run, case, rows, choices, true, table)
@@ -114,7 +121,7 @@ def _name_case(
     everything = Compared(values, shifts, run.study.verification.confidence)
     ours = [k for k, row in enumerate(rows) if choices[row].origin == "search"]
     if kept:
-        broken = excess(kept, true["goal"][rows, count : count + len(kept)])
+        broken = _broken(case, true)[rows]
         ours = _nearest(ours, true["standing"][rows, : len(kept)].max(axis=1), broken)
     mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
     known = mine.known.any()
@@ -136,6 +143,8 @@ def _name_case(
         table.choices.append(replace(choices[rows[k]], name=name))
         table.rows.append(rows[k])
         table.same_as.append(next((label for j, label in seen if everything.one[j, k]), ""))
+        alike = [label for j, label in named if everything.one[j, k] and label != name]
+        table.equivalent.append("; ".join(alike))
         table.dominated.append(bool(everything.beaten[k]))
         seen.append((k, name))
 
@@ -185,20 +194,43 @@ def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
     )
     data["constraints"] = np.array([verdicts.words(case, unit, *row) for case, *row in rows])
     if any(case.kept for case in cases):
-        data["constraint_excess"] = _excess(cases, true)
+        each = {case.name: _broken(case, true) for case in cases}
+        found = np.array([each[case.name][row] for row, case in enumerate(cases)])
+        data["constraint_excess"] = np.where(np.isneginf(found), np.nan, found)
     return data
 
 
-def _excess(cases: Sequence[Case], true: Result) -> Array:
-    """By how much each design breaks the constraints of its case by its estimates, NaN where it has none."""
-    rows = zip(cases, true["goal"], strict=True)
-    found = np.array(
-        [
-            excess(case.kept, row[None, len(case.goals) :][:, : len(case.kept)])[0]
-            for case, row in rows
-        ]
-    )
-    return np.where(np.isneginf(found), np.nan, found)
+def _broken(case: Case, true: Result) -> Array:
+    """By how much designs break the constraints of a case by their estimates, (n,); the designs that fail always, by how far
+    they lie beyond the limit."""
+    count, size = len(case.goals), len(case.kept)
+    return excess(case.kept, true["goal"][:, count : count + size], true["beyond"][:, :size])
+
+
+def _missed(run: StudyRun, table: Table, true: Result) -> Array:
+    """Of each design what is known less well than the accuracy of the study, "mean ± 0.4 % (requested 0.2 %)"."""
+    accuracy, unit = run.study.wanted, run.scene.objective.unit
+    texts = []
+    for k, choice in enumerate(table.choices):
+        known = [
+            ("mean", true["mean_reach"][k] / abs(true["mean"][k]), accuracy.mean),
+            ("standard deviation", true["deviation_reach"][k] / true["deviation"][k], accuracy.deviation),
+        ]  # fmt: skip
+        for column, goal in enumerate(run.study.case(choice.case).goals):
+            if goal.exact or goal.words(unit) in USUAL[:2]:
+                continue
+            half = (true["goal_upper"][k, column] - true["goal_lower"][k, column]) / 2.0
+            share, relative = wanted(goal, accuracy)
+            half /= abs(true["goal"][k, column]) if relative else 1.0
+            known.append((goal.words(unit), half, share))
+        texts.append(
+            ", ".join(
+                f"{words} ± {100.0 * half:.2g} % (requested {100.0 * share:.2g} %)"
+                for words, half, share in known
+                if half > ROUND_OFF * share
+            )
+        )
+    return np.array(texts)
 
 
 def write(
@@ -256,6 +288,9 @@ def write(
     if true["rare_samples"].any():
         data["rare_samples"] = true["rare_samples"].astype(np.int64)
     data["same_as"] = np.array(table.same_as)
+    data["equivalent"] = np.array(table.equivalent)
+    if study.paired:
+        data["accuracy_missed"] = _missed(run, table, true)
     data["dominated"] = np.array(table.dominated, np.int8)
     data["random"] = np.array([" ".join(study.case(choice.case).random) for choice in choices])
     data["on_bounds"] = np.array([_on_bounds(run, choice) for choice in choices])
@@ -269,7 +304,7 @@ def write(
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
-        for name in ("same_as", "dominated"):
+        for name in ("same_as", "equivalent", "dominated"):
             words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence

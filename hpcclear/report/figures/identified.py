@@ -104,6 +104,7 @@ def growth_figure(content: xr.Dataset) -> "Figure":
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):
         unit = str(content["unit"].to_numpy()[u])
+        good = content["explained"].to_numpy() != 0
         low, middle, high = (content["interval"][:, u, k].to_numpy() for k in range(3))
         scale = labels.scale(unit, high)
         panel.errorbar(
@@ -111,7 +112,7 @@ def growth_figure(content: xr.Dataset) -> "Figure":
             color=style.PALETTE["blue"], capsize=2.0, label="median, 95 % interval",
         )  # fmt: skip
         rate = float(content["rate"][1, u]) * DAY
-        line = np.mean(middle) + rate * (days - np.mean(days))
+        line = np.mean(middle[good]) + rate * (days - np.mean(days[good]))
         panel.plot(days, scale.factor * line, color=style.PALETTE["grey"], label="median rate")
         if "limit" in content.attrs:
             limit = scale.factor * float(content.attrs["limit"])

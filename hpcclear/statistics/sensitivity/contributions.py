@@ -1,18 +1,19 @@
 """Which input makes how much of the scatter of f, and what less scatter of it would bring, from samples that are there.
 
 f is fitted by a cubic of each input and by products of each two, all standardised. What the terms of an input explain is its
-contribution; inputs that vary together have one in common. With the scatter of an input halved the fitted values are those at
-half its distance from the mean; what the fit does not explain stays as it is. Errors come from leaving out one replicate at a
-time (jackknife), since points of one sequence are no independent ones.
+contribution; inputs that vary together have one in common. With the scatter of inputs halved the fitted values are those at
+half their distances from the mean, correlations as they were; what the fit does not explain stays as it is. Errors come from
+leaving out one replicate at a time (jackknife), since points of one sequence are no independent ones.
 
 Sources: A. Saltelli et al., "Global Sensitivity Analysis: The Primer" (2008), doi:10.1002/9780470725184; B. Sudret, "Global
 sensitivity analysis using polynomial chaos expansions", Reliab. Eng. Syst. Saf. 93 (2008), doi:10.1016/j.ress.2007.04.002;
 B. Efron and C. Stein, "The jackknife estimate of variance", Ann. Statist. 9 (1981), doi:10.1214/aos/1176345462.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,26 @@ FEWEST = 4
 """Values for each term of the fit, at least."""
 
 
+class Falls(np.ndarray[Any, np.dtype[np.float64]]):
+    """Relative falls of the standard deviation of f with half the scatter of one input each, shape (inputs,).
+
+    With the scatter of several inputs halved at once, it does not follow from these: correlations and interactions count.
+    """
+
+    _joint: Callable[[Sequence[int]], tuple[float, float]]
+
+    @classmethod
+    def of(cls, each: Array, joint: Callable[[Sequence[int]], tuple[float, float]]) -> "Falls":
+        """Return the falls `each`, (inputs,); `joint` is what `together` returns."""
+        found = np.asarray(each, float).view(cls)
+        found._joint = joint
+        return found
+
+    def together(self, chosen: Sequence[int]) -> tuple[float, float]:
+        """Return the fall with the scatter of these inputs halved at once, and its standard error."""
+        return self._joint(chosen)
+
+
 @dataclass(frozen=True)
 class Contributions:
     """Of the inputs of one design; all NaN where there are too few values, 0 where f does not scatter.
@@ -36,15 +57,16 @@ class Contributions:
     ----------
     share, share_error : array, shape (inputs,)
         Of the variance of f; inputs of one group have the same number, which is that of the group.
-    halved, halved_error : array, shape (inputs,)
-        By how much the standard deviation of f falls with half the scatter of an input, over it.
+    halved : Falls, shape (inputs,)
+        By how much the standard deviation of f falls with half the scatter of an input, over it; or of several together.
+    halved_error : array, shape (inputs,)
     rest, rest_error : float
         Share of the variance that no input explains by the fit.
     """
 
     share: Array
     share_error: Array
-    halved: Array
+    halved: Falls
     halved_error: Array
     rest: float
     rest_error: float
@@ -63,25 +85,39 @@ def contributions(inputs: Array, f: Array, groups: Sequence[int]) -> Contributio
         Inputs of one number vary together.
     """
     size, good = inputs.shape[2], np.isfinite(f)
-    nothing = np.full(size, np.nan)
-    unknown = Contributions(nothing, nothing, nothing, nothing, np.nan, np.nan)
     terms = _terms(size)
     if len(f) < 2 or good.sum() < FEWEST * (len(terms) + 1):
-        return unknown
+        return _always(np.nan, size)
     middle, scale = inputs[good].mean(axis=0), inputs[good].std(axis=0)
     x = (inputs - middle) / np.where(scale > 0.0, scale, 1.0)
     level = float(f[good].mean())
     if not float(f[good].std()) > 1e-9 * abs(level):
-        none = np.zeros(size)
-        return Contributions(none, none, none, none, 0.0, 0.0)
+        return _always(0.0, size)
     moments = np.array(
         [_moments(x[k][good[k]], f[k][good[k]] - level, terms) for k in range(len(f))]
     )
-    whole = _found(moments.sum(axis=0), terms, groups)
-    left = np.array([_found(moments.sum(axis=0) - one, terms, groups) for one in moments])
-    errors = np.sqrt((len(f) - 1.0) / len(f) * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
-    rest = float(whole[-1]), float(errors[-1])
-    return Contributions(whole[:size], errors[:size], whole[size:-1], errors[size:-1], *rest)
+    whole = _Fit(moments.sum(axis=0), terms)
+    left = [_Fit(moments.sum(axis=0) - one, terms) for one in moments]
+
+    def estimated(of: Callable[[_Fit], Sequence[float]]) -> tuple[Array, Array]:
+        each = np.array([of(fit) for fit in left])
+        squares = ((each - each.mean(axis=0)) ** 2).sum(axis=0)
+        return np.array(of(whole)), np.sqrt((len(f) - 1.0) / len(f) * squares)
+
+    def joint(chosen: Sequence[int]) -> tuple[float, float]:
+        value, error = estimated(lambda fit: [fit.fall(chosen)])
+        return float(value[0]), float(error[0])
+
+    shares = estimated(lambda fit: fit.shares(groups))
+    falls, errors = estimated(lambda fit: [fit.fall([k]) for k in range(size)])
+    rest, doubt = estimated(lambda fit: [fit.rest])
+    return Contributions(*shares, Falls.of(falls, joint), errors, float(rest[0]), float(doubt[0]))
+
+
+def _always(value: float, size: int) -> Contributions:
+    """One number for all that would be found."""
+    each = np.full(size, value)
+    return Contributions(each, each, Falls.of(each, lambda _: (value, value)), each, value, value)
 
 
 Term = tuple[tuple[int, ...], int]
@@ -100,28 +136,40 @@ def _moments(x: Array, f: Array, terms: Sequence[Term]) -> Array:
     return np.asarray(table.T @ table)
 
 
-def _found(moments: Array, terms: Sequence[Term], groups: Sequence[int]) -> Array:
-    """Shares, falls of the standard deviation, and the rest, (2 d + 1,)."""
-    size, count = len(groups), float(moments[0, 0])
-    means = moments[0, 1:] / count
-    covariance = moments[1:, 1:] / count - np.outer(means, means)
-    within, against, variance = covariance[:-1, :-1], covariance[:-1, -1], float(covariance[-1, -1])
-    weights = np.asarray(np.linalg.lstsq(within, against, rcond=1e-12)[0], float)
+class _Fit:
+    """The fit of f by all terms, from their moments."""
 
-    def explained(its: Array) -> float:
-        return float(its @ within @ its)
+    def __init__(self, moments: Array, terms: Sequence[Term]) -> None:
+        self.terms, self.count = terms, float(moments[0, 0])
+        means = moments[0, 1:] / self.count
+        covariance = moments[1:, 1:] / self.count - np.outer(means, means)
+        self.within, self.variance = covariance[:-1, :-1], float(covariance[-1, -1])
+        found = np.linalg.lstsq(self.within, covariance[:-1, -1], rcond=1e-12)[0]
+        self.weights = np.asarray(found, float)
+        self.fitted = self._explained(self.weights)
+        left = max(self.variance - self.fitted, 0.0)
+        self.noise = left * self.count / max(self.count - len(terms) - 1.0, 1.0)
 
-    fitted = explained(weights)
-    noise = max(variance - fitted, 0.0) * count / max(count - len(terms) - 1.0, 1.0)
-    shares, falls = np.empty(size), np.empty(size)
-    for group in set(groups):
-        own = np.array([all(groups[i] == group for i in which) for which, _ in terms])
-        part = (
-            explained(np.where(own, weights, 0.0)) - noise * own.sum() / count
-        )  # a fit explains noise, too
-        shares[[i for i in range(size) if groups[i] == group]] = max(part, 0.0) / variance
-    for i in range(size):
-        less = np.array([LESS**power if i in which else 1.0 for which, power in terms])
-        change = explained(weights * less) - fitted
-        falls[i] = 1.0 - np.sqrt(max(variance + change, 0.0) / variance)
-    return np.concatenate([shares, falls, [min(noise / variance, 1.0)]])
+    def _explained(self, weights: Array) -> float:
+        return float(weights @ self.within @ weights)
+
+    @property
+    def rest(self) -> float:
+        """Share of the variance that is not explained."""
+        return min(self.noise / self.variance, 1.0)
+
+    def shares(self, groups: Sequence[int]) -> list[float]:
+        """Of the variance, of the group of each input."""
+        found = {}
+        for group in set(groups):
+            own = np.array([all(groups[i] == group for i in which) for which, _ in self.terms])
+            part = self._explained(np.where(own, self.weights, 0.0))
+            part -= self.noise * own.sum() / self.count  # a fit explains noise, too
+            found[group] = max(part, 0.0) / self.variance
+        return [found[group] for group in groups]
+
+    def fall(self, chosen: Sequence[int]) -> float:
+        """Of the standard deviation with the scatter of these inputs halved."""
+        less = [LESS ** (power * sum(i in chosen for i in which)) for which, power in self.terms]
+        change = self._explained(self.weights * less) - self.fitted
+        return 1.0 - float(np.sqrt(max(self.variance + change, 0.0) / self.variance))
