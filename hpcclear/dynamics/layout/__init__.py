@@ -14,7 +14,9 @@ from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 
 TURN = 6.283185307179586  # rad
 
-MAX_COORDINATES = 24
+MAX_COORDINATES = 88
+"""Coordinates that a sample may have, bristles included. 24 and a multiple of 64, as `OWN` has 192 and one: rows that a step reads
+keep their places in the sets of a first-level cache, and a scene of few coordinates its speed. Only rows in use are touched."""
 
 
 class Effects(NamedTuple):
@@ -142,7 +144,7 @@ FILM_STEEPNESS = OF_JOINT(
 )
 JOINT_ROWS = OF_JOINT.end
 JOINT_BLOCKS = OF_SAMPLE("of all joints, one behind the other", size=MAX_JOINTS * JOINT_ROWS)
-OWN = OF_SAMPLE("what a linkage has of its own", size=192)
+OWN = OF_SAMPLE("what a linkage has of its own", size=192 + 16 * 64)
 WAVES = OF_SAMPLE(
     "of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each another, its slope's",
     size=2 * WAVE_ROWS,

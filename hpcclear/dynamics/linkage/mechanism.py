@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Acting,
@@ -30,8 +31,6 @@ from hpcclear.dynamics.linkage.parts import (
     split,
 )
 
-MOST_COORDINATES = 24
-MOST_CONTACTS = 8
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -385,13 +384,8 @@ def _sizes(m: Mechanism) -> None:
             f"{-free} too many degrees of freedom",
             "Give a joint clearance, remove one, or remove a drive",
         )  # fmt: skip
-    free += modes_of(m)
-    if free > MOST_COORDINATES:
+    if len(m.contacts) > MAX_JOINTS:
         raise InputError(
-            "bodies", free, f"more than {MOST_COORDINATES} degrees of freedom", "Use ideal joints"
-        )
-    if len(m.contacts) > MOST_CONTACTS:
-        raise InputError(
-            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints (four in a guide, two in a slot)",
+            "joints", len(m.contacts), f"more than {MAX_JOINTS} contacts in joints (four in a guide, two in a slot)",
             "Make some of the joints ideal",
         )  # fmt: skip
