@@ -466,7 +466,6 @@ class Rules(NamedTuple):
 
     latched: int  # impacts are located, and their speed is kept
     free: int  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
-    turning: int  # its angle is a coordinate, whoever drives it
     responses: int
     impacts: int  # contacts are counted
     profile: int  # where around joints sliding work is done is recorded
@@ -478,9 +477,8 @@ class Rules(NamedTuple):
 def rules_of(effects: Effects) -> Rules:
     """Those of a set of effects."""
     e = effects
-    turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
-    flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
+    flags = (e.latched, e.torque, e.responses, e.impacts, e.profile, largest)
     places = places_of(e)
     return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop])
 

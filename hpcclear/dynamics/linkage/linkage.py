@@ -14,7 +14,7 @@ from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import curves_of
 from hpcclear.dynamics.linkage.poses import Pose, Poses
@@ -204,12 +204,21 @@ class Linkage:
 
     def gained(self, body: str) -> float:
         """Return by how much a body turns in a revolution, rad, where its angle restarts with each: of a drive that prescribes
-        it by the time in the revolution, and of the coordinate that gives the period."""
+        it by the time in the revolution, of the coordinate that gives the period, and of what springs couple to these."""
         main, frame = self.mechanism.period, self.forest.frames[body]
         drive = self.forest.prescribed.get(frame)
-        if drive is None:
-            return main.advance if frame == self.forest.frames[main.body] else 0.0
-        return drive.advance * round(main.seconds / drive.seconds)
+        if drive is None and frame != self.forest.frames[main.body]:
+            with_it = next(names for names in self._coupled if body in names)
+            if main.body in with_it:
+                drive = main
+            else:
+                drive = next((d for d in self.forest.prescribed.values() if d.body in with_it), None)
+            return 0.0 if drive is None else gain_of(self.mechanism, drive)
+        return gain_of(self.mechanism, drive or main)
+
+    @cached_property
+    def _coupled(self) -> list[set[str]]:
+        return coupled(self.mechanism)
 
 
 def _with_impacts(on: On) -> On:

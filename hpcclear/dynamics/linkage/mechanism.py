@@ -211,29 +211,56 @@ def _places(m: Mechanism) -> None:
             )  # fmt: skip
 
 
-def _turned(m: Mechanism) -> None:
-    """Bodies whose angles loads act by can turn, and do not go round and round with the revolutions."""
+def coupled(m: Mechanism) -> list[set[str]]:
+    """Bodies whose angles the joints or loads compare with one another, the ground's first: sets of names."""
     groups = joined(m, (Slide, Fixed))
-    still = next((names for names in groups if GROUND in names), set())
-    round_ = next((names for names in groups if m.drives and m.period.body in names), set())
+    for load in m.loads:
+        if isinstance(load, Acting) and load.by_angle and (other := getattr(load, "other", None)):
+            touched = [names for names in groups if names & {load.body, other}]  # type: ignore[attr-defined]
+            rest = [names for names in groups if not names & {load.body, other}]  # type: ignore[attr-defined]
+            groups = [set().union(*touched), *rest]
+    return sorted(groups, key=lambda names: GROUND not in names)
+
+
+def gain_of(m: Mechanism, drive: Drive) -> float:
+    """By how much the body of a prescribed drive, or of the one that gives the period, turns in a revolution, rad."""
+    main = m.period
+    if drive is main or not main.prescribed:
+        return main.advance
+    return drive.advance * round(main.seconds / drive.seconds)
+
+
+def _turned(m: Mechanism) -> None:
+    """Bodies whose angles loads act by can turn, and the angle does not go round and round with the revolutions: that of one
+    body, or between two."""
+    still, *_ = joined(m, (Slide, Fixed))
+    gains: dict[str, set[float]] = {}
+    for names in coupled(m):
+        driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
+        gains |= dict.fromkeys(names, {gain_of(m, drive) for drive in driven})
     for load in m.loads:
         if not isinstance(load, Acting):
             continue
-        for entry in ("body", "other"):
-            body = getattr(load, entry, None)
-            if body in still:
+        body, other = (getattr(load, entry, None) for entry in ("body", "other"))
+        for entry, name in (("body", body), ("other", other)):
+            if name in still:
                 raise InputError(
-                    f"loads.{load.name}.{entry}",
-                    body,
-                    "this body cannot rotate",
+                    f"loads.{load.name}.{entry}", name, "this body cannot rotate",
                     "Name a body that does",
-                )
-            if load.by_angle and body in round_ and m.period.advance:
-                raise InputError(
-                    f"loads.{load.name}.{entry}", body,
-                    "this body goes round with every revolution, so that its angle has no end",
-                    "Name a body that swings",
                 )  # fmt: skip
+        if load.by_angle and other is None and gains[str(body)] - {0.0}:
+            raise InputError(
+                f"loads.{load.name}.body", body,
+                "this body goes round with every revolution, so that its angle has no end",
+                "Name a body that swings, or another one with `other` that goes round with it",
+            )  # fmt: skip
+        if load.by_angle and other is not None and len(gains[str(body)]) > 1:
+            raise InputError(
+                f"loads.{load.name}.other", other,
+                f"drives turn this body and {body!r} by different angles in a revolution, so that the angle between them has "
+                "no end",
+                "Couple bodies that go round together",
+            )  # fmt: skip
 
 
 def _looked_up(m: Mechanism) -> None:

@@ -445,8 +445,11 @@ class Acting:
     name: str
     kind: ClassVar[str]
     """That the scene names."""
-    by_angle: ClassVar[bool] = False
-    """Whether it goes by the angle of a body, which must not go round with the revolutions."""
+
+    @property
+    def by_angle(self) -> bool:
+        """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
+        return False
 
     @classmethod
     def of(cls, table: object) -> Self:
