@@ -27,6 +27,7 @@ from hpcclear.dynamics.linkage.parts import (
     Drive,
     Force,
     Revolute,
+    Release,
     RunUp,
     Slide,
     Spring,
@@ -117,7 +118,7 @@ class _Generator:
         for load in self.mechanism.loads:
             self._load(load)
         free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
-        torques = [self._torque(d) for d in free if not isinstance(d, RunUp)]
+        torques = [self._torque(d) for d in free if not isinstance(d, (RunUp, Release))]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
         for drive in free:
             if isinstance(drive, RunUp):
@@ -476,6 +477,8 @@ class _Generator:
 
     def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
         """Moment of a drive: what is given, or what the prescribed angle requires."""
+        if isinstance(drive, Release):
+            return ZERO
         column = Column("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]

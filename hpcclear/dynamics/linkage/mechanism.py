@@ -23,6 +23,7 @@ from hpcclear.dynamics.linkage.parts import (
     LooseSlot,
     Pair,
     Revolute,
+    Release,
     RunUp,
     Slide,
     Slot,
@@ -86,7 +87,7 @@ class Mechanism:
     @property
     def free(self) -> bool:
         """Whether torques alone drive it."""
-        return all(type(drive) is TorqueDrive for drive in self.drives)
+        return all(type(drive) in (TorqueDrive, Release) for drive in self.drives)
 
     @property
     def clocked(self) -> bool:
@@ -302,7 +303,7 @@ def _numbers(m: Mechanism) -> None:
                 raise InputError(
                     f"{key}.{entry}", getattr(one, entry), "must be above 0", "Write its size"
                 )
-        expected = getattr(one, "expected_speed", None)
+        expected = getattr(one, "expected_speed", None) or getattr(one, "interval", None)
         for entry in ("speed", "initial_speed", "amplitude"):
             if getattr(one, entry, 1.0) == 0 and expected is None:
                 raise InputError(
@@ -349,13 +350,13 @@ def _drives(m: Mechanism) -> None:
     if not m.drives:
         raise InputError(
             "drives", None, "nothing drives the mechanism",
-            'Add [drives.NAME] with a kind, say "constant-speed", and a body',
+            'Add [drives.NAME] with a kind, say "constant-speed", and a body; "free" with an interval lets it go',
         )  # fmt: skip
     groups = joined(m, (Slide, Fixed))
     driven: dict[int, str] = {}
     for drive in m.drives:
         group = next(k for k, names in enumerate(groups) if drive.body in names)
-        if GROUND in groups[group]:
+        if GROUND in groups[group] and not isinstance(drive, Release):
             raise InputError(
                 f"drives.{drive.name}.body", drive.body, "this body cannot rotate, since it is on a prismatic joint",
                 "Drive a body on a revolute joint",

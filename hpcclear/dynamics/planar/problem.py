@@ -158,6 +158,8 @@ def period_of(mechanism: Any) -> Any:
         return drive.seconds
     if isinstance(drive, Harmonic):
         return 1.0 / drive.frequency
+    if isinstance(drive, TorqueDrive) and drive.interval is not None:
+        return drive.interval
     speed = drive.usual_speed if isinstance(drive, TorqueDrive) else drive.speed
     return at.TURN * drive.turns / np.abs(speed)
 

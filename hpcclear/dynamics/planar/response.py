@@ -202,7 +202,7 @@ def _phase(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> Array:
     """Progress of the drive since the start (t,), 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
     named = Parameters(par)
     cycle = at.TURN * turns_of(scene.linkage)
-    if linkage.mechanism.period.prescribed:
+    if linkage.mechanism.period.prescribed or not linkage.mechanism.period.advance:
         return cycle * (seen.revolution + seen.turn_time / named.period)
     return seen.q[:, -1] - (named.turn_end - cycle) + cycle * seen.revolution
 
