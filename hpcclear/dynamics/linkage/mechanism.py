@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+import numpy as np
+
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.parts import (
@@ -279,17 +281,17 @@ def _looked_up(m: Mechanism) -> None:
 
 def _numbers(m: Mechanism) -> None:
     """Masses, inertias, clearances and the numbers of drives that have to be positive."""
-    turns = turning(m)
+    light = massless_angles(m)
     for body in m.bodies:
         if not body.mass > 0:
             raise InputError(
                 f"bodies.{body.name}.mass", body.mass, "a moving body needs a mass",
                 "Write its mass in kg",
             )  # fmt: skip
-        if body.inertia < 0 or (body.inertia == 0 and body.name in turns):
+        if body.inertia < 0 or body.name in light:
             raise InputError(
-                f"bodies.{body.name}.inertia", body.inertia, "a rotating body needs an inertia",
-                "Write the moment of inertia about its mass centre in kg m2",
+                f"bodies.{body.name}.inertia", body.inertia, "a body that may rotate about its mass centre needs an inertia",
+                "Write the moment of inertia about its mass centre in kg m2, or put an ideal pin off its mass centre",
             )  # fmt: skip
     positive = {
         Clearance: ("clearance", "bearing_radius", "stiffness"),
@@ -322,6 +324,30 @@ def _numbers(m: Mechanism) -> None:
                 f"must be smaller than the bearing radius ({joint.bearing_radius:g} m)",
                 "Write the radial clearance R_B - R_J",
             )  # fmt: skip
+
+
+def massless_angles(m: Mechanism) -> set[str]:
+    """Names of bodies without inertia that may turn while no mass moves, so that the mass matrix is singular.
+
+    Those that an ideal pin off their mass centre, or a guide, joins to a body that cannot are none of them.
+    """
+    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m)
+    found -= {drive.body for drive in m.drives if getattr(drive, "inertia", 0.0)}
+    left = len(m.bodies) + 1
+    while len(found) < left:
+        left = len(found)
+        for joint in m.ideal:
+            (one, point), (two, other) = map(split, joint.places)
+            for body, here, carrier in ((one, point, two), (two, other, one)):
+                if body not in found or carrier in found:
+                    continue
+                if isinstance(joint, Revolute):
+                    aside = np.subtract(m.body(body).points[here], m.body(body).center)
+                    held = bool(np.abs(aside).max() > 0.0)
+                else:
+                    held = isinstance(joint, (Slide, Fixed))
+                found -= {body} if held else set()
+    return found
 
 
 def turning(m: Mechanism) -> set[str]:
