@@ -79,7 +79,7 @@ _TEXT = {
     ),
     Status.STALLED: (
         "the crank stopped before the requested revolutions were complete",
-        "raise the drive torque, the initial speed or the flywheel inertia; if it is meant to swing, give the drive an interval",
+        "raise the drive torque, the initial speed or the flywheel inertia; a drive with an interval may swing",
     ),
     Status.AVERAGE_CAP: (
         "an automatic average of an earlier version was still above its target at the last revolution allowed",

@@ -26,9 +26,9 @@ from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra
 from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.curves import curve_at
-from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
+from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
-from hpcclear.dynamics.planar.response import Seen
+from hpcclear.dynamics.planar.response import Seen, pins_of
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.setup.parameters import parameters
@@ -220,8 +220,8 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
         found["mode"] = scene.mode_labels
     if scene.guides():
         found["guide"] = scene.guides()
-    if scene.template is None and not coordinate_count(scene):
-        found["pin"] = pins_of(scene)
+    if scene.template is None and not scene.modes:
+        found["pin"] = pins_of(linkage_of(scene).mechanism)
     return found or None
 
 
@@ -363,4 +363,4 @@ def _series_between(scene: Scene, sample: Recorded, piece: Piece) -> dict[str, A
     seen = seen_between(sample, piece)
     works = _works_between(sample, piece, seen.share)
     q, v = (one[:, scene.bristles :] for one in seen[:2])
-    return planar_series(scene, sample.par, Seen(q, v, *seen[2:6], works))
+    return planar_series(scene, sample.par, Seen(q, v, *seen[2:6], works, seen.pins))

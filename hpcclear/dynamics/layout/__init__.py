@@ -15,8 +15,8 @@ from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 TURN = 6.283185307179586  # rad
 
 MAX_COORDINATES = 88
-"""Coordinates that a sample may have, bristles included. 24 and a multiple of 64, as `OWN` has 192 and one: rows that a step reads
-keep their places in the sets of a first-level cache, and a scene of few coordinates its speed. Only rows in use are touched."""
+"""Coordinates that a sample may have, bristles included. Moved on by a multiple of 64, as `OWN` is, rows keep their places in
+the sets of a first-level cache, and a scene of few coordinates its speed. Only rows in use are touched."""
 
 
 class Effects(NamedTuple):
@@ -284,6 +284,12 @@ V = OF_LANE("velocities", size=MAX_COORDINATES)
 QS = OF_LANE("coordinates of the stage", size=MAX_COORDINATES)
 VS = OF_LANE("velocities", size=MAX_COORDINATES)
 ACC = OF_LANE("accelerations of the stage", size=MAX_COORDINATES)
+MAX_PINS = 96
+PINS = OF_LANE(
+    "forces of ideal pins on their journals, along x, then along y; of observed motions only",
+    "N",
+    2 * MAX_PINS,
+)
 RATE_NOW = OF_LANE("rates of the stage", size=RATES)
 RATE_OLD = OF_LANE("rates at the start of the step", size=RATES)
 RATE_SUM = OF_LANE("weighted by the method: h * sum is the integral over the step", size=RATES)

@@ -26,7 +26,9 @@ from hpcclear.dynamics import layout as at
     CHOSEN,  # of each joint: 1 where its gap counts for the objective
 ) = range(17)
 ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
-WRAPS = ATOL + 2 * at.MAX_COORDINATES  # rad, by which each coordinate is counted anew with a revolution; first of MAX_COORDINATES
+WRAPS = (
+    ATOL + 2 * at.MAX_COORDINATES
+)  # rad, by which each coordinate is counted anew with a revolution; first of MAX_COORDINATES
 SETTINGS = WRAPS + at.MAX_COORDINATES
 
 STRICT = 1e-6

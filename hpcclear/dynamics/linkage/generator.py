@@ -26,8 +26,8 @@ from hpcclear.dynamics.linkage.parts import (
     Contact,
     Drive,
     Force,
-    Revolute,
     Release,
+    Revolute,
     RunUp,
     Slide,
     Spring,
@@ -38,6 +38,7 @@ from hpcclear.dynamics.linkage.parts import (
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.rubbing import (
     RubbingGuide,
+    RubbingPin,
     coupled,
     rubbing_of,
     ties_of,
@@ -54,6 +55,7 @@ class On(NamedTuple):
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
     impacts: bool = False  # force on the frame
+    pins: bool = False  # forces of ideal pins
     follow: str = ""  # a guided body, or body.point
     objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
@@ -374,7 +376,7 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
-        if on.energies or on.series or on.responses or on.objective:
+        if on.energies or on.series or on.responses or on.objective or on.pins:
             for rub in self.late:
                 rub.measure()
                 rub.known(found)
@@ -403,8 +405,20 @@ class _Generator:
             self._follow(found)
         if on.impacts and not self.kinematics.bends:
             self._shaking(found)
+        if on.pins and not self.kinematics.bends:
+            self._pins(found)
         if on.objective:
             self._objective()
+
+    def _pins(self, found: dict[int, Term]) -> None:
+        """Forces of the ideal pins on their journals' bodies."""
+        for k, joint in enumerate(j for j in self.mechanism.joints if type(j) is Revolute):
+            pin = RubbingPin(joint, self)
+            on_bearing = pin.body is not None and pin.body != split(joint.journal)[0]
+            for axis, part in enumerate(pin.pushes(found)):
+                force = self.writer.text(-part if on_bearing else part)
+                row = at.PINS + axis * at.MAX_PINS + k
+                self.writer.line(f"work[{row} * W + i] = {force}")
 
     def _objective(self) -> None:
         """Calls of the objective's rate, which reads the rates that were written before."""

@@ -16,7 +16,7 @@ from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import curves_of
+from hpcclear.dynamics.linkage.parts import Revolute, curves_of
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
@@ -62,7 +62,9 @@ class Linkage:
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        self._whole = self._text(_with_impacts(self._on))  # has the rows of all others
+        self._whole = self._text(
+            _with_impacts(self._on)._replace(pins=True)
+        )  # has the rows of all others
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -77,6 +79,11 @@ class Linkage:
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
+        count = sum(type(joint) is Revolute for joint in mechanism.joints)
+        if count > at.MAX_PINS:
+            raise InputError(
+                "mechanism.joints", count, f"more than {at.MAX_PINS} pins without clearance", "Use fewer bodies"
+            )  # fmt: skip
         if self._free > at.WAVES:
             raise InputError(
                 "mechanism.bodies", len(mechanism.bodies),
@@ -143,7 +150,8 @@ class Linkage:
     def module(self, effects: at.Effects) -> ModuleType:
         """The module of its motion with these effects."""
         on = self._on._replace(
-            energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses)
+            energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses),
+            pins=bool(effects.series),
         )  # fmt: skip
         on = _with_impacts(on) if effects.impacts else on
         return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
@@ -212,7 +220,9 @@ class Linkage:
             if main.body in with_it:
                 drive = main
             else:
-                drive = next((d for d in self.forest.prescribed.values() if d.body in with_it), None)
+                drive = next(
+                    (d for d in self.forest.prescribed.values() if d.body in with_it), None
+                )
             return 0.0 if drive is None else gain_of(self.mechanism, drive)
         return gain_of(self.mechanism, drive or main)
 

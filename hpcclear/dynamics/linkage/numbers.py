@@ -79,7 +79,8 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             pivoted = inertia + body.mass * (x * x + y * y)
             found |= {
                 f"{body.name}_pivot_inertia": pivoted,
-                f"{body.name}_pivot_inverse_inertia": 1.0 / np.where(pivoted == 0.0, 1.0, pivoted)[()],
+                f"{body.name}_pivot_inverse_inertia": 1.0
+                / np.where(pivoted == 0.0, 1.0, pivoted)[()],
                 f"{body.name}_moment_x": body.mass * x,
                 f"{body.name}_moment_y": body.mass * y,
             }

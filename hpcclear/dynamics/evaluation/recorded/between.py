@@ -5,14 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded
 from hpcclear.dynamics.layout.views import Rates
 
 
 class Between(NamedTuple):
     """Instants of a piece: coordinates in their revolution and velocities (t, n), time in the revolution, its number, contacts
-    (t, 2 MAX_JOINTS), rates, and how far each lies in its step, from 0 to 1 (t,)."""
+    (t, 2 MAX_JOINTS), rates, how far each lies in its step, from 0 to 1 (t,), forces of ideal pins (t, 2, MAX_PINS)."""
 
     q: Array
     v: Array
@@ -21,6 +20,7 @@ class Between(NamedTuple):
     contacts: Array
     rates: Rates
     share: Array
+    pins: Array
 
 
 def seen_between(sample: Recorded, piece: Piece) -> Between:
@@ -32,8 +32,8 @@ def seen_between(sample: Recorded, piece: Piece) -> Between:
     began = (steps.time - steps.turn_time)[k]
     turn_time = times - began
     q = q - problem.wraps * revolution[:, None]  # counted as the kernel does
-    rates = sample.observe(np.hstack([q, v]), contacts, turn_time, began)[1]
-    return Between(q, v, turn_time, revolution, contacts, rates, share)
+    _, rates, pins = sample.observe(np.hstack([q, v]), contacts, turn_time, began)
+    return Between(q, v, turn_time, revolution, contacts, rates, share, pins)
 
 
 def _state(piece: Piece, wraps: Array) -> tuple[Array, Array, Array]:
