@@ -240,7 +240,7 @@ def _turned(m: Mechanism) -> None:
     gains: dict[str, set[float]] = {}
     for names in coupled(m):
         driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
-        gains |= dict.fromkeys(names, {gain_of(m, drive) for drive in driven})
+        gains |= {name: {gain_of(m, drive) for drive in driven} for name in names}
     for load in m.loads:
         if not isinstance(load, Acting):
             continue

@@ -88,8 +88,8 @@ class Recorded:
     def observe(
         self, states: Array, contacts: Array, turn_time: Array, began: Array
     ) -> tuple[Array, Rates, Array]:
-        """Accelerations (t, n), rates and forces of pins (t, 2, MAX_PINS) at states (t, 2 n), contacts (t, 2 MAX_JOINTS), times in the revolution (t,) and when
-        that began (t,)."""
+        """Accelerations (t, n), rates and forces of pins (t, 2, MAX_PINS) at states (t, 2 n), contacts
+        (t, 2 MAX_JOINTS), times in the revolution (t,) and when that began (t,)."""
         out = self._lanes.observe(self.par, states, contacts, turn_time, began)
         n = self.problem.coordinates
         rates, pins = np.split(out[:, n:], [at.RATES], axis=1)
