@@ -329,7 +329,7 @@ def _numbers(m: Mechanism) -> None:
 def massless_angles(m: Mechanism) -> set[str]:
     """Names of bodies without inertia that may turn while no mass moves, so that the mass matrix is singular.
 
-    Those that an ideal pin off their mass centre, or a guide, joins to a body that cannot are none of them.
+    An ideal pin off the mass centre, or a guide, to a body that cannot makes it regular.
     """
     found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m)
     found -= {drive.body for drive in m.drives if getattr(drive, "inertia", 0.0)}
