@@ -5,7 +5,7 @@ from hpcclear.dynamics.planar.response import pins_of
 from hpcclear.scene import Scene
 
 IN_MEMORY = 4.0
-"""Memory over what is stored, measured over 100 to 1000 revolutions of a slider-crank and a V-twin."""
+"""Memory over what is stored, about: 0.69 GB for a file of 169 MB, of 1000 revolutions of one slider-crank."""
 
 LARGE = 5e7
 """Bytes of a file from which on its size is printed before a simulation."""
