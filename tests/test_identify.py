@@ -18,7 +18,7 @@ from hpcclear import report
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.ensemble import single
-from hpcclear.identify import answer, training
+from hpcclear.identify import answer
 from hpcclear.identify.advice import advice, noise_of
 from hpcclear.identify.answer import identified as identified_dataset
 from hpcclear.identify.features import Layout, known_scatter

@@ -78,7 +78,7 @@ _TEXT = {
     ),
     Status.STALLED: (
         "the crank stopped before the requested revolutions were complete",
-        "raise the drive torque, the initial speed or the flywheel inertia",
+        "raise the drive torque, the initial speed or the flywheel inertia; a drive with an interval may swing",
     ),
     Status.NEAR_SINGULAR: (
         "the ideal joints come to a change point, where their constraints depend on one another: forces grow without bound, "

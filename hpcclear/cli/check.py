@@ -21,6 +21,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
     scene's own design can turn."""
     out = console()
+    from hpcclear.dynamics import sizing
     from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
@@ -44,6 +45,7 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
             "revolutions",
             f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
         ),
+        ("time series", sizing.words(scene)),
         *_speeds(scene),
         *_assembly(scene),
         *_tables(scene),

@@ -179,8 +179,14 @@ def _draw(scene: "Scene", sketch: Path) -> None:
 @command(short_help="Simulate one design.")
 @with_scene
 @output_option("NetCDF file to write.")
+@click.option(
+    "--keep",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Store the time series of the last N revolutions only.",
+)
 @of_one_process
-def simulate(written: Written, output: Path) -> int:
+def simulate(written: Written, output: Path, keep: int | None) -> int:
     """Simulate one design: objective, and time series of bearing forces, torque, motion and energies.
 
     Exit code 1 if the simulation failed, 4 if f was not as accurate as numerics.target_error. The file is written all the same.
@@ -189,6 +195,7 @@ def simulate(written: Written, output: Path) -> int:
     """
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
+    from hpcclear.dynamics import sizing
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulated
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
@@ -196,7 +203,13 @@ def simulate(written: Written, output: Path) -> int:
     from hpcclear.results import dataset
     from hpcclear.scene import load_scene
 
+    if keep is not None:
+        written = written._replace(
+            overrides=(*written.overrides, f"output.keep_revolutions={keep}")
+        )
     scene = remarked(load_scene(*written))
+    if sizing.stored_bytes(scene) > sizing.LARGE:
+        say(f"Time series: {sizing.words(scene)}. Shorter with --keep N")
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
         if output.exists():

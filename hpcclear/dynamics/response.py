@@ -26,14 +26,16 @@ from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra
 from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.curves import curve_at
-from hpcclear.dynamics.planar.prescribed import pins_of, prescribed_series
-from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
-from hpcclear.dynamics.planar.response import Seen
+from hpcclear.dynamics.planar.prescribed import prescribed_series
+from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, period_of, refused_of
+from hpcclear.dynamics.planar.response import Seen, pins_of
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
+from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, effects_of, integrator_of, problem_of
 from hpcclear.dynamics.setup.start import start_states
+from hpcclear.dynamics.sizing import kept_revolutions
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
@@ -201,7 +203,7 @@ def _response(
         provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
-        | {"transient_turns": scene.numerics.transient_revolutions * _turns(scene)}
+        | _kept(scene)
         | _reason(scene),
         objective,
         labels,
@@ -220,9 +222,17 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
         found["mode"] = scene.mode_labels
     if scene.guides():
         found["guide"] = scene.guides()
-    if scene.template is None and not coordinate_count(scene):
-        found["pin"] = pins_of(scene)
+    if scene.template is None and not scene.modes:
+        found["pin"] = pins_of(linkage_of(scene).mechanism)
     return found or None
+
+
+def _kept(scene: Scene) -> dict[str, str | int]:
+    """Turns of the transient that are stored; of a scene that keeps the last revolutions alone, how many."""
+    kept = kept_revolutions(scene)
+    transient = max(kept - scene.numerics.averaged_revolutions, 0) * _turns(scene)
+    asked = {} if scene.output.keep_revolutions is None else {"keep_revolutions": kept}
+    return {"transient_turns": transient, **asked}
 
 
 def _turns(scene: Scene) -> int:
@@ -283,7 +293,11 @@ def _prescribed(scene: Scene) -> Found:
     par = parameters(scene)
     lanes.queue(par, start_states(scene, par), np.zeros(1, np.int64))
     record = outcome_records(*lanes.collect(), record_of(scene), responses_reported(problem))
-    return *prescribed_series(scene, problem.transient + problem.averaged), record
+    times, data = prescribed_series(scene, problem.transient + problem.averaged)
+    first = problem.transient + problem.averaged - kept_revolutions(scene)
+    kept = times >= (first - 1e-9) * float(period_of(mechanism_of(scene.linkage)))
+    kept[-1] = True  # of one that ends before
+    return times[kept], {name: one[kept] for name, one in data.items()}, record
 
 
 class Collected:
@@ -294,6 +308,8 @@ class Collected:
         self._pieces = Pieces(scene.output.instants_per_revolution)
         self._parts: list[dict[str, Array]] = []
         self._taken, self._turns = 0, Turns()
+        self._kept, self._began = kept_revolutions(scene), 0.0
+        self._revolutions: list[Array] = []
         self._spectra = spectra_of(scene, sample)
 
     def take(self, rows: Array) -> None:
@@ -302,15 +318,22 @@ class Collected:
             self._add(piece)
 
     def _add(self, piece: Piece) -> None:
-        problem, count = self._sample.problem, self._scene.output.instants_per_revolution
+        count = self._scene.output.instants_per_revolution
         series = {"time": piece.times, **_series_between(self._scene, self._sample, piece)}
+        if not self._taken:
+            self._began = float(series["energy_residual"][0])
+        self._taken += len(piece.times)
         # copies: a column that is a view would keep all that was observed
         self._parts.append({name: one.copy() for name, one in series.items()})
-        self._taken += len(piece.times)
+        self._revolutions.append(piece.steps.revolution[piece.k])
+        latest = self._revolutions[-1].max(initial=0.0)
+        while self._revolutions[0].max(initial=0.0) < latest - self._kept:
+            del self._parts[0], self._revolutions[0]
         self._turns.take(piece.steps)
         if self._spectra is not None:
             self._spectra.take(piece)
-        least = max(self._taken, count * (problem.transient + problem.averaged))
+        stored = sum(len(part["time"]) for part in self._parts)
+        least = max(stored, count * self._kept)
         _refuse_what_does_not_fit(least * _bytes_an_instant(self._parts[0]), count)
 
     def finish(self, record: Records) -> Found:
@@ -318,10 +341,10 @@ class Collected:
         last = self._pieces.finish()
         self._add(last)
         self._turns.finish(last.steps)
-        data = {}
+        data, shown = {}, self._shown(record)
         for name in list(self._parts[0]):
-            data[name] = np.concatenate([part.pop(name) for part in self._parts])
-        data["energy_residual"] -= data["energy_residual"][0]
+            data[name] = np.concatenate([part.pop(name) for part in self._parts])[shown]
+        data["energy_residual"] -= self._began
         problem = self._sample.problem
         if Status(int(record["status"][0])).valid and problem.effects.joints:
             data |= _measured(self._scene, problem, self._turns)
@@ -329,6 +352,16 @@ class Collected:
             if self._spectra is not None and self._scene.bands():
                 enter_levels(self._scene, self._sample, self._turns, self._spectra, record)
         return data.pop("time"), data, record
+
+    def _shown(self, record: Records) -> slice:
+        """The instants of the revolutions to keep, of those that were simulated."""
+        problem, revolution = self._sample.problem, np.concatenate(self._revolutions)
+        ended = Status(int(record["status"][0])).valid
+        end = problem.transient + problem.averaged if ended else revolution.max(initial=0.0) + 1
+        count = self._scene.output.instants_per_revolution
+        if ended and count:
+            return slice(max(len(revolution) - count * self._kept - 1, 0), None)
+        return slice(max(int(np.searchsorted(revolution, end - self._kept)) - 1, 0), None)
 
 
 def _measured(scene: Scene, problem: Problem, turns: Turns) -> dict[str, Any]:
@@ -363,4 +396,4 @@ def _series_between(scene: Scene, sample: Recorded, piece: Piece) -> dict[str, A
     seen = seen_between(sample, piece)
     works = _works_between(sample, piece, seen.share)
     q, v = (one[:, scene.bristles :] for one in seen[:2])
-    return planar_series(scene, sample.par, Seen(q, v, *seen[2:6], works))
+    return planar_series(scene, sample.par, Seen(q, v, *seen[2:6], works, seen.pins))

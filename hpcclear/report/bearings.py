@@ -136,9 +136,8 @@ def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
         time, turned = (
             one[inside] for one in (response["time"].to_numpy(), motion.phase(response))
         )
-        period, cycle = (
-            float(np.ptp(one)) / response.sizes["revolution"] for one in (time, turned)
-        )
+        count = min(response.sizes["revolution"], response.attrs.get("keep_revolutions", np.inf))
+        period, cycle = (float(np.ptp(one)) / count for one in (time, turned))
         flown = _known(response, "contact_loss", k) / cycle
         return _known(response, "contact_impulse", k) / period, min(max(1.0 - flown, 0.0), 1.0)
     weight = _weights(response["time"].to_numpy()[inside])

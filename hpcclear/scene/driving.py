@@ -18,6 +18,7 @@ from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad,
 from hpcclear.scene.places import Angle, PairTable
 
 Turns = Annotated[int, Count(least=1, most=64)]
+Interval = Annotated[float, Quantity("s", above=0)]
 
 
 def check_start(drive: Any) -> None:
@@ -28,12 +29,17 @@ def check_start(drive: Any) -> None:
     PydanticCustomError
         Naming ``expected_speed``.
     """
-    if drive.initial_speed == 0.0 and drive.expected_speed is None:
+    if drive.initial_speed == 0.0 and drive.expected_speed is None and not by_interval(drive):
         raise invalid(
             "is needed where initial_speed = 0: the tolerances and the first step go by it",
             'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
             key="expected_speed",
         )
+
+
+def by_interval(drive: Any) -> bool:
+    """Whether a time replaces the revolution of a drive."""
+    return getattr(drive, "interval", None) is not None
 
 
 def check_torque(drive: Any) -> None:
@@ -156,12 +162,31 @@ class PlanarTorque(Table):
     turns: Turns = 1
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
     `start_angle` of 360 degrees or more begins in the second turn."""
+    interval: Interval | None = None
+    """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
 
     @model_validator(mode="after")
     def _started(self) -> "PlanarTorque":
         check_start(self)
+        if by_interval(self) and self.turns != 1:
+            raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
         check_torque(self)
         return self
+
+
+class PlanarFree(Table):
+    """No drive: the mechanism is let go, and moves by its loads and its weight. A time replaces the revolution."""
+
+    name: str
+    kind: Literal["free"]
+    body: str
+    """Body whose angle is reported as that of the drive."""
+    interval: Interval
+    """Time that replaces the revolution, s: `transient_revolutions` and `averaged_revolutions` count such intervals."""
+    initial_speed: Annotated[float, Quantity("rad/s")] = 0.0
+    """Angular speed of the body at the start, rad/s, counter-clockwise; negative: clockwise."""
+    period: bool = False
+    """Whether its interval replaces the revolution. Default: true for the first drive if no drive has this entry."""
 
 
 class PlanarRunUp(Table):
@@ -195,7 +220,7 @@ class PlanarRunUp(Table):
 
 
 PlanarDrive = Annotated[
-    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp,
+    PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp | PlanarFree,
     Field(discriminator="kind"),
 ]
 

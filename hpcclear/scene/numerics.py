@@ -94,5 +94,6 @@ class Output(Table):
 
     instants_per_revolution: Annotated[int, Count(0, 10**6)] = 720
     """Number of stored instants per revolution, evenly spaced in time; 0: every accepted step. Time series larger than
-    half of the machine's
-    memory are refused."""
+    half of the machine's memory are refused."""
+    keep_revolutions: Annotated[int, Count(1)] | None = None
+    """Number of last revolutions whose time series are stored; default: all. f and all mean values are not affected."""

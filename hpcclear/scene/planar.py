@@ -327,6 +327,7 @@ def main_drive(planar: Planar) -> PlanarDrive:
     if not planar.drives:
         raise InputError(
             "mechanism.drives", None, "nothing drives the mechanism",
-            'Add [mechanism.drives.NAME] with a kind, say "constant-speed", and a body',
+            'Add [mechanism.drives.NAME] with a kind, say "constant-speed", and a body. For a mechanism that is let go: '
+            'kind = "free", a body, and interval = "1 s", which replaces the revolution',
         )  # fmt: skip
     return next((drive for drive in planar.drives if drive.period), planar.drives[0])

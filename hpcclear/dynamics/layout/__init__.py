@@ -14,7 +14,9 @@ from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 
 TURN = 6.283185307179586  # rad
 
-MAX_COORDINATES = 24
+MAX_COORDINATES = 88
+"""Coordinates that a sample may have, bristles included. Moved on by a multiple of 64, as `OWN` is, rows keep their places in
+the sets of a first-level cache, and a scene of few coordinates its speed. Only rows in use are touched."""
 
 
 class Effects(NamedTuple):
@@ -142,7 +144,7 @@ FILM_STEEPNESS = OF_JOINT(
 )
 JOINT_ROWS = OF_JOINT.end
 JOINT_BLOCKS = OF_SAMPLE("of all joints, one behind the other", size=MAX_JOINTS * JOINT_ROWS)
-OWN = OF_SAMPLE("what a linkage has of its own", size=192)
+OWN = OF_SAMPLE("what a linkage has of its own", size=192 + 16 * 64)
 WAVES = OF_SAMPLE(
     "of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each another, its slope's",
     size=2 * WAVE_ROWS,
@@ -286,6 +288,12 @@ V = OF_LANE("velocities", size=MAX_COORDINATES)
 QS = OF_LANE("coordinates of the stage", size=MAX_COORDINATES)
 VS = OF_LANE("velocities", size=MAX_COORDINATES)
 ACC = OF_LANE("accelerations of the stage", size=MAX_COORDINATES)
+MAX_PINS = 96
+PINS = OF_LANE(
+    "forces of ideal pins on their journals, along x, then along y; of observed motions only",
+    "N",
+    2 * MAX_PINS,
+)
 RATE_NOW = OF_LANE("rates of the stage", size=RATES)
 RATE_OLD = OF_LANE("rates at the start of the step", size=RATES)
 RATE_SUM = OF_LANE("weighted by the method: h * sum is the integral over the step", size=RATES)
@@ -466,7 +474,6 @@ class Rules(NamedTuple):
 
     latched: int  # impacts are located, and their speed is kept
     free: int  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
-    turning: int  # its angle is a coordinate, whoever drives it
     responses: int
     impacts: int  # contacts are counted
     profile: int  # where around joints sliding work is done is recorded
@@ -479,9 +486,8 @@ class Rules(NamedTuple):
 def rules_of(effects: Effects, curves: int = 0) -> Rules:
     """Those of a set of effects, and of so many tabulated curves."""
     e = effects
-    turning = e.torque or (None if e.swinging else e.baumgarte)
     largest = None if e.objective is None else e.objective.largest
-    flags = (e.latched, e.torque, turning, e.responses, e.impacts, e.profile, largest)
+    flags = (e.latched, e.torque, e.responses, e.impacts, e.profile, largest)
     places = places_of(e)
     return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop, curves])
 

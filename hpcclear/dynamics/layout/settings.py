@@ -26,7 +26,10 @@ from hpcclear.dynamics import layout as at
     CHOSEN,  # of each joint: 1 where its gap counts for the objective
 ) = range(17)
 ATOL = CHOSEN + at.MAX_JOINTS  # first of 2 * MAX_COORDINATES
-SETTINGS = ATOL + 2 * at.MAX_COORDINATES
+WRAPS = (
+    ATOL + 2 * at.MAX_COORDINATES
+)  # rad, by which each coordinate is counted anew with a revolution; first of MAX_COORDINATES
+SETTINGS = WRAPS + at.MAX_COORDINATES
 
 STRICT = 1e-6
 """Relative tolerance of explicit steps that is never made stricter at the edge of stability."""
@@ -57,5 +60,5 @@ def rules_in(numbers):
     r = RULES
     return at.Rules(
         numbers[r], numbers[r + 1], numbers[r + 2], numbers[r + 3], numbers[r + 4], numbers[r + 5],
-        numbers[r + 6], numbers[r + 7], numbers[r + 8], numbers[r + 9],
+        numbers[r + 6], numbers[r + 7], numbers[r + 8],
     )  # fmt: skip

@@ -202,9 +202,10 @@ class Settings(View):
     senses = Column(settings.SENSES)
     at_rest = Column(settings.AT_REST)  # rad
     chosen = _of_joints(settings.CHOSEN)
-    atol = Column(slice(settings.ATOL, settings.SETTINGS))  # all places
+    atol = Column(slice(settings.ATOL, settings.WRAPS))  # all places
     atol_coordinates = Column(slice(settings.ATOL, settings.ATOL + at.MAX_COORDINATES))
-    atol_velocities = Column(slice(settings.ATOL + at.MAX_COORDINATES, settings.SETTINGS))
+    atol_velocities = Column(slice(settings.ATOL + at.MAX_COORDINATES, settings.WRAPS))
+    wraps = Column(slice(settings.WRAPS, settings.SETTINGS))
 
 
 class Parameters(View):

@@ -26,6 +26,7 @@ from hpcclear.dynamics.linkage.parts import (
     Contact,
     Drive,
     Force,
+    Release,
     Revolute,
     RunUp,
     Slide,
@@ -37,6 +38,7 @@ from hpcclear.dynamics.linkage.parts import (
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.rubbing import (
     RubbingGuide,
+    RubbingPin,
     coupled,
     rubbing_of,
     ties_of,
@@ -53,6 +55,7 @@ class On(NamedTuple):
     series: bool = False  # drive moment, for time series
     responses: bool = False  # drive moment and what is followed
     impacts: bool = False  # force on the frame
+    pins: bool = False  # forces of ideal pins
     follow: str = ""  # a guided body, or body.point
     objective: str = ""  # its rate: "joints", or "whole" of the mechanism
     waves: bool = False  # surfaces of the joints with clearance are out of round
@@ -117,7 +120,7 @@ class _Generator:
         for load in self.mechanism.loads:
             self._load(load)
         free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
-        torques = [self._torque(d) for d in free if not isinstance(d, RunUp)]
+        torques = [self._torque(d) for d in free if not isinstance(d, (RunUp, Release))]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
         for drive in free:
             if isinstance(drive, RunUp):
@@ -373,7 +376,7 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
-        if on.energies or on.series or on.responses or on.objective:
+        if on.energies or on.series or on.responses or on.objective or on.pins:
             for rub in self.late:
                 rub.measure()
                 rub.known(found)
@@ -402,8 +405,20 @@ class _Generator:
             self._follow(found)
         if on.impacts and not self.kinematics.bends:
             self._shaking(found)
+        if on.pins and not self.kinematics.bends:
+            self._pins(found)
         if on.objective:
             self._objective()
+
+    def _pins(self, found: dict[int, Term]) -> None:
+        """Forces of the ideal pins on their journals' bodies."""
+        for k, joint in enumerate(j for j in self.mechanism.joints if type(j) is Revolute):
+            pin = RubbingPin(joint, self)
+            on_bearing = pin.body is not None and pin.body != split(joint.journal)[0]
+            for axis, part in enumerate(pin.pushes(found)):
+                force = self.writer.text(-part if on_bearing else part)
+                row = at.PINS + axis * at.MAX_PINS + k
+                self.writer.line(f"work[{row} * W + i] = {force}")
 
     def _objective(self) -> None:
         """Calls of the objective's rate, which reads the rates that were written before."""
@@ -476,6 +491,8 @@ class _Generator:
 
     def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
         """Moment of a drive: what is given, or what the prescribed angle requires."""
+        if isinstance(drive, Release):
+            return ZERO
         column = Column("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]

@@ -14,9 +14,9 @@ from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism
+from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import curves_of
+from hpcclear.dynamics.linkage.parts import Revolute, curves_of
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
@@ -62,7 +62,9 @@ class Linkage:
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN
-        self._whole = self._text(_with_impacts(self._on))  # has the rows of all others
+        self._whole = self._text(
+            _with_impacts(self._on)._replace(pins=True)
+        )  # has the rows of all others
         self.poses = Poses(self.forest, self._given, self._free)
         self._take(self.poses.rows)
         masses = [
@@ -77,6 +79,11 @@ class Linkage:
         for name in masses:
             if name not in self._given:
                 self._take({name: self._free})
+        count = sum(type(joint) is Revolute for joint in mechanism.joints)
+        if count > at.MAX_PINS:
+            raise InputError(
+                "mechanism.joints", count, f"more than {at.MAX_PINS} pins without clearance", "Use fewer bodies"
+            )  # fmt: skip
         if self._free > at.WAVES:
             raise InputError(
                 "mechanism.bodies", len(mechanism.bodies),
@@ -143,7 +150,8 @@ class Linkage:
     def module(self, effects: at.Effects) -> ModuleType:
         """The module of its motion with these effects."""
         on = self._on._replace(
-            energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses)
+            energies=bool(effects.energies), series=bool(effects.series), responses=bool(effects.responses),
+            pins=bool(effects.series),
         )  # fmt: skip
         on = _with_impacts(on) if effects.impacts else on
         return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
@@ -204,12 +212,23 @@ class Linkage:
 
     def gained(self, body: str) -> float:
         """Return by how much a body turns in a revolution, rad, where its angle restarts with each: of a drive that prescribes
-        it by the time in the revolution, and of the coordinate that gives the period."""
+        it by the time in the revolution, of the coordinate that gives the period, and of what springs couple to these."""
         main, frame = self.mechanism.period, self.forest.frames[body]
         drive = self.forest.prescribed.get(frame)
-        if drive is None:
-            return main.advance if frame == self.forest.frames[main.body] else 0.0
-        return drive.advance * round(main.seconds / drive.seconds)
+        if drive is None and frame != self.forest.frames[main.body]:
+            with_it = next(names for names in self._coupled if body in names)
+            if main.body in with_it:
+                drive = main
+            else:
+                drive = next(
+                    (d for d in self.forest.prescribed.values() if d.body in with_it), None
+                )
+            return 0.0 if drive is None else gain_of(self.mechanism, drive)
+        return gain_of(self.mechanism, drive or main)
+
+    @cached_property
+    def _coupled(self) -> list[set[str]]:
+        return coupled(self.mechanism)
 
 
 def _with_impacts(on: On) -> On:

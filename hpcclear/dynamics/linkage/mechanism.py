@@ -5,7 +5,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+import numpy as np
+
 from hpcclear.base.errors import InputError
+from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Acting,
@@ -21,6 +24,7 @@ from hpcclear.dynamics.linkage.parts import (
     LooseSlide,
     LooseSlot,
     Pair,
+    Release,
     Revolute,
     RunUp,
     Slide,
@@ -30,8 +34,6 @@ from hpcclear.dynamics.linkage.parts import (
     split,
 )
 
-MOST_COORDINATES = 24
-MOST_CONTACTS = 8
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -87,7 +89,7 @@ class Mechanism:
     @property
     def free(self) -> bool:
         """Whether torques alone drive it."""
-        return all(type(drive) is TorqueDrive for drive in self.drives)
+        return all(type(drive) in (TorqueDrive, Release) for drive in self.drives)
 
     @property
     def clocked(self) -> bool:
@@ -212,29 +214,56 @@ def _places(m: Mechanism) -> None:
             )  # fmt: skip
 
 
-def _turned(m: Mechanism) -> None:
-    """Bodies whose angles loads act by can turn, and do not go round and round with the revolutions."""
+def coupled(m: Mechanism) -> list[set[str]]:
+    """Bodies whose angles the joints or loads compare with one another, the ground's first: sets of names."""
     groups = joined(m, (Slide, Fixed))
-    still = next((names for names in groups if GROUND in names), set())
-    round_ = next((names for names in groups if m.drives and m.period.body in names), set())
+    for load in m.loads:
+        if isinstance(load, Acting) and load.by_angle and (other := getattr(load, "other", None)):
+            touched = [names for names in groups if names & {load.body, other}]  # type: ignore[attr-defined]
+            rest = [names for names in groups if not names & {load.body, other}]  # type: ignore[attr-defined]
+            groups = [set().union(*touched), *rest]
+    return sorted(groups, key=lambda names: GROUND not in names)
+
+
+def gain_of(m: Mechanism, drive: Drive) -> float:
+    """By how much the body of a prescribed drive, or of the one that gives the period, turns in a revolution, rad."""
+    main = m.period
+    if drive is main or not main.prescribed:
+        return main.advance
+    return drive.advance * round(main.seconds / drive.seconds)
+
+
+def _turned(m: Mechanism) -> None:
+    """Bodies whose angles loads act by can turn, and the angle does not go round and round with the revolutions: that of one
+    body, or between two."""
+    still, *_ = joined(m, (Slide, Fixed))
+    gains: dict[str, set[float]] = {}
+    for names in coupled(m):
+        driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
+        gains |= {name: {gain_of(m, drive) for drive in driven} for name in names}
     for load in m.loads:
         if not isinstance(load, Acting):
             continue
-        for entry in ("body", "other"):
-            body = getattr(load, entry, None)
-            if body in still:
+        body, other = (getattr(load, entry, None) for entry in ("body", "other"))
+        for entry, name in (("body", body), ("other", other)):
+            if name in still:
                 raise InputError(
-                    f"loads.{load.name}.{entry}",
-                    body,
-                    "this body cannot rotate",
+                    f"loads.{load.name}.{entry}", name, "this body cannot rotate",
                     "Name a body that does",
-                )
-            if load.by_angle and body in round_ and m.period.advance:
-                raise InputError(
-                    f"loads.{load.name}.{entry}", body,
-                    "this body goes round with every revolution, so that its angle has no end",
-                    "Name a body that swings",
                 )  # fmt: skip
+        if load.by_angle and other is None and gains[str(body)] - {0.0}:
+            raise InputError(
+                f"loads.{load.name}.body", body,
+                "this body goes round with every revolution, so that its angle has no end",
+                "Name a body that swings, or another one with `other` that goes round with it",
+            )  # fmt: skip
+        if load.by_angle and other is not None and len(gains[str(body)]) > 1:
+            raise InputError(
+                f"loads.{load.name}.other", other,
+                f"drives turn this body and {body!r} by different angles in a revolution, so that the angle between them has "
+                "no end",
+                "Couple bodies that go round together",
+            )  # fmt: skip
 
 
 def _looked_up(m: Mechanism) -> None:
@@ -252,17 +281,17 @@ def _looked_up(m: Mechanism) -> None:
 
 def _numbers(m: Mechanism) -> None:
     """Masses, inertias, clearances and the numbers of drives that have to be positive."""
-    turns = turning(m)
+    light = massless_angles(m)
     for body in m.bodies:
         if not body.mass > 0:
             raise InputError(
                 f"bodies.{body.name}.mass", body.mass, "a moving body needs a mass",
                 "Write its mass in kg",
             )  # fmt: skip
-        if body.inertia < 0 or (body.inertia == 0 and body.name in turns):
+        if body.inertia < 0 or body.name in light:
             raise InputError(
-                f"bodies.{body.name}.inertia", body.inertia, "a rotating body needs an inertia",
-                "Write the moment of inertia about its mass centre in kg m2",
+                f"bodies.{body.name}.inertia", body.inertia, "a body that may rotate about its mass centre needs an inertia",
+                "Write the moment of inertia about its mass centre in kg m2, or put an ideal pin off its mass centre",
             )  # fmt: skip
     positive = {
         Clearance: ("clearance", "bearing_radius", "stiffness"),
@@ -276,7 +305,7 @@ def _numbers(m: Mechanism) -> None:
                 raise InputError(
                     f"{key}.{entry}", getattr(one, entry), "must be above 0", "Write its size"
                 )
-        expected = getattr(one, "expected_speed", None)
+        expected = getattr(one, "expected_speed", None) or getattr(one, "interval", None)
         for entry in ("speed", "initial_speed", "amplitude"):
             if getattr(one, entry, 1.0) == 0 and expected is None:
                 raise InputError(
@@ -295,6 +324,30 @@ def _numbers(m: Mechanism) -> None:
                 f"must be smaller than the bearing radius ({joint.bearing_radius:g} m)",
                 "Write the radial clearance R_B - R_J",
             )  # fmt: skip
+
+
+def massless_angles(m: Mechanism) -> set[str]:
+    """Names of bodies without inertia that may turn while no mass moves, so that the mass matrix is singular.
+
+    An ideal pin off the mass centre, or a guide, to a body that cannot makes it regular.
+    """
+    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m)
+    found -= {drive.body for drive in m.drives if getattr(drive, "inertia", 0.0)}
+    left = len(m.bodies) + 1
+    while len(found) < left:
+        left = len(found)
+        for joint in m.ideal:
+            (one, point), (two, other) = map(split, joint.places)
+            for body, here, carrier in ((one, point, two), (two, other, one)):
+                if body not in found or carrier in found:
+                    continue
+                if isinstance(joint, Revolute):
+                    aside = np.subtract(m.body(body).points[here], m.body(body).center)
+                    held = bool(np.abs(aside).max() > 0.0)
+                else:
+                    held = isinstance(joint, (Slide, Fixed))
+                found -= {body} if held else set()
+    return found
 
 
 def turning(m: Mechanism) -> set[str]:
@@ -323,13 +376,13 @@ def _drives(m: Mechanism) -> None:
     if not m.drives:
         raise InputError(
             "drives", None, "nothing drives the mechanism",
-            'Add [drives.NAME] with a kind, say "constant-speed", and a body',
+            'Add [drives.NAME] with a kind, say "constant-speed", and a body; "free" with an interval lets it go',
         )  # fmt: skip
     groups = joined(m, (Slide, Fixed))
     driven: dict[int, str] = {}
     for drive in m.drives:
         group = next(k for k, names in enumerate(groups) if drive.body in names)
-        if GROUND in groups[group]:
+        if GROUND in groups[group] and not isinstance(drive, Release):
             raise InputError(
                 f"drives.{drive.name}.body", drive.body, "this body cannot rotate, since it is on a prismatic joint",
                 "Drive a body on a revolute joint",
@@ -385,13 +438,8 @@ def _sizes(m: Mechanism) -> None:
             f"{-free} too many degrees of freedom",
             "Give a joint clearance, remove one, or remove a drive",
         )  # fmt: skip
-    free += modes_of(m)
-    if free > MOST_COORDINATES:
+    if len(m.contacts) > MAX_JOINTS:
         raise InputError(
-            "bodies", free, f"more than {MOST_COORDINATES} degrees of freedom", "Use ideal joints"
-        )
-    if len(m.contacts) > MOST_CONTACTS:
-        raise InputError(
-            "joints", len(m.contacts), f"more than {MOST_CONTACTS} contacts in joints (four in a guide, two in a slot)",
+            "joints", len(m.contacts), f"more than {MAX_JOINTS} contacts in joints (four in a guide, two in a slot)",
             "Make some of the joints ideal",
         )  # fmt: skip

@@ -54,7 +54,8 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
     for body in mechanism.bodies:
         drive = mechanism.drive_of(body.name)
         inertia = body.inertia + (drive.inertia if isinstance(drive, TorqueDrive) else 0.0)
-        inertia = inertia + 1.0 * (np.asarray(inertia) == 0.0)[()]  # 1 for what does not turn
+        some = inertia + 1.0 * (np.asarray(inertia) == 0.0)[()]  # what is divided by
+        inertia = some if trees.cartesian else inertia  # there 1 for what does not turn
         places = {**body.points, CENTER: body.center}
         for a, (ax, ay) in places.items():
             for b, (bx, by) in places.items():
@@ -64,7 +65,7 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             f"{body.name}_mass": body.mass,
             f"{body.name}_inverse_mass": 1.0 / body.mass,
             f"{body.name}_inertia": inertia,
-            f"{body.name}_inverse_inertia": 1.0 / inertia,
+            f"{body.name}_inverse_inertia": 1.0 / some,
             f"{body.name}_offset": angle,
             f"{body.name}_offset_cos": np.cos(angle),
             f"{body.name}_offset_sin": np.sin(angle),
@@ -78,7 +79,8 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             pivoted = inertia + body.mass * (x * x + y * y)
             found |= {
                 f"{body.name}_pivot_inertia": pivoted,
-                f"{body.name}_pivot_inverse_inertia": 1.0 / pivoted,
+                f"{body.name}_pivot_inverse_inertia": 1.0
+                / np.where(pivoted == 0.0, 1.0, pivoted)[()],
                 f"{body.name}_moment_x": body.mass * x,
                 f"{body.name}_moment_y": body.mass * y,
             }

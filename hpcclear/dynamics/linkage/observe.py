@@ -15,7 +15,7 @@ def observe(
     motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: tuple[Array, Array],
     out: Array, width: int = 1,
 ) -> None:  # fmt: skip
-    """Fill `out` (instants, n + RATES) with accelerations and rates.
+    """Fill `out` (instants, n + RATES) with accelerations and rates; with further columns, forces of pins as `PINS` has them.
 
     `motion`: address of a motion of so many lanes; `states` (instants, 2 n): coordinates, then velocities;
     `contacts` (instants, 2 MAX_JOINTS): active flags, then 1/d'_0; `times`, each (instants,): since the start of the
@@ -45,6 +45,8 @@ def _observe(motion, W, lanes, tables, states, contacts, times, began, out):
                 out[first + i, k] = lanes[(at.ACC + k) * W + i]
             for r in range(at.RATES):
                 out[first + i, n + r] = lanes[(at.RATE_NOW + r) * W + i]
+            for r in range(out.shape[1] - n - at.RATES):
+                out[first + i, n + at.RATES + r] = lanes[(at.PINS + r) * W + i]
 
 
 def observing_code() -> None:

@@ -331,7 +331,8 @@ class TorqueDrive:
     period's body.
 
     Where there is a speed without load (rad/s), the torque falls in proportion to the speed and is 0 at that one. `by_speed`:
-    rows (rad/s, N m) in place of the torque, straight between and level beyond.
+    rows (rad/s, N m) in place of the torque, straight between and level beyond. `interval`: a time (s) that replaces the
+    revolution.
     """
 
     name: str
@@ -345,6 +346,7 @@ class TorqueDrive:
     expected_speed: float | None = None
     no_load_speed: float | None = None
     by_speed: tuple[Pair, ...] | None = None
+    interval: float | None = field(default=None, kw_only=True)
     prescribed: ClassVar[bool] = False
 
     @property
@@ -355,12 +357,19 @@ class TorqueDrive:
     @property
     def seconds(self) -> float:
         """One revolution of as many turns at the usual speed, s."""
+        if self.interval is not None:
+            return self.interval
         return 2 * math.pi * self.turns / abs(self.usual_speed)
 
     @property
     def advance(self) -> float:
-        """By how much the angle changes until then, rad."""
-        return 2 * math.pi * self.turns
+        """By how much the angle changes until then, rad; 0 where a time replaces the revolution."""
+        return 2 * math.pi * self.turns if self.interval is None else 0.0
+
+
+@dataclass(frozen=True)
+class Release(TorqueDrive):
+    """No drive: a body is let go at a speed, and a time replaces the revolution."""
 
 
 @dataclass(frozen=True)
@@ -445,8 +454,11 @@ class Acting:
     name: str
     kind: ClassVar[str]
     """That the scene names."""
-    by_angle: ClassVar[bool] = False
-    """Whether it goes by the angle of a body, which must not go round with the revolutions."""
+
+    @property
+    def by_angle(self) -> bool:
+        """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
+        return False
 
     @classmethod
     def of(cls, table: object) -> Self:

@@ -62,6 +62,8 @@ class Forest:
     """Drives by frame, where the angle is given."""
     closures: tuple[Joint | Drive, ...]
     """What is left as a constraint."""
+    cartesian: bool = False
+    """Whether every body is a tree by itself."""
 
     def index(self, kind: str, body: str) -> int | None:
         """Which coordinate it is, if it is one."""
@@ -98,7 +100,7 @@ def forest(mechanism: Mechanism, cartesian: bool = False, closed: bool = False) 
     ends = [d for d in mechanism.drives if d.prescribed or closed] if cartesian else []
     return Forest(
         mechanism, hangs, frames, offsets, _coordinates(mechanism, hangs, frames, prescribed),
-        prescribed, (*closures, *ends),
+        prescribed, (*closures, *ends), cartesian,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Bristles of friction as a scene requires them: their tolerances, and whether they fit in the kernel."""
+"""Bristles of friction as a scene requires them: their tolerances, and whether all coordinates fit in the kernel."""
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
@@ -28,11 +28,22 @@ def tolerances(scene: Scene, period: float) -> tuple[tuple[float, ...], tuple[fl
 
 
 def check_room(scene: Scene, others: int) -> None:
-    """InputError if the kernel cannot hold the bristles beside so many coordinates."""
+    """InputError if the kernel cannot hold so many coordinates, and the bristles beside them."""
     count = others + scene.bristles
-    if scene.bristles and count > at.MAX_COORDINATES:
+    if count <= at.MAX_COORDINATES:
+        return
+    most = f"{count} coordinates, of {at.MAX_COORDINATES} at most"
+    if others <= at.MAX_COORDINATES:
         raise InputError(
-            "effects.friction.law", scene.effects.friction.law,
-            f"needs a coordinate for each joint with clearance: {count} in all, of {at.MAX_COORDINATES} at most",
+            "effects.friction.law", scene.effects.friction.law, f"needs one for each joint with clearance: {most}",
             'Write law = "coulomb", or make some of the joints ideal',
         )  # fmt: skip
+    if scene.numerics.formulation == "baumgarte":
+        raise InputError(
+            "numerics.formulation", "baumgarte", f"has three for each body: {most}",
+            'Write formulation = "minimal", or use fewer bodies',
+        )  # fmt: skip
+    bodies = len(scene.linkage.bodies)
+    raise InputError(
+        "mechanism.bodies", bodies, f"have {most}", "Use fewer bodies, joints with clearance or modes of bending"
+    )  # fmt: skip

@@ -11,12 +11,12 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Revolute, Slide, TableDrive, split
+from hpcclear.dynamics.linkage.parts import Slide, TableDrive, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
 from hpcclear.dynamics.planar.path import rigid_acceleration
 from hpcclear.dynamics.planar.problem import linkage_of, period_of, scene_of
-from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved
+from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved, pins_of
 from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.planar.turning import passage
 from hpcclear.scene import Scene
@@ -219,8 +219,9 @@ def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
     """Forces of the pins (t, pins), or by the names of a template, which has columns of joints with clearance besides."""
     holds = found.holds
     if scene.template is None:
+        pins = pins_of(linkage_of(scene).mechanism)
         return {
-            f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins_of(scene)]).T
+            f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins]).T
             for axis in "xy"
         }
     parts = {
@@ -230,9 +231,3 @@ def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
     none = at_places(scene, np.zeros((len(found.times), 0)))
     single = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
     return dict.fromkeys(OF_CONTACTS, none) | single
-
-
-def pins_of(scene: Scene) -> tuple[str, ...]:
-    """Names of the pins without clearance."""
-    joints = linkage_of(scene).mechanism.joints
-    return tuple(joint.name for joint in joints if type(joint) is Revolute)

@@ -50,7 +50,8 @@ def linkage_of(scene: Scene) -> Linkage:
     cartesian = scene.numerics.formulation == "baumgarte"
     follow = scene.linkage.followed or guided(mechanism)
     _check_followed(scene, follow)
-    linkage = Linkage(
+    bristles.check_room(scene, len(forest(mechanism, cartesian).coordinates))
+    return Linkage(
         mechanism,
         follow=follow,
         gravity=scene.effects.gravity > 0.0,
@@ -61,8 +62,6 @@ def linkage_of(scene: Scene) -> Linkage:
         waves=any(scene.waves().values()),
         places=scene.open_places,
     )
-    bristles.check_room(scene, len(linkage.forest.coordinates))
-    return linkage
 
 
 def _check_followed(scene: Scene, follow: str) -> None:
@@ -159,6 +158,8 @@ def period_of(mechanism: Any) -> Any:
         return drive.seconds
     if isinstance(drive, Harmonic):
         return 1.0 / drive.frequency
+    if isinstance(drive, TorqueDrive) and drive.interval is not None:
+        return drive.interval
     speed = drive.usual_speed if isinstance(drive, TorqueDrive) else drive.speed
     return at.TURN * drive.turns / np.abs(speed)
 

@@ -11,7 +11,14 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Parameters, Rates
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, LooseSlide, LooseSlot, as_complex, split
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    LooseSlide,
+    LooseSlot,
+    Revolute,
+    as_complex,
+    split,
+)
 from hpcclear.dynamics.linkage.poses import Pose
 from hpcclear.dynamics.planar.energy import stored_energy
 from hpcclear.dynamics.planar.path import followed
@@ -22,7 +29,7 @@ from hpcclear.scene.planar import turns_of
 
 class Seen(NamedTuple):
     """States at the instants of a response: coordinates and velocities (t, n), time in the revolution, its number, contacts
-    (t, 2 MAX_JOINTS), rates, works (t, 4)."""
+    (t, 2 MAX_JOINTS), rates, works (t, 4), forces of ideal pins (t, 2, MAX_PINS)."""
 
     q: Array
     v: Array
@@ -31,6 +38,7 @@ class Seen(NamedTuple):
     contacts: Array
     rates: Rates
     works: Array
+    pins: Array
 
 
 def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
@@ -73,7 +81,21 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         **mode_series(scene.modes, seen.q, seen.v, strain),
         **guide_series(mechanism, pose),
         **held,
+        **pin_series(scene, mechanism, seen.pins),
     }
+
+
+def pins_of(mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of the pins without clearance."""
+    return tuple(joint.name for joint in mechanism.joints if type(joint) is Revolute)
+
+
+def pin_series(scene: Scene, mechanism: Mechanism, pins: Array) -> dict[str, Array]:
+    """Forces of the ideal pins on their journals' bodies (t, pins); none where a bar bends, which leaves them unknown."""
+    count = len(pins_of(mechanism))
+    if scene.template is not None or scene.modes or not count:
+        return {}
+    return {f"pin_force_{axis}": pins[:, k, :count] for k, axis in enumerate("xy")}
 
 
 def at_places(scene: Scene, columns: Array) -> Array:
@@ -202,7 +224,7 @@ def _phase(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> Array:
     """Progress of the drive since the start (t,), 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
     named = Parameters(par)
     cycle = at.TURN * turns_of(scene.linkage)
-    if linkage.mechanism.period.prescribed:
+    if linkage.mechanism.period.prescribed or not linkage.mechanism.period.advance:
         return cycle * (seen.revolution + seen.turn_time / named.period)
     return seen.q[:, -1] - (named.turn_end - cycle) + cycle * seen.revolution
 

@@ -21,6 +21,7 @@ from hpcclear.dynamics.planar.curves import angle_pieces, speed_pieces
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     ForceLoad,
+    PlanarFree,
     PlanarHarmonic,
     PlanarRunUp,
     PlanarSpeed,
@@ -191,13 +192,17 @@ def _drive(drive: object) -> parts.Drive:
             drive.name, drive.body, 0.0, rows[0][1], drive.flywheel_inertia, False, drive.period,
             drive.turns, top, rows=rows, pieces=speed_pieces(rows),
         )  # fmt: skip
+    if isinstance(drive, PlanarFree):
+        return parts.Release(
+            drive.name, drive.body, 0.0, drive.initial_speed, period=drive.period, interval=drive.interval
+        )  # fmt: skip
     assert isinstance(drive, PlanarTorque)
     table = isinstance(drive.torque, tuple)
     torque = 1.0 if table or drive.torque is None else drive.torque
     return parts.TorqueDrive(
         drive.name, drive.body, torque,  # type: ignore[arg-type]
         drive.initial_speed, drive.flywheel_inertia, table, drive.period, drive.turns,
-        drive.expected_speed, drive.no_load_speed, drive.torque_by_speed,
+        drive.expected_speed, drive.no_load_speed, drive.torque_by_speed, interval=drive.interval,
     )  # fmt: skip
 
 

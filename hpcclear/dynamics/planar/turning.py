@@ -69,7 +69,7 @@ def _by_torque(mechanism: Mechanism) -> bool:
 def twin_of(mechanism: Mechanism) -> Mechanism | None:
     """The mechanism without clearance, if its drives prescribe all of its motion, or would at constant speeds."""
     by_torque = _by_torque(mechanism)
-    if by_torque and mechanism.clearances:
+    if by_torque and (mechanism.clearances or not mechanism.period.advance):
         return None
     try:
         twin = without_clearance(mechanism) if mechanism.clearances or by_torque else mechanism

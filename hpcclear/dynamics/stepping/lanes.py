@@ -162,12 +162,13 @@ class Lanes:
     def observe(
         self, par: Array, states: Array, contacts: Array, times: Array, began: Array
     ) -> Array:
-        """Accelerations (n), then rates, at each instant (instants, n + RATES), by the motion with the observed effects.
+        """Accelerations (n), rates, forces of pins at each instant (instants, n + RATES + 2 MAX_PINS), by the motion with the
+        observed effects.
 
         Parameters (PARAMETERS,) of one sample; the others as of `hpcclear.dynamics.linkage.observe.observe`. To be called after
         the first step.
         """
-        out = np.zeros((len(times), self.problem.coordinates + at.RATES))
+        out = np.zeros((len(times), self.problem.coordinates + at.RATES + 2 * at.MAX_PINS))
         states, contacts, times, began = map(np.ascontiguousarray, (states, contacts, times, began))
         tables, both = self.problem.tables, (times, began)
         observe(self._observer, par, tables, states, contacts, both, out, self.width)

@@ -101,7 +101,18 @@ class Problem:
         s.chosen = 0.0 if self.chosen else 1.0
         s.chosen[list(self.chosen)] = 1.0
         s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]
+        s.wraps[:n] = self.wraps
         return s
+
+    @property
+    def wraps(self) -> Array:
+        """By how much each coordinate (n,) is counted anew with a revolution, rad; 0 of those that do not go round with it."""
+        linkage = self.linkage
+        gained = [
+            linkage.gained(one.body) if one.kind == "angle" else 0.0
+            for one in linkage.forest.coordinates
+        ]
+        return np.array([0.0] * at.bristles_of(self.effects) + gained)
 
     def motion(self, effects: at.Effects, width: int) -> Any:
         """The compiled motion of so many lanes with these effects (`rhs.compiled_motion`)."""

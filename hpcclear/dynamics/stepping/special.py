@@ -33,7 +33,7 @@ from hpcclear.dynamics.stepping.stops import (
     stop_at_impacts,
     stop_at_kinks,
     stop_free_crank,
-    wrap_crank,
+    wrap_angles,
 )
 
 NEXT_SAMPLE, END_OF_STEP, END_OF_REVOLUTION, END_OF_SAMPLE = range(4)
@@ -80,8 +80,7 @@ def answer(numbers, rules, block, queue, settings, tables):
         status = end_of_step(rules, lane, W, n, block, settings, tables)
         ends = status != OK
     elif asked == END_OF_REVOLUTION:
-        if rules.turning:
-            wrap_crank(lane, W, block.work, n - 1, settings)
+        wrap_angles(lane, W, n, block.work, settings)
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
     elif asked == END_OF_SAMPLE:

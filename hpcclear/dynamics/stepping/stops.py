@@ -9,6 +9,7 @@ from hpcclear.dynamics.layout.settings import (
     CYCLE,
     GAP_TOLERANCE,
     IMPACT_FLOOR,
+    WRAPS,
 )
 from hpcclear.dynamics.stepping.control import FIRST_PART, SHRINK
 from hpcclear.dynamics.stepping.events import (
@@ -192,6 +193,7 @@ def stop_free_crank(lane, W, block, settings, last):
 
 
 @lane_event
-def wrap_crank(lane, W, work, last, settings):
-    """Count a crank angle that is a coordinate anew each turn, so that it keeps its precision."""
-    work[(at.Q + last) * W + lane] -= settings[CYCLE]
+def wrap_angles(lane, W, n, work, settings):
+    """Count angles that go round with the revolutions anew with each, so that they keep their precision."""
+    for k in range(n):
+        work[(at.Q + k) * W + lane] -= settings[WRAPS + k]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hpcclear.base.arrays import Array, Booleans, Records
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import failed
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES, Evaluator, with_pressures
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
 from hpcclear.dynamics.layout.views import Rates, Start
@@ -86,12 +87,13 @@ class Recorded:
 
     def observe(
         self, states: Array, contacts: Array, turn_time: Array, began: Array
-    ) -> tuple[Array, Rates]:
-        """Accelerations (t, n) and rates at states (t, 2 n), contacts (t, 2 MAX_JOINTS), times in the revolution (t,) and when
-        that began (t,)."""
+    ) -> tuple[Array, Rates, Array]:
+        """Accelerations (t, n), rates and forces of pins (t, 2, MAX_PINS) at states (t, 2 n), contacts
+        (t, 2 MAX_JOINTS), times in the revolution (t,) and when that began (t,)."""
         out = self._lanes.observe(self.par, states, contacts, turn_time, began)
         n = self.problem.coordinates
-        return out[:, :n], Rates(out[:, n:])
+        rates, pins = np.split(out[:, n:], [at.RATES], axis=1)
+        return out[:, :n], Rates(rates), pins.reshape(-1, 2, at.MAX_PINS)
 
     def first_row(self) -> Array:
         """The row (1, columns) of the start."""

@@ -22,7 +22,11 @@ class TorsionSpring(Acting):
     upper: float | None = None
     stop_stiffness: float = 0.0
     kind: ClassVar[str] = "torsion-spring"
-    by_angle: ClassVar[bool] = True
+
+    @property
+    def by_angle(self) -> bool:  # type: ignore[override]
+        """Unless it is a damper alone."""
+        return self.stiffness != 0.0 or self.stop_stiffness != 0.0
 
     def numbers(self) -> dict[str, Any]:
         """Its parameters."""
