@@ -222,8 +222,8 @@ VERIFICATION: Columns = {
     **{name: row for place in ORDINALS for name, row in goal(place).items()},
     "constraints": text(("design",), "verdicts on the constraints of its case"),
     "constraint_excess": number(("design",), "1",
-        "largest violation of a constraint, relative to the threshold, at most 0 without; of limits always exceeded with the "
-        "relative distance"),
+        "largest violation of a constraint, relative to the threshold, at most 0 without; plus "
+        "the relative distance of f where all simulations exceed it"),
     "samples": count(("design",), "number of simulations"),
     "rare_samples": count(("design",), "number of additional simulations that decide rare failures"),
     "failed": count(("design",), "number of simulations that failed"),
