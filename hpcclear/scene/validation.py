@@ -65,7 +65,7 @@ def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
         raise _translated(details[0], content, more=len(details) - 1) from None
 
 
-def scene_of(kind: type[Whole], content: Mapping[str, object]) -> Whole:
+def scene_of(kind: type[Whole], content: Mapping[str, Any]) -> Whole:
     """The scene of a file's tables, with the readings of its units; errors as `validated`.
 
     Source text that it carries is run: `hpcclear.scene.load_scene` sees to it that it may be.
