@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -392,6 +393,7 @@ def record(path: Path, noise: float, samples: int, change: float, form: str, see
 def test_each_record_is_judged_as_if_it_were_alone(made, scene, tmp_path, monkeypatch):
     """Good ones and one of another machine, beside loose, coarse, dead, free-running ones: verdicts stay to the last bit."""
     monkeypatch.setattr(answer, "simulated", lambda *_, **__: made[0])
+    monkeypatch.setattr(answer, "prepare", partial(prepare, members=24))  # enough to compare
     bare = scene.with_({"study": None})
     kinds = {
         "good": (0.2, 256, 0.0, ""), "other machine": (0.2, 256, 0.8, ""), "loose": (20.0, 256, 0.0, ""),
