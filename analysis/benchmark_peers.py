@@ -375,6 +375,7 @@ def record(rows: list[dict[str, str]]) -> None:
     table += [f"| {' | '.join(row.values())} |" for row in kept]
     text = PAGE.read_text(encoding="utf-8")
     between = "\n".join(["", "", *table, "", ""])
+    assert FIRST in text, f"{PAGE} lacks {FIRST}"
     pattern = re.compile(f"(?<={re.escape(FIRST)}).*(?={re.escape(LAST)})", re.DOTALL)
     PAGE.write_text(pattern.sub(lambda _: between, text), encoding="utf-8")
 

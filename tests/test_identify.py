@@ -295,7 +295,7 @@ def test_a_resonance_that_is_known_is_taken_off_and_an_unknown_one_is_noticed(ma
 
 def test_impacts_are_counted_in_a_simulated_measurement(tmp_path, scene):
     """Timing is in the harmonics, the count in the mean; both as the motion itself has them."""
-    # At 150 um some motions keep contact, by their last bits; at 400 um nine perturbed ones have 4.2 to 5.1 impacts a revolution.
+    # At 150 um some motions keep contact, by their last bits; at 400 um nine perturbed ones have 4.2 to 5.1 impacts each.
     loose = {"joints.crank_rod.clearance": 400e-6, "study": None}
     own = prepared_scene(scene.with_(loose))
     response, name = hpcclear.simulate(own, checked=False), "impacts crank_rod"
