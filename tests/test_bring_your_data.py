@@ -340,8 +340,9 @@ def test_the_page_draws_the_tables_of_a_scene(tmp_path):
     load = f'effects.slider_load={{file="{tmp_path / "p.csv"}"}}'
     plain, loaded = (load_scene(JOBS / "slider_crank.toml", sets) for sets in ([], [load]))
     found = data.response().assign_attrs(scene=loaded.text)
-    (line,) = tables_figure(found).axes[0].get_lines()
-    assert [round(one, 9) for one in line.get_ydata()[1:5]] == [1.0, -0.5, 0.0, 0.2]
+    curve, rows = tables_figure(found).axes[0].get_lines()
+    assert [round(one, 9) for one in rows.get_ydata()] == [1.0, -0.5, 0.0, 0.2]
+    assert {1.0, -0.5, 0.2} <= {round(one, 6) for one in curve.get_ydata()}
     assert tables_figure in [
         entry.draw for entry in catalogue.RESPONSE
     ]  # all of them are on the page

@@ -134,6 +134,7 @@ def test_commands_and_options_that_are_named_exist(page):
 FOREIGN = {"--kill-on-bad-exit", "--mpi", "--help", "--contain", "--bind"}
 FOREIGN |= {
     "--full",
+    "--last-bits",
     "--quick",
     "--nightly",
     "--tests",

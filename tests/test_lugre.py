@@ -374,7 +374,7 @@ def test_a_scene_tells_of_its_bristles():
 
 
 def test_a_linkage_without_room_for_bristles_is_refused():
-    """A chain of seven free bars: 21 coordinates, and seven bristles."""
+    """A chain of seven free bars: 21 coordinates and seven bristles; and 61 pendulums beside it."""
     bar = {"mass": 1.0, "length": 0.1, "inertia": 1e-3}
     play = {
         "kind": "clearance", "clearance": 1e-4, "bearing_radius": 0.01,
@@ -387,12 +387,17 @@ def test_a_linkage_without_room_for_bristles_is_refused():
     }
     axis = {"axis": {"kind": "revolute", "journal": "shaft.a", "bearing": "ground.o"}}
     base = shaft({}, axis, {"journal": "shaft.o", "bearing": "ground.o"}, 1.0, 1e-6).resolved()
-    base["mechanism"]["bodies"] = dict.fromkeys(names, bar)
-    base["mechanism"]["joints"] = axis | chain
+    idle = [f"idle{k}" for k in range(61)]
+    pins = {
+        f"pin_of_{k}": {"kind": "revolute", "journal": f"{k}.a", "bearing": "ground.o"}
+        for k in idle
+    }
+    base["mechanism"]["bodies"] = dict.fromkeys([*names, *idle], bar)
+    base["mechanism"]["joints"] = axis | chain | pins
     with pytest.raises(InputError) as caught:
         problem_of(load_scene(base))
     assert caught.value.key == "effects.friction.law"
-    assert "28 in all" in caught.value.reason
+    assert "89 in all" in caught.value.reason
 
 
 def test_bristles_give_way_at_most_where_friction_at_rest_holds_them():

@@ -347,17 +347,11 @@ def test_a_response_replaces_no_result_of_a_study(studied):
     assert (studied / "samples.nc").read_bytes() == before
 
 
-def test_neither_ranks_nor_lanes_are_in_a_key(tmp_path, monkeypatch):
+def test_neither_ranks_nor_lanes_are_in_a_key():
     from hpcclear.ensemble import identity
 
     for command in ("sample", "run", "accuracy"):
         assert not {"ranks", "lanes"} & set(identity.run_key(study_scene(), command))
-    sample(tmp_path)
-    content = netcdf.load(tmp_path / "out.nc").to_xarray()
-    earlier = json.loads(content.attrs[KEY]) | {"lanes": "64", "ranks": "2"}
-    content.attrs[KEY] = json.dumps(earlier)
-    netcdf.save(content, tmp_path / "out.nc")
-    sample(tmp_path)  # what an earlier version wrote is found
 
 
 # -- names of results -------------------------------------------------------------------------------

@@ -62,7 +62,8 @@ STUDY = (
     "study.sensitivity.groups=[]", "study.sensitivity.sobol_samples=0", "study.samples=80", "study.test_samples=20",
     "study.surrogate.models=[]", 'study.surrogate.optimisation=["m2", "m3", "u2", "C"]', "study.surrogate.r2=0.9",
     "study.swarm.particles=50", "study.swarm.iterations=40", "study.swarm.runs=2", "study.swarm.archive=60",
-    "study.verification={accuracy={mean=0.005, deviation=0.01}, designs=12, infill_rounds=4, infill_samples=64, "
+    "study.accuracy={mean=0.005, deviation=0.01}",
+    "study.verification={designs=12, infill_rounds=4, infill_samples=64, "
     "infill_designs=12, response_copies=2, response_windows=2, audit_samples=0, most_samples=1024}",
     f'study.cases={{three={{random=["C"], objectives=["mean", "deviation", {{formula="{THIRD}"}}]}}}}',
 )  # fmt: skip

@@ -321,29 +321,6 @@ def test_one_number_stands_for_mean_and_deviation(entry):
     assert load_scene(tomllib.loads(scene.to_toml())) == scene
 
 
-@pytest.mark.parametrize(
-    ("old", "expected"),
-    [
-        ("{mean = 0.01, deviation = 0.02}", (0.01, 0.02)),
-        ("{deviation = 0.01}", (0.002, 0.01)),  # the other one had that default
-        ("{mean = 0.002, deviation = 0.005}", None),  # nothing but the defaults
-    ],
-)
-def test_an_accuracy_of_verification_is_read_as_that_of_the_study(old, expected):
-    bare = STUDY.replace("accuracy = { mean = 0.005, deviation = 0.01 }\n", "")
-    scene = formula_study.scene_of(bare, f"study.verification.accuracy={old}")
-    given = scene.required_study.accuracy
-    assert (given and (given.mean, given.deviation)) == expected
-    assert len(scene.readings) == (expected is not None)
-    assert load_scene(tomllib.loads(scene.to_toml())) == scene
-
-
-def test_an_accuracy_of_verification_beside_another_is_not_used_and_said_so():
-    scene = scene_of("study.verification.accuracy.mean=0.1")
-    assert scene.required_study.wanted.mean == 0.005
-    assert "not used beside study.accuracy" in scene.readings[0]
-
-
 def test_an_accuracy_beside_a_number_of_draws_is_not_used_and_said_so(tmp_path):
     scene = scene_of("study.verification.samples=100")
     told: list[str] = []

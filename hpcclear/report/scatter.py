@@ -1,13 +1,16 @@
 """Lines on the scatter of one design: which random inputs contribute to its variance, and what tighter tolerances bring."""
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
-from hpcclear.statistics.sensitivity.contributions import Falls
+
+if TYPE_CHECKING:
+    from hpcclear.statistics.sensitivity.contributions import Falls
 
 HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
@@ -64,6 +67,8 @@ def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
     prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
         joint = [float(own.get(f"halved_together{end}", np.nan)) for end in ("", "_error")]
+        from hpcclear.statistics.sensitivity.contributions import Falls  # loads SciPy
+
         singly = Falls.of(falls[0], lambda _: (joint[0], joint[1]))
         yield Line("tighten first", _first(list(map(str, names)), singly, falls[1], prices))
 
@@ -79,7 +84,7 @@ def to_tighten(
     return [int(k) for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED], known
 
 
-def _first(names: list[str], falls: Falls, errors: np.ndarray, prices: np.ndarray) -> str:
+def _first(names: list[str], falls: "Falls", errors: np.ndarray, prices: np.ndarray) -> str:
     """Which inputs to tighten first, and by how much the scatter then falls."""
     chosen, known = to_tighten(falls, errors, prices)
     if not chosen:

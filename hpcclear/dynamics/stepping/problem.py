@@ -136,7 +136,7 @@ class Problem:
 
     @cached_property
     def tables(self) -> Array:
-        """The tabulated curves as the kernel reads them (`layout.curves.packed`)."""
+        """The tabulated curves as the kernel reads them, shape (n,) (`layout.curves.packed`)."""
         return packed(self.curves, self.stops)
 
     @cached_property
