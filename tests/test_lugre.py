@@ -397,7 +397,7 @@ def test_a_linkage_without_room_for_bristles_is_refused():
     with pytest.raises(InputError) as caught:
         problem_of(load_scene(base))
     assert caught.value.key == "effects.friction.law"
-    assert "89 in all" in caught.value.reason
+    assert "89 coordinates, of 88 at most" in caught.value.reason
 
 
 def test_bristles_give_way_at_most_where_friction_at_rest_holds_them():

@@ -171,18 +171,6 @@ BROKEN = {
         "joints",
         "more than 8",
     ),
-    "too many degrees of freedom": (
-        lambda: Mechanism(
-            tuple(bar(f"bar{k}", 0.1, 0.1) for k in range(90)),
-            tuple(
-                Revolute(f"o{k}", f"bar{k}.a", f"bar{k - 1}.b" if k else "ground.o")
-                for k in range(90)
-            ),
-            (ConstantSpeed("motor", "bar0", 1.0),),
-        ),
-        "bodies",
-        "more than 88",
-    ),
 }  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from numba import njit
 from running import scene_with
 from some_laws import effects_with
 
+from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.numbered import Rows
 from hpcclear.base.one_text import one_text
@@ -23,6 +24,7 @@ from hpcclear.dynamics.stepping.explicit.steps import weigh_rates
 from hpcclear.dynamics.stepping.implicit.columns import leave
 from hpcclear.dynamics.stepping.implicit.newton import observe_stages
 from hpcclear.dynamics.stepping.lanes import Lanes
+from hpcclear.scene import load_scene
 
 W = 4
 NONE_OPEN = at.Stepped(at.rules_of(at.Effects()), np.zeros(0, np.int64))
@@ -87,6 +89,21 @@ def test_what_does_not_fit_is_refused():
         tab.Tableau("askew", 2, 1, many, many[0, :3], many[0, :3], "none")
     with pytest.raises(ValueError, match=f"a row of Start holds {at.START} numbers, not 21"):
         Start(np.zeros((3, 21)))
+
+
+def test_a_scene_of_too_many_coordinates_is_refused_with_their_number():
+    bar = {"mass": 1.0, "length": 0.1, "inertia": 1e-3}
+    names = ["crank", *(f"bar{k}" for k in range(at.MAX_COORDINATES + 1))]
+    pins = {
+        f"pin_{k}": {"kind": "revolute", "journal": f"{k}.a", "bearing": "ground.o"} for k in names
+    }
+    motor = {"kind": "constant-speed", "body": "crank", "speed": 10.0}
+    mechanism = {
+        "kind": "planar", "bodies": dict.fromkeys(names, bar), "joints": pins, "drives": {"motor": motor},
+    }  # fmt: skip
+    with pytest.raises(InputError, match="89") as caught:
+        problem_of(load_scene({"mechanism": mechanism, "effects": {"contact": {"law": "hertz"}}}))
+    assert "88 at most" in caught.value.reason
 
 
 def test_an_end_is_a_start():

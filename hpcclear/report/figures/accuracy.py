@@ -53,11 +53,17 @@ def _decades(axis: "Axis") -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+FEW_DECADES = 50.0
+"""Ratio of the ends of a time axis above which only decades have a tick: more labels would meet."""
+
+
 def _plain(axis: "Axes") -> None:
     """A logarithmic time axis above a panel, with plain numbers at its ticks."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    low, high = axis.get_xlim()
+    subs = (1.0, 2.0, 5.0) if high < FEW_DECADES * low else (1.0,)
+    axis.xaxis.set_major_locator(LogLocator(subs=subs, numticks=12))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.tick_params(labelsize=style.SMALL, length=2.0, pad=1.0)
