@@ -153,10 +153,11 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
     with (
         on_ranks(ahead=(), resumes=False) if launched else contextlib.nullcontext(alone()) as ranks
     ):
-        from hpcclear.cli.check import describe_scene
         from hpcclear.scene import load_scene
 
         scene = load_scene(*written)
+        from hpcclear.cli.check import describe_scene  # loads the kernel: not for a scene that is refused
+
         turns = describe_scene(scene, cost, ranks)
         if scene.study is not None and scene.study.variables:
             from hpcclear.cli.corners import describe
