@@ -10,7 +10,7 @@ from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.surrogate import region_of
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.host import process_fields
-from hpcclear.ensemble.simulate import make_evaluator, payload_of
+from hpcclear.ensemble import simulate
 from hpcclear.ranks import leading
 from hpcclear.ranks.schedule import COLUMNS, Task
 from hpcclear.ranks.team import Ranks
@@ -72,8 +72,8 @@ def _timed(scene: Scene, case: str, samples: int, number: int, ranks: Ranks) -> 
     paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
     stage = _stage(number, samples)
-    payload = payload_of(scene, points)
-    task = Task(stage, make_evaluator, payload, record_of(scene), workers=number)
+    payload = simulate.payload_of(scene, points)
+    task = Task(stage, simulate.make_evaluator, payload, record_of(scene), workers=number)
     started = time.perf_counter()
     leading.run_points(ranks, task, points.values, keep=False)
     wall = time.perf_counter() - started
