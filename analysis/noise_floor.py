@@ -37,7 +37,7 @@ def inside(share: float, rows: int, seed: int) -> int:
         return np.asarray(own + share**0.5 * rng.standard_normal(len(x)))
 
     values = f(points)
-    found = analyse_sobol(values, INPUTS, rng)
+    found = analyse_sobol(values, INPUTS)
     beside = max(rows // 4, 32)
     noise, error = noise_share(values[:beside], f(points[:beside]), found.variance)
     errors = np.hypot(np.ptp(found.total_interval, axis=1) / 2.0, 1.96 * error)

@@ -56,7 +56,7 @@ def sobol_indices(
     function: Function, bounds: np.ndarray, rng: np.random.Generator, rows: int, **options: float
 ) -> SobolIndices:
     points = sobol_design(bounds, rows, rng)
-    return analyse_sobol(function(points), len(bounds), rng, **options)  # type: ignore[arg-type]
+    return analyse_sobol(function(points), len(bounds), **options)  # type: ignore[arg-type]
 
 
 # the design ---------------------------------------------------------------------------------------
@@ -355,7 +355,7 @@ def test_known_indices(
     shift: int,
 ) -> None:
     rng = np.random.default_rng(seed + shift)
-    found = sobol_indices(function, bounds, rng, 2**14, n_resamples=20)
+    found = sobol_indices(function, bounds, rng, 2**14)
     first, total = truth()
     at_most(np.abs(found.first - first).max(), 0.01)
     at_most(np.abs(found.total - total).max(), 0.01)
@@ -367,14 +367,31 @@ def small(seed: int, function: Function = Ishigami.evaluate, **options: float) -
     return sobol_indices(function, TORUS, rng, 256, **options)
 
 
-def test_bootstrap_limits_hold_the_truth_at_least_as_often_as_they_say(shift: int) -> None:
-    truth = np.concatenate(ishigami_truth())
-    held = []
-    for seed in range(shift, shift + 40):
-        found = small(seed)
-        limits = np.vstack([found.first_interval, found.total_interval])
-        held.append((limits[:, 0] <= truth + 1e-12) & (truth - 1e-12 <= limits[:, 1]))
-    at_least(np.count_nonzero(held), fewest(np.size(held), 0.95))
+KNOWN = {
+    "Ishigami": (Ishigami.evaluate, TORUS, ishigami_truth),
+    "Sobol G": (lambda x: Sobol_G.evaluate(x, a=G_WEIGHTS), UNIT, sobol_g_truth),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_limits_hold_the_truth_as_often_as_they_say_and_are_no_wider_than_needed(
+    name, shift: int
+) -> None:
+    function, bounds, truth = KNOWN[name]
+    values, limits = [], []
+    for seed in range(shift, shift + 100):
+        found = sobol_indices(function, bounds, np.random.default_rng(seed), 256)
+        values.append([found.first, found.total])
+        limits.append([found.first_interval, found.total_interval])
+    exact, ends = np.stack(truth()), np.array(limits)
+    held = (ends[..., 0] <= exact + 1e-12) & (exact - 1e-12 <= ends[..., 1])
+    at_least(np.count_nonzero(held), fewest(held.size, 0.93))
+    needed = 1.96 * np.std(
+        values, axis=0
+    )  # its own error from 100 designs is 7 %, and half of that in the mean of several
+    wider = np.ptp(ends, axis=-1).mean(axis=0) / 2.0 / needed
+    at_most(float(wider.mean()), 1.3)
+    at_least(float(wider.mean()), 0.9)
 
 
 def test_wider_confidence_gives_wider_limits_around_the_estimate() -> None:
@@ -404,12 +421,13 @@ def test_failed_rows_are_dropped_whole_and_counted() -> None:
     values = Ishigami.evaluate(points)
     broken = values.copy()
     broken[[3, 1024 + 10, 2 * 1024 + 3, 4 * 1024 + 99]] = np.nan  # rows 3, 10 and 99
-    found = analyse_sobol(broken, 3, np.random.default_rng(1))
+    found = analyse_sobol(broken, 3)
     kept = np.delete(values.reshape(5, -1), [3, 10, 99], axis=1).ravel()
-    same = analyse_sobol(kept, 3, np.random.default_rng(1))
+    same = analyse_sobol(kept, 3)
     assert (found.n_rows, found.n_dropped) == (1021, 3)
     np.testing.assert_array_equal(found.first, same.first)
-    np.testing.assert_array_equal(found.total_interval, same.total_interval)
+    # three of 1024 rows stand in the replicate beside theirs: each share of the error moves by a few per cent
+    np.testing.assert_allclose(found.total_interval, same.total_interval, atol=0.01)
 
 
 def test_constant_has_no_indices_and_a_seed_of_zero_is_a_seed() -> None:
@@ -421,9 +439,8 @@ def test_constant_has_no_indices_and_a_seed_of_zero_is_a_seed() -> None:
 
 
 def test_sobol_refuses() -> None:
-    rng = np.random.default_rng(0)
     with pytest.raises(InputError, match="nearly every row"):
-        analyse_sobol(np.full(50, np.nan), 3, rng)
+        analyse_sobol(np.full(50, np.nan), 3)
 
 
 def test_chaotic_scatter_is_no_inputs(shift: int) -> None:
@@ -439,7 +456,7 @@ def test_chaotic_scatter_is_no_inputs(shift: int) -> None:
             return 12.0**0.5 * x[:, 0] + rng.standard_normal(len(x))
 
         values = f(points)
-        found = analyse_sobol(values, 3, rng, n_resamples=50)
+        found = analyse_sobol(values, 3)
         share, error = noise_share(values[:64], f(points[:64]), found.variance)
         assert share == pytest.approx(0.5, abs=6.0 * error)
         assert found.total[1] > 0.3

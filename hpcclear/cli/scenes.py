@@ -156,7 +156,9 @@ def check(written: Written, cost: bool, sketch: Path | None) -> int:
         from hpcclear.scene import load_scene
 
         scene = load_scene(*written)
-        from hpcclear.cli.check import describe_scene  # loads the kernel: not for a scene that is refused
+        from hpcclear.cli.check import (
+            describe_scene,
+        )  # loads the kernel: not for a scene that is refused
 
         turns = describe_scene(scene, cost, ranks)
         if scene.study is not None and scene.study.variables:

@@ -352,7 +352,7 @@ def _global(run: StudyRun, values: Array | None) -> Result:
         return dict.fromkeys(names, nothing) | unknown
     beside = _beside(run.study)
     values, near = values[:-beside], values[-beside:]
-    found = sensitivity.analyse_sobol(values, count, run.rng("sobol bootstrap"))
+    found = sensitivity.analyse_sobol(values, count)
     noise, error = sensitivity.noise_share(values[:beside], near, found.variance)
     total_error = np.ptp(found.total_interval, axis=1) / (2 * _NORMAL_95)
     return {

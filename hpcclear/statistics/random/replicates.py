@@ -10,7 +10,9 @@ quasi-Monte Carlo methods" (2002), doi:10.1007/0-306-48102-2_20; for the quantil
 "Confidence intervals for medians and other position measures", J. Amer. Stat. Assoc. 47 (1952),
 doi:10.1080/01621459.1952.10483443, and R. R. Bahadur, "A note on quantiles in large samples", Ann. Math. Stat. 37 (1966),
 doi:10.1214/aoms/1177699450; for the probability E. L. Korn and B. I. Graubard, "Confidence intervals for proportions with small
-expected number of positive counts estimated from survey data", Survey Methodology 24 (1998), 193-201.
+expected number of positive counts estimated from survey data", Survey Methodology 24 (1998), 193-201, and L. D. Brown,
+T. T. Cai, A. DasGupta, "Interval estimation for a binomial proportion", Statistical Science 16 (2001),
+doi:10.1214/ss/1009213286.
 """
 
 from dataclasses import dataclass
@@ -197,13 +199,23 @@ def exceedance(values: Array, limit: float, confidence: float) -> Limited:
 def _interval_of_share(
     share: float, shifts: Array, counts: Array, confidence: float
 ) -> tuple[float, float]:
-    """Interval of a probability: that of as many independent draws as have the error of `shifts` (Korn and Graubard 1998)."""
+    """Interval of a probability: that of as many independent draws as have the error of `shifts` (Korn and Graubard 1998).
+
+    By Jeffreys's prior (Brown, Cai, DasGupta 2001), as its error is known from replicates: the limits of Clopper and Pearson
+    never hold less often than they say, and so are wider by half a hit on each side.
+    """
     total = int(counts.sum())
-    error = float(spread(shifts[None])[0]) + 0.5 / total  # between two values nothing is known
+    if not 0.0 < share < 1.0:
+        return of_hits(share * total, total, confidence)
+    # between two values nothing is known
+    error = np.hypot(float(spread(shifts[None])[0]), 0.5 / total)
     # as many independent draws, fewer for an error of few degrees of freedom
     worth = (student(confidence, total - 1) / student(confidence, int((counts > 0).sum()) - 1)) ** 2
-    draws = share * (1.0 - share) / error**2 * worth if 0.0 < share < 1.0 else float(total)
-    return of_hits(share * draws, draws, confidence)
+    draws = share * (1.0 - share) / error**2 * worth
+    tails = ((1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0)
+    hits = share * draws
+    lower, upper = scipy.special.betaincinv(hits + 0.5, draws - hits + 0.5, tails)
+    return float(lower), float(upper)
 
 
 def of_hits(hits: float, draws: float, confidence: float) -> tuple[float, float]:
