@@ -323,13 +323,6 @@ def test_a_table_of_newlines_takes_no_memory(tmp_path):
         read_points(table, load_scene(SCENE))
 
 
-def test_blank_lines_and_comments_between_points_are_left_out(tmp_path):
-    table = tmp_path / "points.csv"
-    table.write_text('\n# mine\n"C [mm]"\n\n0.3\n , \n #x\n\n0.4\n')
-    points = read_points(table, load_scene(SCENE))
-    np.testing.assert_allclose(points.values, [[3e-4], [4e-4]])
-
-
 # -- forged results -----------------------------------------------------------------------------
 
 DEEPLY = "a = " + "[" * 900 + "]" * 900

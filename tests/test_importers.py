@@ -380,20 +380,6 @@ def test_binary_drawings_and_odd_bytes_are_refused(tmp_path):
         drawing_of(tmp_path / "none.dxf")
 
 
-def test_damaged_files_never_crash(tmp_path):
-    random = np.random.default_rng(3)
-    for text in (four_bar(), document(SLOT, SLOT_BARS), dxf(LAYERS)):
-        for _ in range(60):
-            data = bytearray(text.encode())
-            for place in random.integers(0, len(data), 3):
-                data[place] = random.integers(9, 126)
-            (tmp_path / "damaged").write_bytes(bytes(data))
-            try:
-                load_scene(linkage_of(tmp_path / "damaged"))
-            except InputError:
-                continue
-
-
 def test_the_command_takes_a_unit_and_prints_notes(tmp_path):
     source = written(tmp_path, dxf(LAYERS, unit=0), "sketch.dxf")
     made = tmp_path / "made.toml"

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import page_numbers
 import pytest
 from commands import kill_once_it_saved, overrides, run
 from running import scene_with
@@ -317,7 +316,6 @@ def test_ranks_and_a_kill_change_no_byte(tmp_path):
     code, output = run(words(out), 2)
     assert code == 0, output
     assert out.read_bytes() == files[0]
-    page_numbers.check(out.parent)
     found = dataset.read(out, "wear")
     check(found)
     assert fan_figure(found) is not None

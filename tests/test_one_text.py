@@ -1,8 +1,6 @@
 """Functions written out as one text: it does what their calls do, holds what is on, and is kept for the next process."""
 
-import ast
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,13 +14,11 @@ from running import scene_with
 from some_laws import effects_with
 
 from hpcclear.base import code_folder
-from hpcclear.base.jit import lane_function, scalar_function, written_kind
-from hpcclear.base.one_text import one_text, text_of
-from hpcclear.base.text.alike import written_once
+from hpcclear.base.jit import lane_function, scalar_function
+from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.stepping.stops import impact_fraction
 
 
 @scalar_function
@@ -93,47 +89,6 @@ def test_the_text_does_what_the_calls_do(flag, gaps):
     assert found[2] == pytest.approx(expected[2], rel=1e-14)
 
 
-def test_what_is_off_is_not_in_the_text():
-    with_, without = (
-        text_of(everything, "everything", {"flag": flag, "gaps": Switches(), "n": 2})
-        for flag in (1, None)
-    )
-    assert "3.0 *" in with_
-    assert "3.0 *" not in without
-
-
-def test_a_function_of_the_other_kind_stands_beside():
-    """It is compiled with its own rules of arithmetic."""
-    assert (written_kind(everything), written_kind(first_beyond)) == ("lane", "scalar")
-    text = text_of(everything, "everything", {"flag": None, "gaps": Switches(), "n": 2})
-    beside = text[: text.index("def first_beyond")].splitlines()[-1]
-    assert beside.startswith("@njit(")
-    assert "fastmath" not in beside
-    assert "clipped" not in text
-
-
-def test_two_branches_that_return_keep_their_order():
-    text = njit(one_text(impact_fraction, "impact"))
-    for case in [
-        (-1.0, 3.0, 1.0, 1.0, 0.0),
-        (-1.0, 6.0, -1.0, -6.0, 0.0),
-        (0.5, 0.1, 0.7, 0.1, 0.0),
-    ]:
-        assert text(*case) == impact_fraction(*case)
-
-
-def test_a_motion_holds_its_effects_alone():
-    linkage = linkage_of(scene_with({"effects.friction": {"law": "none"}}))
-    known = {"effects": effects_with((), joints=2), "W": 16}
-    text = text_of(linkage.module(known["effects"]).motion, "motion", known)
-    friction = rf"work\w*\[{(at.RATE_NOW + at.FRICTIONS) * 16} \+ i\w*\]"
-    assert re.search(rf"par\w*\[{(at.JOINTS[0].block + at.CLEARANCE) * 16} \+ i\w*\]", text)
-    assert not re.search(friction, text)
-    known["effects"] = known["effects"]._replace(series=1)
-    text = text_of(linkage.module(known["effects"]).motion, "motion", known)
-    assert re.search(friction, text)
-
-
 def test_a_text_is_a_file_and_written_once():
     effects = effects_with((), joints=2)
     motion = linkage_of(scene_with()).module(effects).motion
@@ -147,71 +102,6 @@ def test_a_text_is_a_file_and_written_once():
     assert again is not text
     assert path.stat().st_mtime_ns == written
     assert one_text(motion, "kept", effects=effects, W=4).__name__ != text.__name__
-
-
-def defined(text):
-    """Functions of a text, the last the one that is asked for, as `written_once` takes them."""
-    return [(f, "scalar" if f.name.startswith("scalar") else "lane") for f in ast.parse(text).body]
-
-
-def merged(text):
-    return ast.unparse(ast.Module([ast.fix_missing_locations(f) for f, _ in written_once(defined(text))], []))  # fmt: skip
-
-
-ALIKE = """
-def gap(work, i):
-    r = work[4 + i] * work[10 + i]
-    return r
-
-def gap_2(work_2, i_2):
-    r_2 = work_2[5 + i_2] * work_2[17 + i_2]
-    return r_2
-
-def gap_3(work_3, i_3):
-    r_3 = work_3[6 + i_3] * work_3[24 + i_3]
-    return r_3
-
-def asked(work, i):
-    return (gap(work, i), gap_2(work, i), gap_3(work, i))
-"""
-
-
-def test_functions_that_differ_by_addresses_are_written_once():
-    text = merged(ALIKE)
-    assert text.count("def ") == 2
-    before, after = {}, {}
-    exec(ALIKE, before)
-    exec(text, after)
-    work = np.random.default_rng(1).normal(size=40)
-    assert after["asked"](work, 3) == before["asked"](work, 3)
-
-
-def test_what_is_alike_by_chance_alone_stays():
-    """Another operation, a number that is no address, a function that is not inlined, more distances than are worth it."""
-    for old, new in (
-        ("work_2[5 + i_2] *", "work_2[5 + i_2] +"),
-        ("work_2[5 + i_2] *", "2.0 * work_2[5 + i_2] *"),
-        ("work_2[5 + i_2] *", "work_2[5 * i_2] *"),
-    ):
-        assert merged(ALIKE.replace(old, new)).count("def ") == 3
-    assert merged(ALIKE.replace("gap", "scalar_gap")).count("def ") == 4
-    sums = "def f{n}(w{n}):\n    return ({items})\n\n"
-    rows = ((1, 2, 3, 4, 5), (2, 4, 6, 8, 10))
-    two = "".join(
-        sums.format(n=n, items=", ".join(f"w{n}[{a}]" for a in row)) for n, row in enumerate(rows)
-    )
-    assert merged(two + "def asked(w):\n    return (f0(w), f1(w))").count("def ") == 3
-
-
-def test_what_does_nothing_is_not_called():
-    """And what then does nothing either is left out as well; equal functions that are not inlined are one."""
-    text = merged(
-        "def empty(a):\n    pass\n\ndef outer(b):\n    empty(b)\n\ndef scalar_one(c):\n    return c\n\n"
-        "def scalar_two(d):\n    return d\n\ndef asked(e):\n    outer(e)\n    return scalar_one(e) + scalar_two(e)"
-    )
-    assert text == (
-        "def scalar_one(c):\n    return c\n\ndef asked(e):\n    pass\n    return scalar_one(e) + scalar_one(e)"
-    )
 
 
 def test_a_source_that_was_written_is_noticed_whatever_its_size_and_time(tmp_path):

@@ -3,7 +3,6 @@
 import json
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -513,22 +512,6 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
         run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
 
 
-@pytest.mark.parametrize("name", ["peak-contact-force", "peak-crank-moment"])
-def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(formula, "FIELD", name.replace("-", "_"))
-    scene, place = scene_of(f"study.objective={name}"), tmp_path / "out"
-    run_study(scene, place, alone(), progress_style="quiet")
-    samples = dataset.read(place / "samples.nc")
-    assert samples["objective"].attrs["units"] == scene.objective.unit
-    assert samples["mean_gap"].attrs["units"] == "m"
-    assert not (place / "claims.nc").exists()
-    assert not (place / "readings.nc").exists()
-    assert "mean_paper" not in dataset.read(place / "verification.nc")
-    told: list[str] = []
-    run_study(scene, place, alone(), progress_style="quiet", notify=told.append)
-    assert told == [f"{place} holds the finished study."]
-
-
 OWN_NAMES = {
     "m1": "crank_mass",
     "u1": "crank_centre",
@@ -588,29 +571,6 @@ def test_the_papers_scene_is_recognised_by_what_it_holds(entry, cites, compares)
     assert bool(printed_designs(scene)) == compares
 
 
-OF_THE_PAPER = re.compile(
-    r"paper|claim|table 4|printed|readings|varying joint clearance", re.IGNORECASE
-)
-
-
-def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["hpcclear", "run", "own.toml"])  # kept with the timing
-    scene, place = own_scene("mechanism.rod.length=0.13"), tmp_path / "out"
-    run_study(scene, place, alone(), progress_style="quiet")
-    written = {path.name for path in place.glob("*.nc")}
-    kinds = "samples sensitivity kriging front verification contributions chaos timing"
-    assert written == {f"{kind}.nc" for kind in kinds.split()}
-    for path in place.rglob("*.nc"):
-        found = dataset.read(path)
-        assert "references" not in found.attrs
-        assert not any(name.endswith("_paper") for name in found.data_vars)
-    assert not any("paper" in name for name in dataset.read(place / "front.nc")["case"].values)
-    shutil.rmtree(place / "responses")  # those of the formula lack what figures draw
-    page = write_report(place).read_text(encoding="utf-8")
-    page = re.sub(r'(?s)src="data:[^"]*"|<style>.*?</style>|<script>.*?</script>', "", page)
-    assert OF_THE_PAPER.findall(page.replace(str(tmp_path), "")) == []
-
-
 OF_THE_OBJECTIVE = {
     "chaos.nc": "chaos_deviation",
     "samples.nc": "objective objective_spread objective_uncertainty",
@@ -656,15 +616,6 @@ def test_units_follow_the_objective_and_nothing_else_does(
                 assert content.attrs["units"] == table.data[variable].units, (path.name, variable)
     response = dataset.read(place / "responses" / "original.nc")
     assert response["eccentricity_x"].attrs["units"] == "m"
-
-
-def test_of_contact_forces_the_larger_is_the_objective():
-    for which in ("mean", "peak"):
-        scene = scene_of(f"study.objective={which}-contact-force")
-        records = np.zeros(2, [(f"{which}_contact_force", float, 2)])
-        records[f"{which}_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
-        assert scene.objective.unit == "N"
-        assert scene.objective.of(records).tolist() == [3.0, 5.0]
 
 
 # -- parts ------------------------------------------------------------------------------------------

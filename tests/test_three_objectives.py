@@ -323,6 +323,7 @@ return select.map((one) => [...one.options].map((option) => option.textContent))
 
 
 @needed
+@pytest.mark.nightly
 def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
     shutil.copytree(study, tmp_path / "page", ignore=shutil.ignore_patterns("responses"))
     page = write_report(tmp_path / "page")
