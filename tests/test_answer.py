@@ -177,6 +177,7 @@ SHORT |= {("one joint", "slider-acceleration-deviation"), ("damped", "mean-conta
         if o.replace("-", "_") not in WIDEST  # their geometry of contact has no pressure
     ],
 )
+@pytest.mark.shortened(1)
 def test_a_study_of_ones_own_tells_its_own_story(tmp_path, monkeypatch, capsys, scene, objective):
     """No word of the paper's in page, figures and terminal; f by its own name, variables by theirs."""
     formula.replace_dynamics(monkeypatch.setattr)

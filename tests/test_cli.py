@@ -70,6 +70,7 @@ def test_check_says_what_would_be_simulated():
     ],
     ids=lambda words: words[0],
 )
+@pytest.mark.shortened(3)
 def test_what_a_pipe_gets_fits_80_columns_on_any_number_of_ranks(tmp_path, words, ranks):
     """Output and log: no colour, no bar, no line that wraps, nothing said once a rank."""
     scene = {"wear": "wear"}.get(words[0], "quickstart")

@@ -148,6 +148,7 @@ ERRORS = [
 
 
 @pytest.mark.parametrize("how", ERRORS)
+@pytest.mark.shortened(6)
 def test_a_program_error_is_reported_once_and_ends_every_rank(how, tmp_path):
     code, output = finish(start(3, "failing.py", how, tmp_path / "mark"))
     elapsed = time.time() - (tmp_path / "mark").stat().st_mtime
@@ -180,6 +181,7 @@ def test_work_finished_before_an_error_reaches_root(tmp_path):
         "deaf root, bad input",
     ],
 )
+@pytest.mark.shortened(3)
 def test_bad_input_on_any_rank_is_a_message_and_exit_code_2(how, tmp_path):
     code, output = finish(start(3, "failing.py", how, tmp_path / "mark"))
     assert code == 2, output
@@ -215,6 +217,7 @@ def stop_and_resume(folder: pathlib.Path, where: str, number: int, ranks: int) -
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1])
 @pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.shortened(4)
 def test_a_signal_stops_a_run_that_then_resumes_to_the_same_result(ranks, number, tmp_path):
     output = stop_and_resume(tmp_path, "sampling", number, ranks)
     assert f"{number.name} was received" in output
@@ -231,6 +234,7 @@ def test_a_signal_stops_a_run_that_then_resumes_to_the_same_result(ranks, number
 @pytest.mark.parametrize(
     "where", ["begin", "polling", "deaf", "set-up of a rank", "call of a rank"]
 )
+@pytest.mark.shortened(3)
 def test_a_signal_is_obeyed_in_every_state(where, tmp_path):
     stop_and_resume(tmp_path, where, signal.SIGTERM, 2)
 

@@ -94,6 +94,7 @@ def test_the_table_holds_every_pair():
 
 
 @pytest.mark.parametrize("row", ROWS)
+@pytest.mark.shortened(3)
 def test_every_pair_of_effects_runs(row):
     """One revolution; where energies are kept, they balance."""
     scene = scene_of(row)
@@ -137,6 +138,7 @@ def assert_same_motion(one, other):
         for name in ZEROS
     ],
 )
+@pytest.mark.shortened(2)
 def test_an_effect_with_coefficient_zero_changes_nothing(effect, without):
     flags, rows, changes = ZEROS[effect]
     plain = {"effects.contact": HUNT_CROSSLEY, "effects.friction": {"law": "none"}}

@@ -57,6 +57,7 @@ def test_the_table_holds_every_pair():
         for k, row in enumerate(TABLE)
     ],
 )
+@pytest.mark.shortened(3)
 def test_every_pair_of_effects_runs(row):
     """The energy closes as it does for the slider-crank."""
     scene = scene_of(
@@ -93,6 +94,7 @@ ZEROS = {
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[] if n == "v_twin" else pytest.mark.full) for n in NAMES]
 )
+@pytest.mark.shortened(1)
 def test_an_effect_at_zero_changes_nothing(name, zero):
     """Poses to 1e-8 over a twentieth of a revolution: after that contact has multiplied the rounding too often."""
     on, off = (
@@ -109,6 +111,7 @@ def test_an_effect_at_zero_changes_nothing(name, zero):
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[] if n == "press" else pytest.mark.full) for n in NAMES]
 )
+@pytest.mark.nightly
 def test_samples_that_were_killed_go_on_to_the_same_bytes(name, tmp_path):
     """Root, or the other rank, is killed after the first save."""
     sets = overrides(*(f"{key}={value}" for key, value in SHORT.items()), "study.samples=40")

@@ -204,6 +204,7 @@ def test_the_worst_constraint_counts() -> None:
 # -- where to look next -----------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_proposals_keep_the_constraints() -> None:
     """Least x + y and least (x - 1)^2 where x + y >= 1: on the line, to x = 1."""
     rng = np.random.default_rng(4)

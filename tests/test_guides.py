@@ -9,15 +9,12 @@ import pytest
 import rigid_slider as rigid
 from commands import overrides, run
 from dense_linkage import Contact, Dense, start_of
-from linkages import LINKAGES, slider_crank
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.linkage.compiled import module_text
-from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.ensemble.api import as_points
@@ -25,7 +22,6 @@ from hpcclear.report.figures import guides, moving
 
 PUBLISHED = Path(__file__).parents[1] / "jobs" / "loose_slider.toml"
 ONE_TURN = {"numerics.averaged_revolutions": 1, "numerics.rtol": 1e-10}
-STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}
 SEPARATE, BLOCK = 0.7, 0.076 * (0.1**2 + 0.05**2) / 12
 """A restitution, and the inertia of a solid block, kg m^2, with which impacts are separate."""
 CHI, MU, RAMP, GRAVITY = 0.4, 0.05, 0.02, 9.81
@@ -37,6 +33,7 @@ def published():
 
 
 # ---- the published slider-crank ----------------------------------------------------------------------
+@pytest.mark.nightly
 def test_before_the_first_impact_the_motion_is_that_of_three_free_angles(published):
     """At 1 ms and up to the impact at 2.69 ms to 1e-6 of an own fine integration; contacts have no part in it."""
     response = simulate(published)
@@ -228,24 +225,6 @@ def test_random_guides_move_as_in_the_dense_model(seed):
     assert pressed[: len(early)].any()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
-
-
-# ---- scenes -----------------------------------------------------------------------------------------
-def test_scenes_without_such_a_guide_compile_nothing_of_it(published):
-    plain = problem_of(load_scene(PUBLISHED.parent / "slider_crank.toml"))
-    text = module_text(plain.linkage._text(plain.linkage._on), ())
-    assert "joint_force" in text
-    assert "corner" not in text
-    problem = problem_of(published)
-    own = module_text(problem.linkage._text(problem.linkage._on), ())
-    assert own.count("= corner_force(") == 4
-    assert "joint_force" not in own
-    loose = LINKAGES["slider-crank, loose guide"]
-    bare = generate(loose, On(), Rows()).source
-    for word in ("spin_slider, None", "mj_guide_front_left,"):
-        assert word in bare
-    assert "mj_guide_front_left *" not in bare  # moments of friction
-    assert "corner" not in generate(slider_crank(), On(), Rows()).source
 
 
 @pytest.mark.full  # pytest -m full tests/test_guides.py -k bytes: two widths more to compile, a minute

@@ -159,6 +159,7 @@ def limited(words: list[str], limit: int, amount: int) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("megabytes", [250, 500, 639, 700])
+@pytest.mark.shortened(2)
 def test_too_little_address_space_ends_in_a_message(tmp_path, megabytes):
     """With 400 or 500 MB Python, out of memory amid an import, once went on for ever."""
     words = sample(tmp_path / "x.nc", 40)
@@ -248,6 +249,7 @@ def on_two_ranks(first: list[str], second: list[str], *settings: str) -> tuple[i
 @pytest.mark.mpi
 @pytest.mark.parametrize("alone", [0, 1])
 @pytest.mark.parametrize("bad", [["--bogus"], ["--time-limit", "-3"]], ids=lambda bad: bad[0])
+@pytest.mark.shortened(2)
 def test_a_rank_that_alone_gets_a_bad_option_does_not_leave_the_others_waiting(
     tmp_path, bad, alone
 ):

@@ -3,7 +3,6 @@
 Energy lost in impacts against the energy balance, counts against a dense series, the force on the frame against the momentum of
 the bodies, third-octave levels against scipy.signal."""
 
-import inspect
 import math
 from pathlib import Path
 
@@ -19,8 +18,6 @@ from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import IMPACTS
-from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.ensemble.simulate import content_of
 from hpcclear.results import dataset
 from hpcclear.statistics import spectra
@@ -225,20 +222,6 @@ def test_each_measure_is_an_objective_and_asks_for_itself(name):
     expected = values.sum() if name == "impact-energy" else values.max()
     assert float(found["objective"][0]) == expected
     assert OURS[name].unit == found["objective"].attrs["units"].replace("1", "")
-
-
-def test_what_is_not_asked_for_is_not_compiled():
-    scene = light().with_({"numerics.impacts": False})
-    problem = problem_of(scene)
-    assert effects_of(scene).impacts is None
-    text = inspect.getsource(problem.linkage.module(problem.effects))
-    assert "frame_x" not in text
-    measured = effects_of(scene, impacts=True)
-    assert "frame_x" in inspect.getsource(problem.linkage.module(measured))
-    names = {at.FRAME_X, at.BEGUN, at.IMPACT_POWERS}
-    assert names.isdisjoint(at.measures_of(problem.effects))
-    assert at.rules_of(problem.effects).impacts == 0
-    assert set(IMPACTS).isdisjoint(evaluate(scene, ONE).data_vars)
 
 
 LEVELS = ("frame_force_level", "contact_force_level")

@@ -225,6 +225,7 @@ def test_a_search_by_statistics_ends_at_the_front(done):
     assert samples.sizes["sample"] < sum(counted.values())
 
 
+@pytest.mark.nightly
 def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
     formula.replace_dynamics(monkeypatch.setattr)
     assert formula.run_in_pieces(study(), str(tmp_path / "out"), alone()) > 4

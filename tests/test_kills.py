@@ -11,15 +11,17 @@ from hpcclear.cli import cli
 
 pytestmark = pytest.mark.mpi
 ROUNDS = {
-    "bifurcation": 2, "map": 2, "wear": 2, "effects": 2, "identify": 2, "accuracy": 2, "plan": 2, "import": 2, "export": 2,
+    "sample": 2, "run": 1, "bifurcation": 2, "map": 2, "wear": 2, "effects": 2, "identify": 2, "accuracy": 2, "plan": 2,
+    "import": 2, "export": 2,
 }  # fmt: skip
-"""Times that a command is killed twice and then ends: 36 kills, with the four of the short profile 40."""
+"""Times that a command is killed twice and then ends."""
 
 
 @pytest.mark.parametrize(
     ("name", "rounds", "kills"),
-    [("map", 1, 1), ("import", 1, 2), ("export", 1, 1)]
-    + [pytest.param(*row, 2, marks=pytest.mark.nightly) for row in ROUNDS.items()],
+    [("map", 1, 1)]
+    + [pytest.param(*row, 2, marks=pytest.mark.nightly) for row in ROUNDS.items()]
+    + [pytest.param(name, 13, 4, marks=pytest.mark.full) for name in ("sample", "run")],
 )
 @pytest.mark.timeout(3600)
 def test_a_command_that_was_killed_goes_on_to_the_same_bytes(tmp_path, name, rounds, kills):

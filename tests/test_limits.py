@@ -115,6 +115,7 @@ def test_a_design_that_does_not_fit_into_memory_ends_in_a_message(tmp_path, comp
 
 
 @pytest.mark.parametrize("rank", [0, 1])
+@pytest.mark.shortened(1)
 def test_memory_that_runs_out_during_the_run_ends_in_a_message(tmp_path, rank):
     words = commands.sample(tmp_path / "samples.nc", 4000, *OPTIONS)
     failing = {"TEST_FAIL": "simulation", "TEST_ERROR": "MemoryError", "TEST_RANK": str(rank)}

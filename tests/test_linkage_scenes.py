@@ -43,6 +43,7 @@ def rocker(*sets):
 # ---- physics -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_a_whole_motion_is_the_dense_model_s():
     """From assembly through contact in both joints: positions to 1e-8 m while the motion is well-posed; energy closed."""
     scene = rocker(
@@ -162,6 +163,7 @@ def test_without_play_nothing_is_integrated_and_reactions_are_the_closed_form_s(
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.shortened(3)
 def test_the_gallery_runs_and_closes_its_energy(name):
     scene = load_scene(
         LINKAGES / f"{name}.toml",
@@ -204,6 +206,7 @@ def driven(drive: str) -> Scene:
 
 
 @pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.shortened(3)
 def test_every_drive_closes_the_energy(drive):
     scene = driven(drive)
     response = simulate(scene)

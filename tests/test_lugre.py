@@ -110,6 +110,7 @@ def shaft(bodies: dict, joints: dict, hub: dict, speed: float, rtol: float, **fr
 
 
 @pytest.mark.parametrize("speed", [0.004, 0.02, 0.05])
+@pytest.mark.shortened(1)
 def test_a_shaft_that_slides_steadily_has_the_friction_of_stribecks_curve(speed):
     """A rotor that lies in its bearing: 0.2, one, and 2.5 times Stribeck's speed."""
     scene = shaft(

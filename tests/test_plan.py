@@ -1,7 +1,6 @@
 """The plan: cost measured on samples, the job that follows from it."""
 
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -154,23 +153,3 @@ def test_a_forecast_states_how_far_it_holds():
         "first look, settings of the file: 2 ms per sample, 1000 simulations take"
     )
     assert text.endswith("(± 2 % between designs; probably less: a short batch leaves lanes idle)")
-
-
-def test_the_first_answer_takes_less_than_ten_seconds():
-    """Of processor time, once the motion is compiled; the rest of the ladder refines it."""
-
-    class Answered(Exception):
-        pass
-
-    def show(made):
-        assert made.first
-        raise Answered
-
-    scene = load_scene(JOBS / "quickstart.toml")
-    design(scene, None)
-    for _ in range(2):  # the first time may compile
-        begin = time.process_time()
-        with pytest.raises(Answered):
-            measure(scene, alone(), show=show)
-        spent = time.process_time() - begin
-    assert spent < 8.0  # and some two seconds to start the program

@@ -133,6 +133,7 @@ def random_scene(seed):
 @pytest.mark.parametrize(
     "seed", [pytest.param(k, marks=[] if k < 3 else pytest.mark.full) for k in range(20)]
 )
+@pytest.mark.shortened(1)
 def test_random_loads_move_linkages_as_in_the_dense_model(seed):
     """Positions of all bodies over a quarter of a revolution, to 1e-8 m and 1e-8 rad; and energies close."""
     scene, curves = random_scene(seed)

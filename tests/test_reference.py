@@ -130,6 +130,7 @@ def test_order_of_samples_does_not_change_one_bit():
     assert alone == [forward[7]]
 
 
+@pytest.mark.nightly
 def test_the_number_of_lanes_does_not_change_one_bit():
     scene = paper_case(LATCHED, 0.3e-3, 0, 1, rtol=1e-6).with_(
         {"numerics.energy": True, "numerics.responses": True}
@@ -206,6 +207,7 @@ def ideal_slider(scene: Scene, time: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("contact", [HUNT_CROSSLEY, LATCHED], ids=lambda c: c["law"])
+@pytest.mark.shortened(1)
 def test_motion_tends_to_the_ideal_mechanism(contact: dict):
     """Slowly, so that penetration stays below the clearance: the joints hold within about c."""
     for clearance in (1e-3, 1e-4, 1e-5):

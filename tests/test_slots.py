@@ -12,9 +12,7 @@ from test_loads import machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.compiled import module_text
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.setup.problem import problem_of
 
 JOB = Path(__file__).parents[1] / "jobs" / "loose_slot.toml"
 MASS, INERTIA, RADIUS, CLEARANCE = 0.2, 2e-5, 0.01, 1e-3
@@ -189,19 +187,6 @@ def test_the_job_s_pin_changes_walls_and_follows_the_slot_without_clearance():
     assert (forces.min(axis=1) == 0.0).all()  # one wall at a time
     work = float(np.abs(np.diff(found["driving_work"].to_numpy())).sum())
     assert float(np.abs(found["energy_residual"]).max()) < 1e-4 * work
-
-
-def test_scenes_without_a_slot_compile_nothing_of_it():
-    scene = load_scene(JOB)
-    problem = problem_of(scene)
-    text = module_text(problem.linkage._text(problem.linkage._on), ())
-    assert text.count("= corner_force(") == 2
-    slot = {"kind": "slot", "point": "crank.b", "line": "lever.a"}
-    plain = problem_of(scene.with_({
-        "mechanism.joints.slot": slot, "effects.contact": None, "effects.friction": "none",
-        "mechanism.drives.motor": {"kind": "torque", "body": "crank", "torque": 1.0, "initial_speed": 30.0},
-    }))  # fmt: skip
-    assert "corner_force" not in module_text(plain.linkage._text(plain.linkage._on), ())
 
 
 @pytest.mark.parametrize(

@@ -403,6 +403,7 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.shortened(1)
 def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
     scene = tmp_path / "scene.toml"
     scene.write_text(scene_of().text)
@@ -596,6 +597,7 @@ OF_THE_OBJECTIVE = {
         ("peak-crank-moment", "N m", "(N m)^2"),
     ],
 )
+@pytest.mark.shortened(2)
 def test_units_follow_the_objective_and_nothing_else_does(
     tmp_path, monkeypatch, name, unit, squared
 ):

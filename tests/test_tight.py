@@ -66,6 +66,7 @@ def outcome(scene) -> Outcome:
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.shortened(4)
 def test_it_agrees_with_another_pair(name: str):
     """Two methods that share no coefficient, at tolerances where both have converged."""
     ours = outcome(case(name, TIGHT, 1e-11, 1))
@@ -85,6 +86,7 @@ def test_it_agrees_with_another_pair(name: str):
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.shortened(4)
 def test_a_tighter_tolerance_is_nearer(name: str):
     exact = outcome(case(name, TIGHT, 1e-12, 1)).objective
     errors = [
@@ -97,6 +99,7 @@ def test_a_tighter_tolerance_is_nearer(name: str):
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.shortened(4)
 def test_the_energy_balance_closes(name: str):
     scene = case(name, TIGHT, 1e-8)
     residual, passed = energy_residual(scene, run(scene))

@@ -311,6 +311,7 @@ STARTS = (30.0, 45.0, 60.0, 61.3, 75.0, 77.7, 90.0, 100.1, 120.0, 180.5, -0.2, 2
     "path", ["bodies.coupler.mass_center", "bodies.rocker.mass_center", "bodies.coupler.mass"]
 )
 @pytest.mark.parametrize("locked", [False, True])
+@pytest.mark.shortened(2)
 def test_designs_that_differ_in_mass_alone_all_turn_or_none(path, locked):
     """Turning is judged by the scene's own geometry then; each has the bits of its own scene."""
     path = f"mechanism.{path}"
@@ -328,6 +329,7 @@ def test_designs_that_differ_in_mass_alone_all_turn_or_none(path, locked):
 @pytest.mark.parametrize(
     "path", ["bodies.coupler.mass_center", "bodies.rocker.mass_center", "bodies.coupler.mass"]
 )
+@pytest.mark.shortened(1)
 def test_samples_start_with_the_bits_of_their_own_scenes(path):
     path = f"mechanism.{path}"
     scene = rocker(*(f"mechanism.bodies.{one}.mass_center=0.03" for one in ("coupler", "rocker")))

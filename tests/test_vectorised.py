@@ -25,6 +25,7 @@ def arithmetic(law: str, width: int) -> Arithmetic:
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.shortened(1)
 def test_force_evaluation_is_packed(law):
     found = arithmetic(law, DEFAULT_LANES)
     assert found.packed.total() >= 100
