@@ -6,11 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.student import student
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import REPLICATES, Verification
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import limits, moments, quantile, surely_less
 from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
@@ -63,14 +62,6 @@ def test_every_scrambling_is_balanced_in_every_input():
     }.items():
         place = (names.column(name) - middle) / half / 2 + 0.5
         assert sorted(np.floor(place * 64).astype(int)) == list(range(64))
-
-
-def test_a_number_of_draws_asks_for_draws():
-    assert Verification().draws is None
-    assert Verification(samples=500).draws == 500
-    assert Verification(method="monte-carlo").draws == 10_000
-    with pytest.raises(InputError, match="follows from the accuracy"):
-        load_scene(ROBUST, ["study.verification.method=qmc", "study.verification.samples=100"])
 
 
 # -- limits -----------------------------------------------------------------------------------------
@@ -144,11 +135,6 @@ def test_failed_values_are_left_out_and_too_few_say_nothing():
     assert np.isnan([none.value, none.lower, none.upper]).all()
 
 
-def test_nothing_random_has_no_deviation():
-    mean, deviation = moments(np.full((16, 4), 2.5))
-    assert (mean.value, mean.error, deviation.value, deviation.error) == (2.5, 0.0, 0.0, 0.0)
-
-
 # -- what can be told apart -------------------------------------------------------------------------
 
 
@@ -187,10 +173,6 @@ def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
     assert not found.one[0, 1]
     assert found.beaten.tolist() == [False] * 6 + [True, False]
     assert found.front(2) == [1, 4]
-
-
-def test_designs_that_are_one_make_a_front_of_one():
-    assert len(compared([(1, 2), (1.0001, 2.0001), (1.0002, 1.9999)]).front(5)) == 1
 
 
 # -- which end is one -------------------------------------------------------------------------------
@@ -261,16 +243,6 @@ def rippled(x):
     first = 2.0 - 0.3 * x[:, 0] + slope
     second = 1.0 + 0.1 * (x[:, 0] - 0.5) ** 2 + 0.05 * np.cos(2 * np.pi * (x[:, 0] - 0.3) / 0.3)
     return np.column_stack([first, second - 0.1 + slope])
-
-
-def test_two_scales_see_a_ripple_on_a_slope():
-    rng = np.random.default_rng(6)
-    designs = BOUNDS[:, 0] + rng.random((60, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    designs[:30, 1] = -2.0
-    model = TwoScales(designs, rippled(designs)[:, 1], BOUNDS, rng)
-    line = np.column_stack([np.linspace(0.05, 0.95, 50), np.full(50, -2.0)])
-    assert abs(model.predict(line) - rippled(line)[:, 1]).max() < 0.02
-    assert model.variance(line).shape == (50,)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -353,22 +325,3 @@ def test_small_steps_that_a_search_wins_count_together():
     assert not by_f.stands(run, case, small)
     assert by_f.won(run, case, small) == "the last one still lowered the least deviation by 0.6%"
     assert by_f.stands(run, case, met([0.0, 2.0, 2.0, 2.0, 2.0]))
-
-
-def test_too_few_designs_for_a_model_are_refused():
-    with pytest.raises(InputError, match="too few valid samples"):
-        proposals(np.full((3, 2), 0.5), np.ones((3, 2)), BOUNDS, 4, np.random.default_rng(1))
-
-
-def test_a_round_that_proposes_nothing_ends_the_search():
-    """Of several variables too: nothing is added to what was tried."""
-    scene = load_scene(ROBUST)
-    run = SimpleNamespace(scene=scene, study=scene.required_study)
-    (case, *_) = (one.name for one in scene.required_study.cases)
-    names = scene.required_study.design_variables(case)
-    assert len(names) > 1
-    nothing = tried.simulated(run, [], "check-1")
-    before = tried.added(run, case, nothing, None)
-    assert before.coordinates.shape == (0, len(names))
-    after = tried.added(run, case, nothing, before)
-    assert after.values.shape == (0, 2)

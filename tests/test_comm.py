@@ -196,12 +196,6 @@ def test_the_program_may_choose_the_exit_code(ranks, how, tmp_path):
     assert finish(start(ranks, "failing.py", how, tmp_path / "mark")) == (1, "")
 
 
-def test_an_error_in_one_process_is_reported_once(tmp_path):
-    code, output = finish(start(0, "failing.py", "worker on root", tmp_path / "mark"))
-    assert (code, output.count("Traceback")) == (1, 1)
-    assert "sample" in output
-
-
 def stop_and_resume(folder: pathlib.Path, where: str, number: int, ranks: int) -> str:
     job = start(ranks, "stopping.py", where, folder)
     wait_for(folder / "ready", job)
@@ -268,18 +262,6 @@ def test_a_time_limit_stops_the_run(ranks, tmp_path):
     assert (tmp_path / "records").stat().st_size > 0
 
 
-def test_a_second_interrupt_ends_a_deaf_process_at_once(tmp_path):
-    job = start(0, "stopping.py", "deaf", tmp_path)
-    wait_for(tmp_path / "ready", job)
-    os.kill(job.pid, signal.SIGINT)
-    time.sleep(1.0)
-    assert job.poll() is None
-    told = time.monotonic()
-    os.kill(job.pid, signal.SIGINT)
-    assert finish(job)[0] == 3
-    assert time.monotonic() - told < crowded(1.5)
-
-
 def test_a_switch_leaves_a_process_that_goes_on_as_it_was():
     before = [signal.getsignal(number) for number in STOP_SIGNALS]
     with StopSwitch() as stop:
@@ -291,23 +273,6 @@ def test_a_switch_leaves_a_process_that_goes_on_as_it_was():
         assert stop.reason == "SIGUSR1 was received"
     assert [signal.getsignal(number) for number in STOP_SIGNALS] == before
     assert "stop-switch" not in {thread.name for thread in threading.enumerate()}
-
-
-def test_a_switch_knows_its_time_limit():
-    stop = StopSwitch()
-    stop.limit_time(1000.0)
-    assert not stop.is_set()
-    stop.limit_time(0.0)
-    assert stop.reason == "the time limit was reached"
-
-
-def test_copies_that_do_not_see_each_other_are_refused(tmp_path):
-    settings = {"OMPI_COMM_WORLD_SIZE": "4", "OMPI_COMM_WORLD_RANK": "0"}
-    code, output = finish(start(0, "equal.py", tmp_path / "out.npz", **settings))
-    assert code == 2
-    assert "OMPI_COMM_WORLD_SIZE = 4: the launcher started 4 processes" in output
-    settings["OMPI_COMM_WORLD_RANK"] = "1"
-    assert finish(start(0, "equal.py", tmp_path / "out.npz", **settings)) == (2, "")
 
 
 def test_no_mpi_library_is_needed_in_one_process_but_named_when_missing(tmp_path):
@@ -396,10 +361,3 @@ def test_a_library_that_cannot_be_looked_at_is_left_alone_in_silence(monkeypatch
     launcher.pin_threads()
     assert capsys.readouterr().err == ""
     assert sys.unraisablehook is hook
-
-
-def test_importing_the_boundary_loads_no_mpi():
-    script = "import sys, hpcclear.ranks.boundary; print('mpi4py' in sys.modules, 'numba' in sys.modules)"
-    root = PROGRAMS.parent.parent
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=root)
-    assert run.stdout.split() == ["False", "False"], run.stderr

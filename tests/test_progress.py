@@ -12,7 +12,7 @@ import pytest
 from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ranks.progress import Progress, duration, launching_terminal, log_interval
+from hpcclear.ranks.progress import Progress, launching_terminal, log_interval
 
 PROGRAM = pathlib.Path(__file__).parent / "mpi_programs" / "bar.py"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -64,17 +64,6 @@ def test_what_an_earlier_run_did_counts_as_done_but_not_as_fast():
     ]
 
 
-def test_the_rate_forgets_after_half_a_minute():
-    clock, log = Clock(), io.StringIO()
-    progress = Progress("", "log", 5.0, log, clock)
-    progress.start(10_000, records(0))
-    for rate in [100] * 60 + [1] * 60:
-        clock.now += 1.0
-        progress.add(records(rate))
-        progress.refresh()
-    assert log.getvalue().splitlines()[-1].split(", ")[1] == "1 samples/s"
-
-
 def test_quiet_writes_nothing_and_an_empty_design_is_complete():
     log = io.StringIO()
     for style in ("quiet", "log"):
@@ -102,14 +91,6 @@ def test_a_bar_shows_the_numbers():
     clock.now += 2.0
     progress.close()
     assert "10/10 (100 %), 3 failed, 5 samples/s" in screen.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0.4, "0 s"), (59.7, "1:00 min"), (185.0, "3:05 min"), (3723.0, "1:02:03 h")],
-)
-def test_durations_read_naturally(seconds, text):
-    assert duration(seconds) == text
 
 
 def test_batch_logs_stay_short():

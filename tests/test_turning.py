@@ -18,7 +18,6 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import ConstantSpeed, Harmonic, TorqueDrive
-from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
@@ -264,11 +263,6 @@ def test_a_journal_deep_in_its_bearing_is_no_result(depth, status):
     assert marked.status.tolist() == [status]
 
 
-def test_no_remedy_leads_from_a_failure_to_a_wrong_number():
-    assert "loosen" not in Status.STEP_CAP.remedy
-    assert "hpcclear check" in Status.STEP_CAP.remedy
-
-
 # ---- change points -----------------------------------------------------------------------------------
 
 
@@ -324,24 +318,6 @@ def test_designs_that_differ_in_mass_alone_all_turn_or_none(path, locked):
         (alone,) = evaluate_records(scene.with_({path: float(value)}), NOTHING)
         assert alone["status"] == record["status"]
         np.testing.assert_allclose(alone["objective"], record["objective"], rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    "path", ["bodies.coupler.mass_center", "bodies.rocker.mass_center", "bodies.coupler.mass"]
-)
-@pytest.mark.shortened(1)
-def test_samples_start_with_the_bits_of_their_own_scenes(path):
-    path = f"mechanism.{path}"
-    scene = rocker(*(f"mechanism.bodies.{one}.mass_center=0.03" for one in ("coupler", "rocker")))
-    values = np.linspace(0.9, 1.1, 5)[:, None] * scene.number(path)
-    points = Points(("x",), values, ((path,),))
-    together = start_states(scene, parameters(scene, points), points)
-    n = len(linkage_of(scene).forest.coordinates)
-    for row, value in enumerate(values[:, 0]):
-        own = scene.with_({path: float(value)})
-        alone = start_states(own, parameters(own))
-        for part in ("coordinates", "velocities"):
-            assert (getattr(alone, part)(n)[0] == getattr(together, part)(n)[row]).all()
 
 
 @pytest.mark.parametrize("speed", [6.0, -6.0])

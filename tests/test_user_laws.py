@@ -14,10 +14,7 @@ from oracle import SliderCrank
 from running import run
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.laws.lanes import in_lanes
-from hpcclear.dynamics.laws.numbers import force_of, sample_numbers
 from hpcclear.dynamics.physics import powers
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.laws import ENTRIES
@@ -389,23 +386,6 @@ def test_laws_are_listed_with_their_sources():
     assert code == 0
     for word in ("hunt-crossley", "flores", "lugre", "doi:10.1007/s11044-010-9237-4", "s/m"):
         assert word in said
-
-
-def test_parts_of_helpers_and_of_other_modules_become_constant_too():
-    """IMPACT's force and elastic part divide by the same depth: one number of the sample serves both."""
-    law = laws("contact")["impact"]
-    made = with_constants(law)
-    assert made.read == (*(one for one in law.read if one != "depth_at"), "once_0", "depth_at")
-    given = {
-        "force_at": 1e3,
-        "depth_at": 2e-6,
-        "exponent": 1.7,
-        "greatest_damping": 50.0,
-        "full_depth": 1e-6,
-    }
-    at = {"depth": np.array([1e-6, 3e-6]), "rate": 0.2}
-    before, after = (force_of(one, {**sample_numbers(one, given), **at}) for one in (law, made))
-    np.testing.assert_allclose(after, before, rtol=1e-14)
 
 
 def test_a_parameter_of_a_fractional_unit_takes_text_in_others(tmp_path):

@@ -181,25 +181,6 @@ def test_waves_of_no_height_change_nothing():
     np.testing.assert_allclose(on.sliding_work, off.sliding_work, rtol=1e-7)
 
 
-def test_profiles_are_rates_of_worn_surfaces():
-    scene = scene_with({"effects.contact": HUNT_CROSSLEY, **WORN, **ANGULAR})
-    effects = effects_of(scene)
-    assert (effects.waves, effects.bearing_waves, effects.journal_waves, effects.profile) == (
-        1,
-        3,
-        None,
-        1,
-    )
-    assert problem_of(scene).settings().profiled == 2 * 6
-    plain = effects_of(scene_with({"effects.contact": HUNT_CROSSLEY, **WORN}))
-    assert (plain.waves, plain.profile) == (None, None)
-    ideal = {"joints.crank_rod": {"kind": "ideal"}, "effects.contact": HUNT_CROSSLEY}
-    one = run(scene_with({"joints.rod_slider.wear": WEAR, **ANGULAR, **ideal})).out.profile
-    assert (one[:6] == 0.0).all()
-    assert (one[6:12] != 0.0).all()
-    assert np.isnan(one[12:]).all()
-
-
 # ---- a turning journal under a constant load ---------------------------------------------------
 
 
