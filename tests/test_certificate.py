@@ -16,11 +16,9 @@ from scipy.interpolate import PchipInterpolator
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, recast
 from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
-    Asked,
     Certificate,
     Plan,
     Seen,
@@ -46,11 +44,10 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
-from hpcclear.scene.record import record_of
 from hpcclear.scene.switches import Off, switches
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
-from hpcclear.study.extent import certificate_extent, certificate_samples, samples_of
+from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
@@ -469,60 +466,7 @@ def test_a_study_that_would_have_nothing_to_vary_keeps_its_effect():
     assert "clearance in o2" not in [one.name for one in trial.switches]
 
 
-def test_what_is_far_dearer_without_an_effect_ends_as_failed():
-    """Of a motion that the explicit method takes long over, friction stands for the effect."""
-    scene = load_scene(SCENE, ["numerics.max_steps=1000000"])
-    trial = Trial(scene)
-    records = np.zeros(4, OUTCOME)
-    records["rhs_evaluations"] = 600
-    assert trial.simulated((0,)).numerics.max_steps == 1_000_000  # nothing is known yet
-    for off in ((), (0,)):
-        trial.seen(Asked(off, 0, 1), records)
-    assert trial.simulated((0,)).numerics.max_steps == 5 * 600 // 6 + 1000
-    assert trial.simulated(()).numerics.max_steps == 1_000_000
-    assert (
-        trial.variant((0,)).scene.numerics.max_steps == 1_000_000
-    )  # what is recommended has its own
-    aimed = Trial(load_scene(SCENE, ["numerics.target_error=0.01"]))
-    records = recast(records, record_of(aimed.scene))
-    records["steady_revolutions"] = 50.0
-    aimed.seen(Asked((), 0, 1), records)
-    assert aimed.simulated((0,)).numerics.target_revolutions == 350
-
-
 # ---- points ----------------------------------------------------------------------------------------
-
-
-def test_points_are_the_same_however_many_are_drawn():
-    for name, settings in (("quickstart.toml", ()), ("slider_crank.toml", ())):
-        drawn = Drawn(load_scene(JOBS / name, settings))
-        whole = drawn.points(0, 8).values
-        parts = np.concatenate([drawn.points(0, 4).values, drawn.points(4, 8).values])
-        np.testing.assert_array_equal(whole, parts)
-        assert len(whole) == 8 * drawn.size
-
-
-def test_replicates_scatter_about_designs_of_their_own():
-    scene = load_scene(JOBS / "quickstart.toml")
-    drawn = Drawn(scene)
-    values = drawn.points(0, 16)
-    mass = values.column("m2").reshape(16, drawn.size)
-    assert (np.ptp(mass, axis=1) <= 0.01).all()  # half-width 5 g
-    assert np.ptp(mass.mean(axis=1)) > 0.2  # all over the range
-    clearance = values.column("C").reshape(16, drawn.size)
-    assert (np.ptp(clearance, axis=1) > 0.4e-3).all()
-
-
-def test_a_certificate_takes_a_twentieth_of_its_study():
-    scene = load_scene(JOBS / "robust_slider_crank.toml")
-    effects, samples = len(switches(scene)), certificate_samples(scene)
-    assert samples * (effects + 2) <= 0.05 * sum(samples_of(scene).values())
-    assert samples >= 128
-    asked = scene.with_({"study.certificate": {"samples": 256}})
-    assert samples_of(asked) == {**samples_of(scene), "effects": 256 * (effects + 2)}
-    assert certificate_extent(scene) == (4096, samples * (effects + 2))
-    assert certificate_extent(scene, 256) == (256, math.inf)
-    assert certificate_samples(asked) == samples
 
 
 # ---- bad input -------------------------------------------------------------------------------------

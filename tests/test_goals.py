@@ -16,11 +16,8 @@ from hpcclear.report.beside import beside_original
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.formula import FormulaError, names_in, value_of
-from hpcclear.scene.goals import Goal
-from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.statistics.random.replicates import exceedance, quantile
 from hpcclear.statistics.search.infill import proposals
-from hpcclear.study import goals
 
 QUICKSTART = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 RANDOM = ["C", "m2", "m3", "u2", "I2"]
@@ -173,24 +170,6 @@ def test_shifts_of_a_quantile_are_as_large_as_it_scatters(method: str, order: fl
     if method == "monte-carlo":
         density = stats.norm.pdf(stats.norm.ppf(order)) / SPREAD
         assert mean == pytest.approx(np.sqrt(order * (1 - order) / 512) / density, rel=0.15)
-
-
-def test_what_is_told_and_guessed_of_a_goal() -> None:
-    values = replicated(3, "qmc", 256)
-    asked = [Goal(statistic="mean"), Goal(statistic="deviation"), Goal(statistic="quantile", level=0.9),
-             Goal(statistic="exceedance", limit=3.0), Goal(formula="a*b")]  # fmt: skip
-    exact = [0.0, SPREAD, SPREAD * stats.norm.ppf(0.9), stats.norm.sf(3.0 / SPREAD), 6.0]
-    for goal, truth in zip(asked, exact, strict=True):
-        found = goals.goal_value(goal, values, {"a": 2.0, "b": 3.0}, 0.95)
-        assert found.lower <= truth <= found.upper
-        assert found.value == pytest.approx(truth, abs=0.06)  # of 4096 points
-        guess = goals.guessed(
-            goal, values.reshape(1, -1), {"a": np.array([2.0]), "b": np.array([3.0])}
-        )
-        assert guess == pytest.approx(found.value, abs=0.02)
-        assert goals.accurate(goal, found, MomentAccuracy(mean=0.9, deviation=0.1)) == (
-            goal.statistic != "mean"
-        )
 
 
 # -- where to look next -----------------------------------------------------------------------------

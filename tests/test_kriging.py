@@ -202,11 +202,6 @@ def test_fit_is_deterministic(model):
         assert (array == again.to_arrays()[name]).all(), name
 
 
-def test_stored_arrays_cannot_be_changed(model):
-    with pytest.raises(ValueError, match="read-only"):
-        model.alpha[0] = 1.0
-
-
 @pytest.mark.parametrize(
     ("name", "damage"),
     [
@@ -388,17 +383,6 @@ def test_a_smooth_function_stays_in_one_piece():
     pieces = fit_kinked(evaluate)
     assert len(pieces.leaves) == 1
     assert evaluate.calls == [70]
-
-
-def test_grid_of_subintervals_and_borders():
-    pieces = fit_kinked(lambda p: p[:, 0] + p[:, 1], cuts=(2, 3))
-    assert len(pieces.leaves) == 6
-    places = np.array([[0.5, 2 / 3], [0.0, 0.0], [1.0, 2.0], [0.49, 2.0]])
-    corners = np.array([pieces.leaves[k].lower for k in pieces.locate(places)])
-    np.testing.assert_allclose(corners, [[0.5, 2 / 3], [0, 0], [0.5, 4 / 3], [0, 4 / 3]])
-    np.testing.assert_allclose(pieces.predict(places), places.sum(axis=1), atol=1e-3)
-    one = pieces.leaves[pieces.locate(places[3:])[0]]
-    assert pieces.predict(places[3:]) == one.predict(places[3:])
 
 
 def test_pieces_round_trip_is_bitwise():

@@ -20,7 +20,7 @@ from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.regression import RegressionMethod
 from hpcclear.statistics.surrogate.stored import models_in
-from hpcclear.study import run_study, surrogates
+from hpcclear.study import run_study
 
 PROGRAMS = Path(__file__).parent / "mpi_programs"
 MPIEXEC = Path(sys.executable).parent / "mpiexec"
@@ -202,13 +202,6 @@ def test_predictions_that_are_none_are_refused(answer, said):
     assert caught.value.key == "study.surrogate.model"
 
 
-def test_a_fit_that_does_not_come_out_again_is_refused():
-    source = np.random.default_rng(0)
-    method = RegressionMethod(lambda: Constant(lambda X: source.random(len(X))), "mine")
-    with pytest.raises(InputError, match="it is two models"):
-        method.restored(fitted(method.source).to_arrays())
-
-
 def test_units_are_taken_off_and_put_on_again():
     leaf = fitted(lambda: Constant(lambda X: X[:, 0]))
     mean, scale = leaf.values.mean(), leaf.values.std()
@@ -318,10 +311,3 @@ def test_an_algorithm_of_pymoo_with_settings_of_ones_own_is_a_search(tmp_path):
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     front = dataset.read(tmp_path / "out" / "front.nc", "front")
     assert np.isfinite(front["mean"]).sum() > 4
-
-
-def test_the_default_is_kriging_by_name_or_without(tmp_path):
-    scene = load_scene(written(tmp_path / "scene"))
-    for model in (None, "kriging"):
-        found = surrogates.method_of(scene.with_({"study.surrogate.model": model}))
-        assert found.label == ""

@@ -1,6 +1,5 @@
 """Plug-ins by name: from files beside a scene and from installed packages; whose source is run, and when."""
 
-import inspect
 import json
 import subprocess
 import sys
@@ -126,15 +125,6 @@ def test_files_are_not_looked_for_where_python_looks(shapes, tmp_path, monkeypat
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=r"there is no elsewhere\.py beside the scene file"):
         shapes.get("elsewhere:Mine")
-
-
-def test_two_texts_of_one_name_are_two_modules_whose_lines_can_be_read():
-    first = run_source("shapes", SOURCE)
-    second = run_source("shapes", SOURCE.replace("**2", "**3"))
-    assert run_source("shapes", SOURCE) is first
-    assert (first.Mine(2.0).area(), second.Mine(2.0).area()) == (4.0, 8.0)
-    assert "self.size**2" in inspect.getsource(first.Mine.area)
-    assert "self.size**3" in inspect.getsource(second.Mine.area)
 
 
 def test_source_that_a_scene_carries_counts_and_is_not_run_unasked():

@@ -18,7 +18,6 @@ from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics, statistics_dataset
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import collection, dataset
-from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import Summary, columns, rows_of, summarise
@@ -173,15 +172,6 @@ def test_a_sample_counts_once():
         sums.result()
 
 
-def test_points_on_demand_are_the_points():
-    scene = scene_of(10000)
-    every = monte_carlo(scene).values
-    points = MonteCarloPoints(scene, 10000)
-    assert len(points) == 10000
-    for index in (np.arange(3), np.array([9999, 0, 4096, 4095]), np.arange(4000, 9000)):
-        np.testing.assert_array_equal(points[index], every[index])
-
-
 def test_dataset_round_trip_and_raw_samples(tmp_path):
     ranks = alone()
     scene = scene_of(9000)
@@ -216,18 +206,6 @@ def test_statistics_go_on_only_with_the_same_versions_and_processor(
     monkeypatch.setattr(name, value)
     with pytest.raises(InputError, match="another run"):
         run_statistics(scene, output, alone(), options=QUIET)
-
-
-def test_fresh_statistics_go_beside_what_is_there_and_say_where(tmp_path):
-    scene, output = scene_of(5000), tmp_path / "statistics.nc"
-    fresh = Options(fresh=True, style="quiet")
-    for expected in ("statistics.nc", "statistics-2.nc", "statistics-3.nc"):
-        found = run_statistics(scene, output, alone(), options=fresh)
-        assert found.output == tmp_path / expected
-        assert dataset.read(found.output, "statistics").identical(found.content)
-    assert {path.name for path in tmp_path.glob("*.nc")} == {
-        f"statistics{more}.{kind}" for more in ("", "-2", "-3") for kind in ("nc", "timing.nc")
-    }  # fmt: skip
 
 
 def test_latin_hypercubes_are_refused(tmp_path):
