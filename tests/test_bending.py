@@ -488,19 +488,6 @@ def test_methods_agree():
     )
 
 
-@pytest.mark.full
-def test_samples_beside_others_have_the_bits_of_single_ones():
-    scene = bending()
-    rng = np.random.default_rng(0)
-    columns = {
-        ("mechanism.rod.mass",): rng.uniform(0.1, 0.4, 24),
-        ("mechanism.rod.mass_center",): rng.uniform(0.0, 0.12, 24),
-        ("mechanism.rod.inertia",): rng.uniform(2e-4, 8e-4, 24),
-        ("mechanism.rod.bending.stiffness",): 10 ** rng.uniform(2.5, 5, 24),
-    }
-    running.lanes_have_single_bits(scene, columns)
-
-
 def test_the_slider_crank_written_as_a_linkage_is_the_same():
     scene = bending(rtol=1e-9)
     bars = scene.slider_crank

@@ -249,32 +249,6 @@ def test_a_column_of_names_is_kept(tmp_path):
     assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
 
 
-def test_a_sketch_draws_each_table():
-    from hpcclear.dynamics.planar.problem import poses_at_start
-    from hpcclear.report import sketch_figure
-    from hpcclear.report.figures.curves import tabulated
-
-    linkage = load_scene(LINKAGE)
-    (gas,) = tabulated(linkage)
-    assert (gas.key, gas.unit, gas.turns) == ("mechanism.loads.gas.size", "N", 2)
-    with_load = load_scene(
-        JOBS / "slider_crank.toml",
-        ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
-    )
-    for scene, peak in ((linkage, None), (with_load, 1.0)):
-        figure = sketch_figure(scene, poses_at_start(scene))
-        curve = figure.axes[-1]
-        line = curve.get_lines()[0]
-        angles, values = line.get_data()
-        assert curve.get_xlim() == (0.0, 360.0 * tabulated(scene)[0].turns)
-        assert angles[0] == 0.0  # the seam is drawn closed
-        assert angles[-1] == pytest.approx(360.0 * tabulated(scene)[0].turns)
-        assert values[0] == pytest.approx(values[-1], abs=1e-9 * np.ptp(values))
-        assert "kN" in curve.get_title(loc="left")
-        assert peak is None or values.max() == peak
-    assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []
-
-
 def test_the_page_draws_the_tables_of_a_scene(tmp_path):
     """Also of one that came from a file, whose values the result carries."""
     from hpcclear.report.figures import catalogue

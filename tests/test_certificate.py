@@ -466,9 +466,6 @@ def test_a_study_that_would_have_nothing_to_vary_keeps_its_effect():
     assert "clearance in o2" not in [one.name for one in trial.switches]
 
 
-# ---- points ----------------------------------------------------------------------------------------
-
-
 # ---- bad input -------------------------------------------------------------------------------------
 
 
@@ -555,19 +552,6 @@ def test_the_scene_that_is_printed_stays_within_the_tolerance(certified):
     assert float(content["change"][chosen, 0]) == pytest.approx(
         less.mean() / on.mean() - 1.0, abs=2e-3
     )
-
-
-def test_what_is_needed_is_said_so(certified):
-    place, output = certified
-    content = dataset.read(place / "e.nc", "effects")
-    needed = {str(name) for name, row in zip(content["effect"].to_numpy(), content["off"].T, strict=True)
-              if int(content["decision"][int(np.argmax(row.to_numpy()))]) == Verdict.BEYOND}  # fmt: skip
-    assert needed == {"clearance in crank_rod", "contact damping"}
-    assert "Without clearance in crank_rod f changes by -100.00 %" in output
-    assert "Without contact damping f changes by" in output
-    flat = " ".join(output.split())
-    assert "Without gravity f changes by 0.0" in flat
-    assert "without friction in joints, gravity, slider load" in flat
 
 
 def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):

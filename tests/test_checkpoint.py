@@ -13,17 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import (
-    IMPACTS,
-    LEVELS,
-    MAPPED,
-    ON_REQUEST,
-    RESPONSES,
-    STEADY,
     Status,
     failed,
     recast,
@@ -33,12 +26,7 @@ from hpcclear.base.outcome import (
 from hpcclear.results import files
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
 from hpcclear.results.lock import Holder, Lock
-from hpcclear.results.places import fresh_sibling
-from hpcclear.results.provenance import provenance
-from hpcclear.scene import load_scene
-from hpcclear.scene.record import record_of
 
-JOBS = Path(__file__).parents[1] / "jobs"
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
 
 
@@ -52,16 +40,6 @@ def outcomes(first: int, count: int) -> np.ndarray:
         if found["sample"][row] % 7 == 3:
             found[row] = failed(int(found["sample"][row]), Status.NOT_FINITE, 5)[0]
     return found
-
-
-class Clock:
-    """A clock that a test turns."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 def add(checkpoint: Checkpoint, *arguments: np.ndarray) -> None:
@@ -92,58 +70,6 @@ def test_parts_too_large_to_be_kept_are_read_from_their_files(tmp_path, monkeypa
     for one, two in zip(*found, strict=True):
         assert len(one) == 55
         assert one.tobytes() == two.tobytes()
-
-
-def test_samples_reach_disk_when_the_interval_is_over_and_not_before(tmp_path):
-    clock = Clock()
-    checkpoint = Checkpoint(tmp_path / "c", KEY, interval=5.0, clock=clock)
-    add(checkpoint, outcomes(0, 3))
-    clock.now += 4.9
-    add(checkpoint, outcomes(3, 3))
-    assert parts(tmp_path / "c") == []
-    clock.now += 0.2
-    add(checkpoint, outcomes(6, 1))
-    assert len(parts(tmp_path / "c")) == 1
-    add(checkpoint, outcomes(7, 1))
-    clock.now += 4.0
-    add(checkpoint, outcomes(8, 1))
-    assert len(parts(tmp_path / "c")) == 1
-    checkpoint.flush()
-    assert len(parts(tmp_path / "c")) == 2
-    again = Checkpoint(tmp_path / "c", KEY)
-    assert again.completed().tobytes() == outcomes(0, 9).tobytes()
-    assert again.problems == []
-
-
-def test_any_order_of_samples_gives_the_same_records(tmp_path):
-    checkpoint = Checkpoint(tmp_path / "c", KEY, interval=0.0)
-    order = np.random.default_rng(0).permutation(50)
-    for start in range(0, 50, 6):
-        add(checkpoint, outcomes(0, 50)[order[start : start + 6]])
-    assert checkpoint.completed().tobytes() == outcomes(0, 50).tobytes()
-    assert Checkpoint(tmp_path / "c", KEY).completed().tobytes() == outcomes(0, 50).tobytes()
-
-
-def test_parts_are_datasets_of_their_own(tmp_path):
-    checkpoint = Checkpoint(
-        tmp_path / "c",
-        KEY,
-        names=("m2", "mechanism.rod.length"),
-        units={"mechanism.rod.length": "m"},
-        attributes=provenance("[mechanism]", "ab" * 32),
-    )
-    values = np.arange(8.0).reshape(4, 2)
-    add(checkpoint, outcomes(0, 4), values)
-    checkpoint.flush()
-    (part,) = parts(tmp_path / "c")
-    with xr.open_dataset(tmp_path / "c" / part, engine="h5netcdf") as found:
-        np.testing.assert_array_equal(found["m2"], values[:, 0])
-        assert found["mechanism_rod_length"].attrs["units"] == "m"
-        np.testing.assert_array_equal(found["objective"], outcomes(0, 4)["objective"])
-    with pytest.raises(ValueError, match="shape"):
-        add(checkpoint, outcomes(4, 1))
-    again = Checkpoint(tmp_path / "c", KEY, names=("mechanism.rod.length", "m2"))
-    assert again.completed().tobytes() == outcomes(0, 4).tobytes()
 
 
 def test_unreadable_parts_and_leftovers_are_reported_and_done_again(tmp_path):
@@ -246,35 +172,6 @@ def test_what_killed_runs_were_writing_is_removed_and_who_writes_tries_again(tmp
 # -- keys, stages, places -----------------------------------------------------------------------
 
 
-def test_stages_come_back_bit_for_bit(tmp_path):
-    data = {
-        "weights": np.random.default_rng(0).random((3, 4, 2)),
-        "special": np.array([np.nan, -0.0, np.inf]),
-        "count": np.int64(2**62),
-        "seeds": np.array([2**63, 5], np.uint64),
-        "accepted": np.array([True, False]),
-        "names": np.array(["m2", "mässe"]),
-        "state": '{"bit_generator": "PCG64"}',
-        "nothing": np.empty((0, 2)),
-    }
-    checkpoint = Checkpoint(tmp_path / "c", KEY)
-    assert checkpoint.load_stage("fit-1") is None
-    checkpoint.save_stage("fit-1", data)
-    found = Checkpoint(tmp_path / "c", KEY).load_stage("fit-1")
-    assert found is not None
-    assert set(found) == set(data)
-    for name, values in data.items():
-        expected = np.asarray(values)
-        assert found[name].dtype == expected.dtype, name
-        assert found[name].shape == expected.shape, name
-        assert found[name].tobytes() == expected.tobytes(), name
-    with pytest.raises(InputError, match="another run"):
-        Checkpoint(tmp_path / "c", {**KEY, "seed": "5"}).load_stage("fit-1")
-    (tmp_path / "c" / "stage-fit-1.nc").write_bytes(b"\x89HDF")
-    assert checkpoint.load_stage("fit-1") is None
-    assert "stage-fit-1.nc" in checkpoint.problems[0]
-
-
 def test_a_link_in_place_of_the_directory_is_refused(tmp_path):
     outside = tmp_path / "outside"
     outside.mkdir()
@@ -286,23 +183,6 @@ def test_a_link_in_place_of_the_directory_is_refused(tmp_path):
         with pytest.raises(InputError):
             Checkpoint(place, KEY)
     assert list(outside.iterdir()) == []
-
-
-def test_fresh_results_lie_beside_the_old_ones(tmp_path):
-    (tmp_path / "study").mkdir()
-    assert fresh_sibling(tmp_path / "study") == tmp_path / "study-2"
-    assert fresh_sibling(tmp_path / "study") == tmp_path / "study-3"
-    assert (tmp_path / "study-3").is_dir()
-    (tmp_path / "run.v1").mkdir()
-    assert fresh_sibling(tmp_path / "run.v1") == tmp_path / "run.v1-2"
-    (tmp_path / "x.nc").write_text("")
-    (tmp_path / "x-2.nc").symlink_to("nowhere")
-    assert fresh_sibling(tmp_path / "x.nc") == tmp_path / "x-3.nc"
-    with pytest.raises(InputError):
-        fresh_sibling(tmp_path / "x.nc" / "y")
-
-
-# -- kills --------------------------------------------------------------------------------------
 
 
 # -- lock ---------------------------------------------------------------------------------------
@@ -492,21 +372,3 @@ def test_records_of_a_variant_that_requests_less_come_back_as_they_were(tmp_path
         kept = with_levels.completed()
         assert kept.dtype == whole
         assert recast(kept, made.dtype).tobytes() == made.tobytes()
-
-
-def test_a_record_has_what_the_scene_requests():
-    plain = load_scene(JOBS / "robust_slider_crank.toml")
-    assert not {*ON_REQUEST, *STEADY, *MAPPED} & {*record_of(plain).names}
-    for changes, fields in (
-        ({"numerics.levels": [1000.0]}, {*RESPONSES, *IMPACTS, *LEVELS}),
-        ({"numerics.energy": True}, {"energy_error"}),
-        ({"numerics.target_error": 0.01}, {*STEADY}),
-    ):
-        found = {*record_of(plain.with_(changes)).names}
-        assert found - {*record_of(plain).names} == fields
-    assert record_of(plain.with_({"numerics.levels": [1000.0]}))["contact_force_level"].shape == (
-        2,
-        1,
-    )
-    corners = record_of(load_scene(JOBS / "loose_slider.toml"))
-    assert corners["mean_gap"].shape == (4,)

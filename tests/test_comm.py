@@ -110,15 +110,6 @@ def test_seconds_of_all_ranks_add_up_to_the_wall_time_of_a_stage(runs, ranks):
     assert runs[ranks]["seconds_serial"][0, COLUMNS.index("write")] > 0.0
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_a_stage_on_fewer_ranks_leaves_the_others_idle(runs, ranks):
-    run = runs[ranks]
-    assert run["on_one"].tobytes() == records_of(np.arange(200), design(200)).tobytes()
-    busy = run["seconds_on one"][:, COLUMNS.index("busy")]
-    assert busy[0] > 0.09  # 200 samples of 2 ms in 4 lanes
-    assert (busy[1:] == 0.0).all()
-
-
 @pytest.mark.parametrize("ranks", [0, 1, 2, 3])
 def test_every_rank_does_once_what_is_to_be_done_everywhere(runs, ranks):
     run = runs[ranks]
@@ -163,12 +154,6 @@ def test_a_report_names_rank_stage_and_sample(tmp_path):
     assert "on rank 1 of 2 in stage 'sampling'" in output
     assert "sample" in output.partition("in stage")[2].splitlines()[0]
     assert "raised on purpose" in output
-
-
-def test_work_finished_before_an_error_reaches_root(tmp_path):
-    finish(start(2, "failing.py", "worker on a rank", tmp_path / "mark"))
-    samples = [int(line) for line in (tmp_path / "mark.records").read_text().split()]
-    assert len(set(samples)) == len(samples) > 5
 
 
 @pytest.mark.parametrize(
@@ -283,13 +268,6 @@ def test_no_mpi_library_is_needed_in_one_process_but_named_when_missing(tmp_path
     assert output.count("Error: MPI library") == 1
     assert "MPI4PY_LIBMPI" in output
     assert "Traceback" not in output
-
-
-def test_the_mpi_library_is_described_without_starting_it():
-    assert boundary.describe_mpi()
-    from mpi4py import MPI
-
-    assert not MPI.Is_initialized()
 
 
 @pytest.mark.parametrize(("copies", "code"), [(1, 0), (2, 2)])

@@ -96,12 +96,6 @@ def test_samples_are_sorted_and_come_back_as_the_same_records():
     assert found["rhs_evaluations"][3] == 17
 
 
-def test_design_variables_by_path_keep_their_path():
-    found = samples()
-    assert found["mechanism_rod_length"].attrs["units"] == "m"
-    assert list(designs_in(found)) == ["m2", "C", "mechanism.rod.length"]
-
-
 @pytest.mark.parametrize("name", ["objective", "sample", "status", "2m", "a b", "", "m.ö"])
 def test_names_that_cannot_be_design_variables_are_refused(name):
     with pytest.raises(InputError, match=r"study\.variables"):
@@ -224,16 +218,6 @@ def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
 def test_a_probe_refuses_them_beforehand(tmp_path, case):
     with pytest.raises(InputError, match="output"):
         files.probe(places(tmp_path)[case])
-
-
-def test_a_probe_leaves_nothing_behind(tmp_path):
-    files.probe(tmp_path / "x.nc")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_nul_in_a_path_is_bad_input(tmp_path):
-    with pytest.raises(InputError):
-        dataset.write(samples(), f"{tmp_path}/a\0b")
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "replace"])

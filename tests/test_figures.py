@@ -1,7 +1,6 @@
 """Every figure is readable in print: axes labelled with units, 7 pt and more, nothing cut off or overlapping."""
 
 import re
-import sys
 from collections.abc import Callable, Iterator
 from itertools import combinations
 
@@ -17,7 +16,6 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from hpcclear import report
-from hpcclear.base.errors import InputError
 from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import labels, motion, style
 
@@ -252,15 +250,6 @@ def test_no_axis_cuts_its_data(request: pytest.FixtureRequest, figure: Figure) -
                 )
 
 
-def test_a_deeper_second_joint_is_not_cut_off() -> None:
-    response = data.response()
-    depth = response["penetration"]
-    response["penetration"] = depth * xr.DataArray([1.0, 3.0], dims="joint")
-    response["penetration"].attrs = depth.attrs
-    for panel in report.penetration_figure(response).axes:
-        assert panel.get_ylim()[1] >= max(np.max(line.get_ydata()) for line in panel.lines)
-
-
 def test_no_panel_is_empty(figure: Figure) -> None:
     for axes in figure.axes:
         assert not axes.axison or axes.has_data() or axes.get_label() == "<colorbar>"
@@ -281,21 +270,6 @@ def test_the_users_settings_are_left_alone() -> None:
         made = report.timing_figure(data.timing())
         assert matplotlib.rcParams["font.size"] == 3.0
         assert made.axes[0].get_facecolor()[:3] == (1.0, 1.0, 1.0)
-
-
-def test_saved_under_the_name_given(tmp_path) -> None:
-    path = report.save(report.timing_figure(data.timing()), tmp_path / "timing.svg")
-    assert path.read_text().startswith("<?xml")
-    with pytest.raises(InputError, match="png, svg or pdf"):
-        report.save(report.timing_figure(data.timing()), tmp_path / "timing.docx")
-    with pytest.raises(InputError, match="No such"):
-        report.save(report.timing_figure(data.timing()), tmp_path / "nowhere" / "timing.png")
-
-
-def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(InputError, match=r"pip install 'matplotlib>=3\.9'"):
-        report.timing_figure(data.timing())
 
 
 def test_objective_of_each_turn_is_the_time_mean() -> None:
@@ -321,42 +295,6 @@ def test_spectrum_finds_amplitude_and_order() -> None:
     peak = int(np.argmax(amplitude))
     assert order[peak] == pytest.approx(5.0)
     assert amplitude[peak] == pytest.approx(3.0, rel=1e-6)
-
-
-def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
-    front, verified = _other_goals()
-    made = report.front_figure(front, verified)
-    upper, lower = np.array(made.axes).reshape(2, 2)
-    assert upper[0].get_xlabel().split() == ["95th", "percentile", "of", "f", "(mm)"]
-    assert upper[0].get_ylabel() == "m2 + m3 (SI)"
-    assert lower[0].get_xlabel().startswith("mean")
-    assert lower[0].get_ylabel().startswith("standard deviation")
-    points = upper[0].lines[0].get_xydata()
-    one = front.isel(case=0, run=0)
-    np.testing.assert_allclose(points[:, 0], 1.5e3 * one["mean"])
-    np.testing.assert_allclose(points[:, 1], one["m2"] + one["m3"])
-    low, high = upper[1].get_ylim()
-    mass = verified["m2"] + verified["m3"]
-    assert low <= float(mass.min()) <= float(mass.max()) <= high
-
-
-def test_each_two_of_three_have_panels_and_each_end_a_letter() -> None:
-    front, verified = _three_goals()
-    made = report.front_figure(front, verified)
-    lines = np.array(made.axes).reshape(4, 2)  # three pairs of the first case, one of the second
-    starts = [(one.get_xlabel()[:4], one.get_ylabel()[:4]) for one in lines[:, 0]]
-    assert starts == [("mean", "stan"), ("mean", "((m2"), ("stan", "((m2"), ("mean", "stan")]
-    assert lines[1, 0].get_ylabel().endswith("… (SI)")
-    for panel in lines[:3, 0]:
-        letters = {text.get_text(): text for text in panel.texts}
-        assert set(letters) == set("αβγ")
-        assert letters["α"].xy == letters["γ"].xy  # one design, told apart by where they stand
-        assert letters["α"].xyann != letters["γ"].xyann
-    assert [text.get_text() for text in lines[3, 0].texts] == ["α", "β"]
-    points = lines[2, 0].lines[0].get_xydata()
-    one = front.isel(case=0, run=0)
-    np.testing.assert_allclose(points[:, 1], one["searched_third"])
-    assert not lines[0, 1].texts
 
 
 def test_drawing_leaves_a_figure_as_it_was():

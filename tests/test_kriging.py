@@ -14,7 +14,6 @@ from hpcclear.statistics.surrogate.kernels import KERNELS, MATERN, SQUARED_EXPON
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.likelihood import PART, maximise, negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import gaussian, matern
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 
@@ -194,12 +193,6 @@ def test_round_trip_is_bitwise(either):
     assert again.kernel == model.kernel
     assert (again.predict(places) == model.predict(places)).all()
     assert (again.variance(places) == model.variance(places)).all()
-
-
-def test_fit_is_deterministic(model):
-    again = refit(model, names=model.names)
-    for name, array in model.to_arrays().items():
-        assert (array == again.to_arrays()[name]).all(), name
 
 
 @pytest.mark.parametrize(
@@ -383,15 +376,3 @@ def test_a_smooth_function_stays_in_one_piece():
     pieces = fit_kinked(evaluate)
     assert len(pieces.leaves) == 1
     assert evaluate.calls == [70]
-
-
-def test_pieces_round_trip_is_bitwise():
-    pieces = fit_kinked(kinked)
-    arrays = {name: np.copy(array) for name, array in pieces.to_arrays().items()}
-    again = Piecewise.from_arrays(arrays, METHOD)
-    places = draw(200, 14, SQUARE)
-    assert (again.predict(places) == pieces.predict(places)).all()
-    assert (again.accepted == pieces.accepted).all()
-    for name in ("leaf0_upper", "leaf0_lower"):  # boxes that overlap or leave gaps
-        with pytest.raises(InputError):
-            Piecewise.from_arrays(arrays | {name: arrays[name] + 0.1}, METHOD)

@@ -145,25 +145,6 @@ def test_a_second_run_on_one_output_is_refused(tmp_path):
     assert commands.finish(job)[0] == 3
 
 
-def test_another_scene_is_refused_with_the_keys_that_differ_and_fresh_lies_beside(tmp_path):
-    output = tmp_path / "samples.nc"
-    assert commands.run(commands.sample(output, 100), 0)[0] == 0
-    before = output.read_bytes()
-    other = commands.sample(output, 100, "--set", "effects.gravity=9.81", "--set", "study.seed=2")
-    code, text = commands.run(other, 0)
-    assert code == 2, text
-    assert "effects.gravity: 0.0 there, 9.81 now" in text
-    assert "study.seed: 1 there, 2 now" in text
-    assert "--fresh" in text
-    assert commands.run([*other, "--fresh"], 0)[0] == 0
-    assert output.read_bytes() == before
-    beside = dataset.read(tmp_path / "samples-2.nc", "samples")
-    assert beside.sizes["sample"] == 100
-    assert commands.run([*other, "--fresh"], 0)[0] == 0
-    assert (tmp_path / "samples-3.nc").read_bytes() == (tmp_path / "samples-2.nc").read_bytes()
-    assert output.read_bytes() == before
-
-
 def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
     output = tmp_path / "samples.nc"
     job = commands.start(commands.sample(output, 100_000, *OPTIONS))

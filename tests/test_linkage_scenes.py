@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import overrides, run
-from dense_linkage import Contact, Dense
+from dense_linkage import Contact, Dense, comes_as
 from margins import energy_closes
-from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
@@ -59,21 +58,11 @@ def test_a_whole_motion_is_the_dense_model_s():
     ]
     start = np.zeros((2, dense.n))
     start[0, order], start[1, order] = assembly.q, assembly.v
-    n, end = (
-        dense.n,
-        0.0025,
-    )  # s: contact begins in both joints before; later chaos parts any two solutions
     response = simulate(scene)
-    time = response["time"].to_numpy()
-    early = time[time <= end]
-    y = solve_ivp(
-        lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, end), start.ravel(),
-        method="DOP853", rtol=1e-10, atol=1e-12, max_step=end / 100, t_eval=early,
-    ).y  # fmt: skip
-    for k, name in enumerate(("body_x", "body_y", "body_angle")):
-        seen = response[name].to_numpy()[: len(early)]
-        np.testing.assert_allclose(seen, y[k:n:3].T, rtol=0, atol=1e-8)
-    assert (response["contact_force"].to_numpy()[: len(early)].max(axis=0) > 100.0).all()
+    met = comes_as(
+        response, dense, start, 0.0025
+    )  # s: contact in both joints before; later chaos parts solutions
+    assert (response["contact_force"].to_numpy()[:met].max(axis=0) > 100.0).all()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
 

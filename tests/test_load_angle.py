@@ -13,10 +13,6 @@ from test_linkage_scenes import slider_crank_pair
 from test_rest import REST
 
 from hpcclear import load_scene, simulate
-from hpcclear.report.figures import motion
-from hpcclear.report.figures.portraits import poincare_figure
-from hpcclear.report.figures.response import response_figure
-from hpcclear.report.html.picture import frames
 
 TURN = 2 * math.pi
 STARTS = [math.radians(angle) for angle in (-70.0, 20.0, 115.0, 230.0, 400.0)]
@@ -362,22 +358,6 @@ def test_series_of_the_driven_body_go_on_from_turn_to_turn(formulation):
     tip = response[["point_x", "point_y"]].sel(point="coupler.tip")
     off = tip["point_x"] + 1j * tip["point_y"] - four_bar(given(time))[0]
     assert float(np.abs(off).max()) < 20 * CLEARANCE
-
-
-def test_figures_know_which_way_a_drive_goes():
-    for kind, way in (("constant", -1), ("table", -1), ("harmonic", 1)):
-        scene, _ = linkage(kind, way, STARTS[1], CLEARANCE, revolutions=2)
-        response = simulate(scene)
-        assert motion.whole_turns(response) == 2
-        last = motion.steady(response, 1)
-        assert float(last["time"][0]) == pytest.approx(SECONDS, rel=1e-6)
-        if kind != "harmonic":  # which has no one angle once a turn
-            crossed = motion.section(response, "crank_angle", 0.5)
-            np.testing.assert_allclose(np.mod(crossed, TURN), 0.5, rtol=0, atol=1e-9)
-            assert len(crossed) == 2
-        for made in (response_figure(response), poincare_figure(response, 0.5)):
-            assert made.axes
-        assert np.ptp(frames(response)["turn"]) == pytest.approx(2.0)
 
 
 def test_a_body_from_rest_may_be_thrown_back_wherever_it_starts():

@@ -245,18 +245,6 @@ def test_methods_agree():
 
 
 @pytest.mark.full
-def test_samples_beside_others_have_the_bits_of_single_ones():
-    scene = bristled()
-    rng = np.random.default_rng(0)
-    columns = {
-        ("mechanism.rod.mass",): rng.uniform(0.1, 0.4, 24),
-        ("effects.friction.coefficient",): rng.uniform(0.01, 0.15, 24),
-        ("effects.friction.bristle_stiffness",): 10 ** rng.uniform(3, 7, 24),
-    }
-    running.lanes_have_single_bits(scene, columns)
-
-
-@pytest.mark.full
 @pytest.mark.parametrize("ideal", ["crank_rod", "rod_slider"])
 def test_one_joint_alone_has_its_bristles(ideal):
     scene = bristled({f"joints.{ideal}": {"kind": "ideal"}}, 1e-8)

@@ -257,6 +257,19 @@ def test_fresh_statistics_keep_their_samples_in_a_directory_of_their_own(kept):
     assert contents(folder) == contents(folder.with_name("raw-2")) == before
 
 
+def test_finished_statistics_do_not_take_samples_of_another_seed_for_theirs(tmp_path):
+    outputs = {seed: tmp_path / f"{seed}.nc" for seed in (1, 2)}
+    folders = {seed: tmp_path / f"raw{seed}" for seed in (1, 2)}
+    for seed, output in outputs.items():
+        run_statistics(
+            random_scene(f"study.seed={seed}"), output, alone(), raw=folders[seed], options=QUIET
+        )
+    before = contents(tmp_path)
+    with pytest.raises(InputError, match=r"study\.seed: 2 there, 1 now"):
+        run_statistics(random_scene("study.seed=1"), outputs[1], alone(), raw=folders[2])
+    assert contents(tmp_path) == before
+
+
 @pytest.mark.parametrize("change", ["nothing", "a file is gone", "another directory"])
 def test_a_stopped_run_ends_with_all_its_samples(tmp_path, kept, monkeypatch, change):
     whole = contents(kept[1])

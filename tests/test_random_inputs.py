@@ -287,19 +287,6 @@ def _model(scene: Scene, length: float = 1.2, kernel: Kernel = SQUARED_EXPONENTI
     return Piecewise((leaf,), np.ones(1), np.zeros(1), np.array([True]))
 
 
-def test_a_model_that_found_noise_is_averaged_by_draws() -> None:
-    """No rule has nodes enough for length scales of a hundredth: a study of rattling linkages stopped there."""
-    wide = {"study.random.C": {"distribution": "uniform", "range": ["0.3 mm", "1 mm"]}}
-    scene = ROBUST.with_(wide)
-    problem = problem_of(scene, "robust", _model(scene, 0.01))
-    design = np.array([[DESIGN[name] for name in problem.names]])
-    moments = problem.objective(design)
-    assert np.isfinite(moments).all()
-    np.testing.assert_array_equal(
-        problem.objective(design), moments
-    )  # the same draws for every design
-
-
 @pytest.mark.parametrize(
     ("together", "kernel"),
     [(False, SQUARED_EXPONENTIAL), (True, SQUARED_EXPONENTIAL), (False, MATERN)],

@@ -135,15 +135,6 @@ def test_with_validates_and_keeps_the_original(scene: Scene) -> None:
         scene.with_({"joints..clearance": 0.03})
 
 
-def test_with_keeps_the_study() -> None:
-    study = load_scene(ROBUST)
-    changed = study.with_({"study.samples": 77, "study.variables.m2.range": [0.2, 0.3]})
-    assert changed.study is not None
-    assert changed.study.samples == 77
-    assert changed.study.variable("m2").range == (0.2, 0.3)
-    assert changed.study.names == study.study.names
-
-
 def test_number_and_unit(scene: Scene) -> None:
     assert scene.number("mechanism.rod.mass") == 0.21
     assert scene.unit("joints.crank_rod.clearance") == "m"
@@ -218,23 +209,6 @@ def test_c_drives_the_clearances_there_are() -> None:
             + ['effects.friction={law="none"}'],
         )
     assert both.with_({"joints.crank_rod.kind": "ideal"}) == one
-
-
-def test_effects_are_listed(scene: Scene) -> None:
-    assert len(scene.effects_on()) == 4
-    loud = scene.with_(
-        {
-            "effects.gravity": 9.81,
-            "effects.slider_load": 10,
-            "effects.guide_friction": {"coefficient": 0.1},
-            "numerics.formulation": "baumgarte",
-            "numerics.energy": True,
-            "drive": {"kind": "torque", "torque": 5, "initial_speed": 500},
-        }
-    )
-    assert len(loud.effects_on()) == 10
-    quiet = {"joints.crank_rod": {"kind": "ideal"}, "joints.rod_slider": {"kind": "ideal"}}
-    assert scene.with_({**quiet, "effects.friction": None}).effects_on() == ()
 
 
 def test_a_coefficient_of_zero_is_on(scene: Scene) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hpcclear.ranks.leading import WorkQueue
-from hpcclear.ranks.schedule import QUANTUM, HandOut, Need, allot
+from hpcclear.ranks.schedule import QUANTUM, HandOut
 
 
 class SimulatedWorker:
@@ -102,42 +102,8 @@ def test_many_ranks_stay_busy():
     assert simulate(tenfold(64 * 400, 0.05), 64, 1) > 0.95
 
 
-@pytest.mark.parametrize("rate", [0.0, 0.5, 1e4])
-@pytest.mark.parametrize("lanes", [1, 16])
-@pytest.mark.parametrize("ranks", [1, 2, 10_000])
-def test_a_block_is_never_empty_while_something_remains_and_never_more(ranks, lanes, rate):
-    for remaining in (1, 2, 17, 1000, 10**6):
-        for pending in (0, lanes, 3 * lanes):
-            size, ask_below = allot(remaining, ranks, Need(lanes, pending, rate))
-            assert 1 <= size <= remaining
-            assert ask_below >= lanes
-    assert allot(0, ranks, Need(lanes, 0, rate)).size == 0
-
-
-def test_blocks_shrink_towards_the_end():
-    sizes = []
-    remaining = 10_000
-    while remaining:
-        sizes.append(allot(remaining, 4, Need(1, 0, 1e4)).size)
-        remaining -= sizes[-1]
-    assert sizes == sorted(sizes, reverse=True)
-    assert sizes[-4:] == [1, 1, 1, 1]
-
-
 def records(samples: list[int]) -> np.ndarray:
     return np.array([(sample,) for sample in samples], [("sample", np.int64)])
-
-
-def test_hand_out_leaves_out_what_is_completed_and_ends_when_all_is_back():
-    book = HandOut(6, np.array([1, 4]), 1)
-    handed = []
-    while book.remaining:
-        handed += book.grant(Need(2, 0, 0.0))[0].tolist()
-    assert handed == [0, 2, 3, 5]
-    book.accept(records([5, 0, 3]))
-    assert (book.outstanding, book.done) == (1, False)
-    book.accept(records([2]))
-    assert book.done
 
 
 def test_a_desk_knows_its_samples_when_the_worker_raises():

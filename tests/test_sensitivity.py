@@ -61,23 +61,6 @@ def sobol_indices(
 # the design ---------------------------------------------------------------------------------------
 
 
-def test_intervals_shrink_together_about_their_midpoints() -> None:
-    design = design_intervals(
-        BOUNDS, CLEARANCES, np.random.default_rng(0), IntervalSettings(steps=5, shrink=0.2)
-    )
-    assert design.intervals.shape == (5, 2, 2)
-    np.testing.assert_array_equal(design.intervals[0], BOUNDS)
-    np.testing.assert_allclose(design.intervals.mean(axis=2), np.tile(MIDDLE, (5, 1)), rtol=1e-14)
-    lengths = np.ptp(design.intervals, axis=2) / np.ptp(BOUNDS, axis=1)
-    np.testing.assert_allclose(lengths, np.outer(0.8 ** np.arange(5), [1, 1]), rtol=1e-12)
-    blocks = design.points.reshape(5, 3, 50, 3)
-    assert (blocks[..., 2] == CLEARANCES[:, np.newaxis]).all()
-    inside = blocks[..., :2] - design.intervals[:, np.newaxis, np.newaxis, :, 0]
-    assert (inside >= 0).all()
-    assert (inside <= np.ptp(design.intervals, axis=2)[:, np.newaxis, np.newaxis]).all()
-    assert len(np.unique(design.points, axis=0)) == len(design.points)  # every surface its own
-
-
 # midpoint sensitivity -----------------------------------------------------------------------------
 
 
@@ -118,16 +101,6 @@ def test_loop_finds_the_interval_and_the_derivative(sigma: float, shift: int) ->
     # fifty repeats no less than 0.02 below
     wanted = {0.0: 1.9, 1e-6: 1.9, 1e-5: 1.4, 5e-5: 0.9}[sigma]
     at_least(np.concatenate(steps).mean(), wanted)
-
-
-def test_wide_interval_alone_would_be_wrong() -> None:
-    """The loop is there for a reason: over the global interval truncation exceeds the error."""
-    found = history(with_noise(curved, 1e-6, 0))
-    off = np.abs(found.sensitivity - slopes(CLEARANCES)) / found.standard_error
-    verdict = convergence_intervals(found)
-    assert (off[0, :, 0] > 4).all()
-    assert (verdict.interval[:, 0] >= 2).all()
-    assert verdict.found.all()
 
 
 def test_noise_amplification_in_short_intervals_is_in_the_standard_error() -> None:

@@ -11,6 +11,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from commands import warm
+from formula_study import PROGRAMS, contents, formula
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -38,13 +39,9 @@ from hpcclear.study.paper import claims
 from hpcclear.study.paper.printed import printed_designs
 from hpcclear.study.paper.recognition import is_the_papers, own_names
 from hpcclear.study.problem import problem_of
-from hpcclear.study.stages import STAGES, files_of
+from hpcclear.study.stages import files_of
 
-PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
 
 Z = ("m2", "m3", "u2", "I2")
 HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
@@ -70,14 +67,6 @@ def results(tmp_path_factory):
     patch.undo()
     assert all("ended with its rounds" in text for text in told)  # there is one round
     return place
-
-
-def contents(place: pathlib.Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(place)): path.read_bytes()
-        for path in sorted(place.rglob("*.nc"))
-        if path.name != "timing.nc"
-    }
 
 
 def truth(design: dict[str, float], robust: bool) -> tuple[float, float]:
@@ -714,17 +703,3 @@ def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch)
     texts = " ".join(found["figure"].to_numpy().astype(str))
     assert "first alpha against original: peak of contact force 1 unknown" in texts
     assert not re.search(r"\bnan\b.*against|against[^;]*\bnan\b", texts)
-
-
-def test_every_stage_needs_earlier_ones_alone_and_announces_parts_of_its_own():
-    known, parts = {"scene", "extent"}, list[str]()
-    for stage in STAGES:
-        assert set(stage.needs) <= known
-        known.add(stage.name)
-        parts += stage.words
-    assert len(parts) == len(set(parts))
-
-
-def test_the_files_of_a_finished_study_are_those_of_its_stages(results):
-    made = {path.name for path in results.glob("*.nc")}
-    assert made - {"timing.nc"} == set(files_of(scene_of()))

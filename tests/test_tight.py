@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from running import HUNT_CROSSLEY, LATCHED, energy_residual, run, scene_with
 
-from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record
 from hpcclear.dynamics.stepping.lanes import Lanes
-from hpcclear.scene.points import Points
 
 TIGHT = "prince-dormand"
 
@@ -103,16 +101,6 @@ def test_the_energy_balance_closes(name: str):
     scene = case(name, TIGHT, 1e-8)
     residual, passed = energy_residual(scene, run(scene))
     assert abs(residual) < 1e-7 * passed
-
-
-def test_samples_have_the_bits_of_single_ones():
-    """Of other numbers of lanes see `test_abreast` and `test_reference`."""
-    scene = case("latched", TIGHT, 1e-6)
-    clearances = np.linspace(0.2e-3, 0.5e-3, 7)[:, None]
-    par = parameters(scene, Points(["c"], clearances, [["joints.crank_rod.clearance"]]))
-    start = start_states(scene, par)
-    one, many = (Lanes(problem_of(scene), width).run(par, start) for width in (1, DEFAULT_LANES))
-    assert one.rows.tobytes() == many.rows.tobytes()
 
 
 def test_a_full_record_is_not_written_beyond():

@@ -1,7 +1,6 @@
 """Linkages that cannot turn, and change points: against Grashof's rule, determinants of other equations, and 50 digits."""
 
 import math
-import tomllib
 from dataclasses import replace
 from decimal import Decimal, getcontext
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from commands import overrides, run
 from linkages import bar, pins
+from test_linkage_scenes import ROCKER, rocker
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
@@ -25,7 +25,6 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.points import Points
 
 JOBS = Path(__file__).parents[1] / "jobs" / "linkages"
-ROCKER = tomllib.loads((JOBS / "crank_rocker.toml").read_text())
 MOTOR = ConstantSpeed("motor", "crank", 2 * math.pi)
 NOTHING = Points((), np.empty((1, 0)), ())
 LOCKED = "mechanism.bodies.coupler.length=0.088"
@@ -33,13 +32,6 @@ FOUR = (
     ("o1", "crank.a", "ground.o"), ("o2", "crank.b", "coupler.a"),
     ("o3", "coupler.b", "rocker.b"), ("o4", "rocker.a", "ground.p"),
 )  # fmt: skip
-
-
-def rocker(*sets):
-    """The crank-rocker without its study, one revolution."""
-    content = {key: value for key, value in ROCKER.items() if key != "study"}
-    short = ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1")
-    return load_scene(content, (*short, *sets))
 
 
 def four_bar(a, b, c, g, start, elbow, open_pins=(), drive=MOTOR):
