@@ -70,17 +70,6 @@ def test_times_beside_a_result_do_not_replace_a_users_file(tmp_path):
     assert (tmp_path / "samples.timing.nc").read_text() == "mine"
 
 
-def test_our_own_files_are_replaced_and_a_link_is_not_followed(thesis, tmp_path):
-    output = tmp_path / "out.nc"
-    netcdf.save(data.timing(), output)
-    netcdf.save(data.claims(), output)
-    link = tmp_path / "link.nc"
-    link.symlink_to(thesis)
-    netcdf.save(data.timing(), link)
-    assert not link.is_symlink()
-    assert thesis.read_bytes().startswith(b"three years")
-
-
 def test_devices_and_pipes_are_refused(tmp_path):
     pipe, device = tmp_path / "pipe.nc", tmp_path / "full.nc"
     os.mkfifo(pipe)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from commands import overrides, run
 from dense_linkage import Contact, Dense, comes_as
-from margins import energy_closes
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
@@ -59,9 +58,8 @@ def test_a_whole_motion_is_the_dense_model_s():
     start = np.zeros((2, dense.n))
     start[0, order], start[1, order] = assembly.q, assembly.v
     response = simulate(scene)
-    met = comes_as(
-        response, dense, start, 0.0025
-    )  # s: contact in both joints before; later chaos parts solutions
+    # contact begins in both joints before 2.5 ms; later chaos parts any two solutions
+    met = comes_as(response, dense, start, 0.0025)
     assert (response["contact_force"].to_numpy()[:met].max(axis=0) > 100.0).all()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
@@ -149,21 +147,6 @@ def test_without_play_nothing_is_integrated_and_reactions_are_the_closed_form_s(
     assert (found["objective"] == 0.0).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.shortened(3)
-def test_the_gallery_runs_and_closes_its_energy(name):
-    scene = load_scene(
-        LINKAGES / f"{name}.toml",
-        ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"),
-    )
-    response = simulate(scene.with_({"study": None}))
-    assert int(response["status"]) == 0
-    energy_closes(response, 1e-4)
-    assert float(response["objective"]) > 0.0
-    points = [str(point) for point in response["point"].to_numpy()]
-    assert len(points) == len(set(points))
-
-
 DRIVES = {
     "torque": {
         "kind": "torque", "body": "crank", "torque": 1.0, "initial_speed": 90.0,
@@ -221,20 +204,6 @@ def test_no_first_step_of_a_contact_is_its_last():
     found = evaluate(driven("torque"), {"mechanism.joints.o2.clearance": worst})
     assert (found["status"] == 0).all()
     assert float(found["energy_error"].max()) < 1.5e-6
-
-
-def test_latched_laws_multipliers_and_implicit_steps_run_on_linkages():
-    latched = rocker(
-        'effects.contact={law="lankarani-nikravesh", restitution=0.8}', "numerics.energy=true"
-    )
-    for scene in (
-        latched,
-        rocker("numerics.formulation=baumgarte", "numerics.energy=true"),
-        rocker("numerics.method=radau", "numerics.energy=true"),
-    ):
-        found = evaluate(scene, {"mechanism.joints.o2.clearance": [1e-4, 3e-4]})
-        assert (found["status"] == 0).all()
-        assert (found["energy_error"] < 1e-4).all()
 
 
 # ---- samples -----------------------------------------------------------------------------------------

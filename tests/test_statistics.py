@@ -109,23 +109,6 @@ def test_order_of_arrival_changes_no_bit():
     assert not same(one, fill(Accumulator(3000, block=128), changed, 1).result())
 
 
-def test_going_on_from_a_state_changes_no_bit():
-    records = outcomes(3000)
-    whole = fill(Accumulator(3000, block=128), records, 1).result()
-    rng = np.random.default_rng(0)
-    for taken in (0, 50, 1500, 2999):
-        chosen = rng.permutation(3000)[:taken]
-        first = Accumulator(3000, block=128)
-        first.add(records[chosen])
-        second = Accumulator(3000, block=128)
-        second.restore(first.state())
-        left = second.remaining()
-        numbers = left.samples(np.arange(len(left)))
-        np.testing.assert_array_equal(np.sort(numbers), np.setdiff1d(np.arange(3000), chosen))
-        second.add(records[numbers])
-        assert same(second.result(), whole)
-
-
 def test_deviation_survives_a_large_mean():
     # A sum of squares minus a squared sum loses all digits here.
     records = outcomes(4096)
@@ -157,19 +140,6 @@ def test_all_samples_failed_leaves_nan_not_zero():
     assert np.isnan(content["objective_minimum"])
     failed = content["samples_by_status"].sel(outcome=int(Status.NOT_FINITE))
     assert failed == content["samples_by_status"].sum() == 300
-
-
-def test_a_sample_counts_once():
-    records = outcomes(300)
-    sums = Accumulator(300, block=128)
-    sums.add(records[:150])
-    for again in (records[10:11], records[120:121], np.concatenate([records[200:201]] * 2)):
-        with pytest.raises(ValueError, match="before"):
-            sums.add(again)
-    with pytest.raises(ValueError, match="outside"):
-        sums.add(outcomes(301)[300:])
-    with pytest.raises(RuntimeError, match="before every sample"):
-        sums.result()
 
 
 def test_dataset_round_trip_and_raw_samples(tmp_path):
