@@ -3,6 +3,7 @@
 import gc
 import os
 import tempfile
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -76,7 +77,7 @@ def pytest_generate_tests(metafunc):
 LONGEST = (
     "survival", "docs", "release", "native_windows", "random_scenes", "linkage_scenes", "limits", "accuracy", "certificate",
     "effects", "cli", "statistics", "fuzz", "bending", "cluster", "goals", "reference", "guides", "hostile", "tight",
-    "further_responses", "stiff", "jacobian", "llvm", "hard_cases", "ideal", "motion", "run", "comm", "study",
+    "further_responses", "stiff", "jacobian", "hard_cases", "ideal", "motion", "run", "comm", "study",
 )  # fmt: skip
 """Files that take longest first: one that begins last keeps a single worker busy at the end."""
 
@@ -86,8 +87,16 @@ def _turn(item):
     return LONGEST.index(name) if name in LONGEST else len(LONGEST)
 
 
+@pytest.hookimpl(tryfirst=True)  # before marks choose
 def pytest_collection_modifyitems(config, items):
     items.sort(key=_turn)
+    met = Counter()
+    for item in items:
+        if kept := item.get_closest_marker("shortened"):
+            of = (item.path, item.originalname)
+            met[of] += not any(item.iter_markers("nightly")) and not any(item.iter_markers("full"))
+            if met[of] > kept.args[0]:
+                item.add_marker("nightly")
     if config.getoption("--other-seeds"):
         items[:] = [item for item in items if "shift" in item.fixturenames]
 

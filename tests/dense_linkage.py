@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from dense_mechanism import Touch, touching
+from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.assembly import assemble
@@ -422,3 +423,17 @@ def start_of(dense):
         place = dense.first[one.body] + ("x", "y", "angle").index(one.kind)
         start[:, place] = made.q[k], made.v[k]
     return start
+
+
+def comes_as(response, dense, start, end, rtol=1e-11):
+    """Positions of all bodies up to a time (s) are those of the dense model, to 1e-8 m and rad; how many instants."""
+    n, time = dense.n, response["time"].to_numpy()
+    early = time[time <= end]
+    y = solve_ivp(
+        lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, end), start.ravel(),
+        method="DOP853", rtol=rtol, atol=rtol / 100, max_step=end / 50, t_eval=early,
+    ).y  # fmt: skip
+    for k, name in enumerate(("body_x", "body_y", "body_angle")):
+        seen = response[name].to_numpy()[: len(early)]
+        np.testing.assert_allclose(seen, y[k:n:3].T, rtol=0, atol=1e-8)
+    return len(early)

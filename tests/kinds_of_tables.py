@@ -1,10 +1,7 @@
-"""Files as people have them, made by a program: `python tests/kinds_of_tables.py` prints how each is read,
-or why it is refused."""
+"""Files as people have them, made by a program: what each has to give, or why it is refused."""
 
 import io
 import math
-import sys
-import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -309,21 +306,3 @@ def outcome(kind: Kind, folder: Path) -> tuple[bool, str]:
         found, expected_of(kind, found), rtol=1e-9, atol=1e-6 * (kind.role != "designs")
     )
     return right, f"read, {len(found)} rows"
-
-
-def main() -> int:
-    """Print the table; the number of files that are treated wrongly."""
-    wrong = 0
-    with tempfile.TemporaryDirectory() as folder:
-        sys.stdout.write("| file | outcome |\n| --- | --- |\n")
-        for kind in kinds():
-            right, shown = outcome(kind, Path(folder))
-            wrong += not right
-            sys.stdout.write(
-                f"| {kind.words} ({kind.role}) | {'' if right else 'WRONG: '}{shown} |\n"
-            )
-    return wrong
-
-
-if __name__ == "__main__":
-    sys.exit(main())

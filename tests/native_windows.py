@@ -1,7 +1,6 @@
 """Every command in a Python that lacks what native Windows lacks: modules, functions, signals, flags of files.
 
     python tests/native_windows.py            prints a table: command, exit code, its last line
-    python tests/native_windows.py --page     writes the table of docs/checks.md
 
 Each command is a fork of one process in which these names are missing. What Windows has and Linux lacks is not imitated,
 nor are its file system and compiler.
@@ -49,20 +48,6 @@ STOPS = ("bifurcation", "map", "wear", "effects", "identify", "run", "accuracy")
 
 REFUSED = ("merge",)
 """End with exit code 2 and a sentence: of the words here nothing else is there to merge, wherever they run."""
-
-PAGE = ROOT / "docs" / "checks.md"
-BEGIN, END = "<!-- native windows: begin -->", "<!-- native windows: end -->"
-
-
-def table() -> str:
-    """What becomes of every command, as a table of the page."""
-    rows = [
-        (WORKS, "works"),
-        (STOPS, "works until the time limit that the test sets, and keeps what is finished"),
-        (REFUSED, "exit code 2 and a message: the test has no parts to merge"),
-    ]
-    lines = [f"| {', '.join(f'`{name}`' for name in names)} | {what} |" for names, what in rows]
-    return "\n".join([BEGIN, "", "| commands | result |", "| --- | --- |", *lines, "", END])
 
 
 class Missing(importlib.abc.MetaPathFinder):
@@ -168,11 +153,6 @@ def outcomes(place: Path, scene: str) -> dict[str, tuple[int, str]]:
 
 
 def main() -> None:
-    if sys.argv[1:] == ["--page"]:
-        text = PAGE.read_text(encoding="utf-8")
-        before, after = text.partition(BEGIN)[0], text.partition(END)[2]
-        PAGE.write_text(before + table() + after, encoding="utf-8")
-        return
     scene = str(ROOT / "jobs" / "quickstart.toml")
     with tempfile.TemporaryDirectory() as place:
         for name, (code, said) in outcomes(Path(place), scene).items():

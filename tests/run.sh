@@ -2,9 +2,9 @@
 # Set-up and all checks; every step runs whatever became of the others, and one table ends it. Exit 1 if a test failed.
 #   bash tests/run.sh           short profile: what a change must pass before it lands (.ci/run)
 #   bash tests/run.sh --quick   for the loop while developing, under 3 minutes once the kernel is compiled
-#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, examples, release, kills, fuzz, compiled code
+#   bash tests/run.sh --nightly short profile and tests marked nightly: blocks of the pages, examples, release, kills, fuzz, more parameters
 #   bash tests/run.sh --full    everything, and the job scripts on a real Slurm where it is installed
-#   bash tests/run.sh --strict  exit 1 for lint, format, types and layers too; types for every locked Python (.ci/run)
+#   bash tests/run.sh --strict  exit 1 for lint, format, types and layers too (.ci/run); --nightly and --full: types for every locked Python
 # --latest and --lowest choose other versions (jobs/environment.sh). All other words go to pytest:
 #   bash tests/run.sh tests/test_kriging.py -k nugget
 set -u
@@ -27,7 +27,7 @@ done
 # simulate for long. A file that is new is in.
 long=(
     api checkpoint cli cluster comm dataset docs effects figures fuzz hard_cases hostile jacobian limits linkage_scenes
-    llvm motion native_windows notebook oracle plan progress random_scenes release report robust sensitivity statistics
+    motion native_windows notebook oracle plan progress random_scenes release report robust sensitivity statistics
     stiff study survival target tight trust vectorised
 )
 
@@ -57,6 +57,13 @@ row() { # name, code, seconds
         red=1
     fi
     rows+=("$(printf '%-32s %-8s %d:%02d' "$1" "$result" $(($3 / 60)) $(($3 % 60)))")
+}
+warning() { # name, command...: it says what a reader may improve, and changes no exit code
+    local name=$1 start=$SECONDS result=ok
+    shift
+    printf '\n== %s\n' "$name"
+    "$@" || result=warning
+    rows+=("$(printf '%-32s %-8s %d:%02d' "$name" "$result" $(((SECONDS - start) / 60)) $(((SECONDS - start) % 60)))")
 }
 step() { # name, command...
     local name=$1 start=$SECONDS code=0
@@ -108,12 +115,14 @@ tested=$red
 step lint ruff check .
 step format ruff format --check .
 # Older libraries describe their own types less well; what runs with them is what the tests say.
-case "$strict ${versions[*]-} " in
+# Of what NumPy and others say of their types in other versions the nightly profile hears soon enough.
+case "$profile ${versions[*]-} " in
 *--lowest*) ;;
-1*) step "types, every locked Python" bash tests/types.sh ;;
+nightly* | full*) step "types, every locked Python" bash tests/types.sh ;;
 *) step types mypy ;;
 esac
 step layers lint-imports
+if [ -f docs/mkdocs/wording.py ]; then warning wording python docs/mkdocs/wording.py; fi
 table
 if [ -z "$strict" ] && [ "$tested" -ne "$red" ]; then
     echo "the tests pass; what is RED concerns developers only and does not change the exit code (--strict)"

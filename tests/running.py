@@ -1,6 +1,6 @@
 """One sample through the kernel with W = 1, every step kept, and what its state says about the bodies."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,9 +10,7 @@ from bending_by_lagrange import Rod
 from dense_mechanism import PHI, THETA2, THETA3, X1, X2, X3, Y1, Y2, Y3
 from some_laws import row
 
-from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.recorded.steps import Recording, Steps
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.setup.parameters import parameters
@@ -21,7 +19,6 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points
 
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 HUNT_CROSSLEY = {"law": "hunt-crossley", "damping": 0.5}
@@ -107,19 +104,6 @@ def methods_agree(scene: Scene, methods: Sequence[str]) -> None:
         name: float(run(scene.with_({"numerics.method": name})).out.objective) for name in methods
     }
     assert found == pytest.approx(dict.fromkeys(found, found[methods[0]]), rel=1e-8)
-
-
-def lanes_have_single_bits(scene: Scene, columns: Mapping[tuple[str, ...], np.ndarray]) -> None:
-    """That samples beside others have the bits of single ones; values by the scene entries they are of."""
-    names = tuple(paths[0] for paths in columns)
-    points = Points(names, np.transpose(list(columns.values())), tuple(columns))
-    par = parameters(scene, points)
-    start = start_states(scene, par)
-    together, alone = (
-        Lanes(problem_of(scene), width).run(par, start) for width in (DEFAULT_LANES, 1)
-    )
-    assert (alone.status == Status.OK).all()
-    np.testing.assert_array_equal(together.rows, alone.rows)
 
 
 def rod_of(scene: Scene) -> Rod:

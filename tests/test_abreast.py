@@ -50,6 +50,7 @@ def run(scene: Scene, samples: slice, width: int) -> Outcome:
 
 
 @pytest.mark.parametrize("name", ["friction", "oil", "always"])
+@pytest.mark.shortened(1)
 def test_no_sample_depends_on_its_neighbours(name: str):
     """Three samples and many empty lanes, and eleven that take three in turn."""
     scene = scene_of(name)
@@ -61,6 +62,7 @@ def test_no_sample_depends_on_its_neighbours(name: str):
 
 
 @pytest.mark.parametrize("model", ["short", "long", "finite"])
+@pytest.mark.shortened(1)
 def test_a_film_is_the_same_in_any_number_of_lanes(model: str):
     """To the last bit, at places from the middle to beyond the clearance."""
     joints = [entry.replace("short", model) for entry in SCENES["oil"]]
@@ -82,6 +84,7 @@ def test_a_film_is_the_same_in_any_number_of_lanes(model: str):
 
 
 @pytest.mark.parametrize(("name", "near"), [("ramp", 1e-4), ("oil", 5e-5), ("always", 1e-5)])
+@pytest.mark.shortened(1)
 def test_implicit_steps_agree_with_explicit_ones(name: str, near: float):
     """Which share no coefficient, and are tight: what they differ by is the error of implicit steps at rtol 1e-6 or less."""
     scene = scene_of(name)

@@ -8,37 +8,23 @@ import pytest
 from margins import FALSE_RED, at_least, at_most, fewest, most
 from scipy.stats import chi2, f
 
-from hpcclear.accuracy import averaging, integration, methods, random_inputs, spending, surrogate
+from hpcclear.accuracy import averaging, integration, random_inputs, spending, surrogate
 from hpcclear.accuracy.looked_at import QUANTITIES
 from hpcclear.accuracy.methods import LARGEST_STEP
-from hpcclear.accuracy.profile import FULL, QUICK
+from hpcclear.accuracy.profile import QUICK
 from hpcclear.accuracy.run import measure
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
 from hpcclear.cli.accuracy import advice, describe, resolution
-from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import style
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 JOBS = Path(__file__).parent.parent / "jobs"
 PAPER = load_scene(JOBS / "slider_crank.toml")
 TWIN = load_scene(JOBS / "hunt_crossley.toml")
-
-# A load that never lets the journals leave their bearings, and friction without a corner: every law is smooth along the
-# whole revolution.
-PRESSED = TWIN.with_(
-    {
-        "drive.speed": "3000 rpm",
-        "effects.slider_load": -6000.0,
-        "effects.friction": {"law": "coulomb", "coefficient": 0.05, "ramp_speed": 1e3},
-        "joints.crank_rod.start_eccentricity": [0.65e-3, 0.0],
-        "joints.rod_slider.start_eccentricity": [-0.65e-3, 0.0],
-    }
-)
 
 TINY = replace(
     QUICK,
@@ -63,21 +49,6 @@ def silent(text: str) -> None:
 
 
 # ---- integration ----------------------------------------------------------------------------------
-
-
-@pytest.mark.full  # test_order.py has it of steps of one length
-def test_the_slope_of_every_method_is_its_order_where_the_motion_is_smooth():
-    profile = replace(TINY, tolerances=tuple(2.5 * 10.0 ** (-k / 2.0) for k in range(14, 22)))
-    found = integration.measure(PRESSED, profile, silent)
-    velocity = found.order[:, QUANTITIES.index("slider_velocity")]
-    order = dict(zip(found.methods, velocity, strict=True))
-    # Approached from above as the ladder moves down: 6.2 from 1e-4 on, 5.8 from 1e-6 on, 5.7 here, where double precision
-    # ends. test_order.py finds 4.95 with steps of one length.
-    assert order["tsitouras"] == pytest.approx(5.0, abs=0.8)
-    assert order[f"tsitouras, {DEFAULT_LANES} lanes"] == order["tsitouras"]
-    assert order["fehlberg"] == pytest.approx(4.0, abs=0.5)
-    assert order["RK4, fixed steps"] == pytest.approx(4.0, abs=0.5)
-    assert order["DOP853 (scipy)"] == pytest.approx(8.0, abs=0.8)
 
 
 def test_the_slope_of_a_known_power_is_found_and_what_is_not_resolved_is_left_out():
@@ -122,6 +93,7 @@ def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better()
 @pytest.mark.parametrize(
     "drive", [pytest.param("constant-speed", marks=pytest.mark.full), "torque"]
 )
+@pytest.mark.nightly
 def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
     """scipy on the generated equations, and the kernel; a revolution of a free crank ends at an angle, not at a time."""
     scene = load_scene(JOBS / "linkages" / "crank_rocker.toml")
@@ -260,25 +232,6 @@ def test_what_was_measured_is_shown_at_once_and_not_measured_again(monkeypatch):
 # ---- surrogates and random inputs -----------------------------------------------------------------
 
 
-def test_leave_one_out_is_what_a_model_without_the_point_predicts():
-    rng = np.random.default_rng(3)
-    points = rng.random((15, 2))
-    values = np.sin(3.0 * points[:, 0]) + points[:, 1] ** 2
-    model = fit_kriging(points, values, np.array([[0.0, 1.0]] * 2), rng=rng)
-    unit = points / model.length_scales
-    squares = np.square(unit[:, None] - unit[None]).sum(axis=2)
-    smooth = model.signal_variance * np.exp(-0.5 * squares)
-    matrix, y = smooth + model.noise_variance * np.eye(15), values - model.mean
-    expected = []
-    for k in range(15):
-        rest = np.arange(15) != k
-        expected.append(
-            y[k] - smooth[k, rest] @ np.linalg.solve(matrix[np.ix_(rest, rest)], y[rest])
-        )
-    left_out = values - model.leave_one_out()
-    np.testing.assert_allclose(left_out, expected, rtol=1e-5, atol=1e-9)
-
-
 def test_a_study_with_another_kernel_is_shown_both():
     variables = {"m2": {"range": [0.1, 0.4]}, "C": {"range": ["0.3 mm", "1 mm"]}}
     scene, case, _ = with_case(PAPER.with_({"study": {"seed": 1, "variables": variables}}))
@@ -397,16 +350,3 @@ def test_without_clearance_there_is_nothing_to_measure():
     scene = PAPER.with_({**ideal, "effects.contact": None, "effects.friction": {"law": "none"}})
     with pytest.raises(InputError, match="without clearance"):
         measure(scene, alone(), TINY)
-
-
-def test_profiles_differ_in_size_only():
-    assert set(vars(QUICK)) == set(vars(FULL))
-    assert set(QUICK.tolerances) < set(FULL.tolerances) | {1e-11}
-
-
-def test_an_event_has_one_value_at_one_time():
-    # The interpolant of a step differs by rounding from the states at its ends: here by enough to hide the change of sign.
-    event = methods._event(lambda time, y: float(y[0]), 1.0)
-    assert event(1.0, np.array([1e-17])) == event(1.0, np.array([-1e-17])) == 1e-17
-    assert event.terminal
-    assert event(2.0, np.array([-3.0])) == -3.0

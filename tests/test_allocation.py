@@ -6,7 +6,6 @@ import pathlib
 import subprocess
 import sys
 import tomllib
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,11 +16,8 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.study import run_study, tried
-from hpcclear.study.optimisation import Choice
-from hpcclear.study.surrogates import domain
+from hpcclear.study import run_study
 
-JOBS = pathlib.Path(__file__).parent.parent / "jobs"
 PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
 sys.path.insert(0, str(PROGRAMS))
@@ -103,17 +99,6 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     assert prices == pytest.approx(costs / widths, rel=1e-9)
 
 
-def test_a_surrogate_holds_where_designs_scatter_though_it_does_not_know_all_variables():
-    """The width of u2 is a variable that only a random input knows; m3 has values, and scatters by 1 % about each."""
-    scene = load_scene(JOBS / "tolerances.toml")
-    study = scene.required_study
-    assert study.models[-1] != study.optimisation
-    region = domain(SimpleNamespace(scene=scene, study=study), study.models[-1])
-    column = region.names.index("m3")
-    assert region.lower[column] == pytest.approx(0.99 * 0.12)
-    assert region.upper[column] == pytest.approx(1.01 * 0.16)
-
-
 # -- all kinds in one study -------------------------------------------------------------------------
 
 FITS = ["40 H7/f7", "40 H7/g6", "40 H6/g5"]
@@ -183,14 +168,6 @@ def test_every_design_exists_and_samples_too(results):
     samples = dataset.read(results / "samples.nc")
     assert samples["duty"].to_numpy()[:4].tolist() == [0, 1, 0, 1]
     assert samples["duty"].attrs["options"] == "idle; full"
-
-
-def test_of_equal_designs_of_a_case_the_first_is_kept():
-    first, twin, other = (
-        Choice(name, case, {"fit": 1.0})
-        for name, case in (("end", "one"), ("", "one"), ("", "another"))
-    )
-    assert tried.distinct([first, twin, other]) == [first, other]
 
 
 def test_the_cheapest_design_is_that_of_enumeration(results):

@@ -61,6 +61,7 @@ def test_formulations_agree_without_clearance():
 
 
 @pytest.mark.parametrize("b", [250.0, 100.0, 0.0])
+@pytest.mark.shortened(1)
 def test_an_offset_of_the_slider_decays_as_asked(b):
     """(1 + b t) exp(-b t), the critically damped answer; with no feedback the offset stays."""
     scene = scene_with(

@@ -5,15 +5,13 @@ import math
 import numpy as np
 import pytest
 import running
-from bending_by_lagrange import IdealSliderCrank, Rod, share_of
+from bending_by_lagrange import IdealSliderCrank, Rod
 from scipy.integrate import solve_ivp
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.evaluation.steady.copies import scales
-from hpcclear.dynamics.linkage.bending import uniform_share
 from hpcclear.dynamics.linkage.elements import held_inverse, sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
@@ -27,7 +25,7 @@ from hpcclear.dynamics.linkage.parts import (
     Slide,
     TorqueDrive,
 )
-from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
+from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method
 from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.tables import plain
 
@@ -295,6 +293,7 @@ def test_a_bar_held_at_both_ends_swings_at_the_beams_frequencies():
 
 
 @pytest.mark.parametrize("share", [0.5, -0.8])
+@pytest.mark.shortened(1)
 def test_what_presses_softens_a_bar_as_euler_has_it(share):
     """The squared frequency falls with the share of the buckling load."""
     push = share * SIMEON * WAVE**2
@@ -370,6 +369,7 @@ def integrated(ideal, start, times):
 
 
 @pytest.mark.parametrize("seconds", [0.015, pytest.param(0.1, marks=pytest.mark.full)])
+@pytest.mark.nightly
 def test_a_flexible_slider_crank_moves_as_by_lagrange(seconds):
     """Positions, modes and energy; what is left out of the kinetic energy matters by a thousandth."""
     response = simulate(simeons(seconds))
@@ -435,6 +435,7 @@ def bending(changes=None, rtol=1e-6, revolutions=1, **table):
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+@pytest.mark.shortened(1)
 def test_energy_closes_with_play_contact_and_friction(rtol):
     """By the tests' own energies, over ten revolutions."""
     scene = bending({"effects.gravity": 9.81}, rtol=rtol, revolutions=10, stiffness=50.0)
@@ -469,19 +470,6 @@ def test_rods_however_soft_or_stiff_end_in_a_stated_way(contact):
     assert {end for (_, power), end in ends.items() if power >= 1} == {Status.OK}
 
 
-def test_errors_of_stiff_modes_hold_no_more_energy_than_those_of_their_speeds():
-    """So that perturbations to copies, which are so many tolerances, are no blows: to each mode some 10 um/s."""
-    for stiffness in (10.0, 1e3, 1e9):
-        scene = bending(stiffness=stiffness, modes=3)
-        size = scales(scene)
-        n = len(size) // 2
-        density = 0.21 * 2.5 / 2.52 / 0.12  # that of the paper's rod is a little less than its mass
-        rates = (np.arange(1, 4) * np.pi / 0.12) ** 2 * np.sqrt(stiffness / density)
-        assert (size[:3] * rates <= size[n : n + 3] * (1 + 1e-9)).all()
-        assert (size[:3] <= 1e-3).all()
-        assert problem_of(scene).settings().gap_tolerance == pytest.approx(1e-10)
-
-
 def test_a_stiff_rod_tends_to_a_rigid_one_like_one_over_its_stiffness():
     without = {"effects.contact": running.HUNT_CROSSLEY, "effects.friction": {"law": "none"}}
     rigid = running.run(running.scene_with(without, rtol=1e-10))
@@ -498,19 +486,6 @@ def test_methods_agree():
     running.methods_agree(
         bending({}, 1e-10, modes=2), ("dormand-prince", "radau", "switching", "prince-dormand")
     )
-
-
-@pytest.mark.full
-def test_samples_beside_others_have_the_bits_of_single_ones():
-    scene = bending()
-    rng = np.random.default_rng(0)
-    columns = {
-        ("mechanism.rod.mass",): rng.uniform(0.1, 0.4, 24),
-        ("mechanism.rod.mass_center",): rng.uniform(0.0, 0.12, 24),
-        ("mechanism.rod.inertia",): rng.uniform(2e-4, 8e-4, 24),
-        ("mechanism.rod.bending.stiffness",): 10 ** rng.uniform(2.5, 5, 24),
-    }
-    running.lanes_have_single_bits(scene, columns)
 
 
 def test_the_slider_crank_written_as_a_linkage_is_the_same():
@@ -609,20 +584,6 @@ def test_deflections_that_are_not_small_are_no_motion():
     assert int(response["status"]) == Status.STEP_TOO_SMALL
     q = response["mode_amplitude"].to_numpy()
     assert 0.04 * LENGTH < np.abs(q).max() < 0.0451 * LENGTH  # sqrt(0.02)/pi
-
-
-def test_what_a_rod_leaves_beside_its_uniform_part_is_a_body():
-    """All of a uniform bar; of others the most that leaves neither negative mass nor negative inertia."""
-    rng = np.random.default_rng(3)
-    assert uniform_share(**UNIFORM) == pytest.approx(MASS, rel=1e-15)
-    for _ in range(100):
-        bar = UNIFORM | {
-            "inertia": UNIFORM["inertia"] * rng.uniform(0.5, 4.0),
-            "center": LENGTH * rng.uniform(-0.2, 1.2),
-        }
-        share = float(uniform_share(**bar))
-        assert 0.0 < share <= MASS
-        assert share == pytest.approx(share_of(**bar), rel=1e-6)
 
 
 def test_a_rod_that_its_inertia_buckles_is_warned_of():

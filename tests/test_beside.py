@@ -32,6 +32,7 @@ def run(folder, *parts):
 
 
 @pytest.mark.skipif(cores.own_cores() < 2, reason="one core: nothing is compiled beside")
+@pytest.mark.nightly
 def test_what_is_not_there_is_compiled_by_another_process(tmp_path):
     assert run(tmp_path, HEAVY) == ["True"]
 

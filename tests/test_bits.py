@@ -1,10 +1,8 @@
 """Limits without a branch: what is no number stays none, in lanes as alone, whichever side it stands on."""
 
 import math
-import platform
 
 import numpy as np
-import pytest
 from numba import njit
 
 from hpcclear.base.bits import no_less, no_more
@@ -27,13 +25,3 @@ def test_limits_are_kept_and_nan_stays_nan():
     np.testing.assert_array_equal(low, np.maximum(VALUES, -1.0))  # which hands NaN on
     np.testing.assert_array_equal(high, np.minimum(VALUES, 1.0))
     assert np.isnan(low).sum() == np.isnan(high).sum() == 3
-
-
-@pytest.mark.skipif(
-    platform.machine() != "x86_64", reason="it is told by the names of x86's instructions"
-)
-def test_each_is_one_instruction_for_several_numbers():
-    limited(VALUES)
-    (text,) = limited.inspect_asm().values()
-    assert "maxpd" in text
-    assert "minpd" in text

@@ -7,7 +7,6 @@ import kinds_of_tables
 import numpy as np
 import pytest
 import report_data as data
-from pydantic import BaseModel
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import OUTCOME
@@ -15,12 +14,7 @@ from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
-from hpcclear.scene.fields import CurveOf, MotionTable
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.loads import Law
-from hpcclear.scene.measured import BY_TIME, CURVES
-from hpcclear.scene.paths import PHYSICAL, _named, _parts
-from hpcclear.scene.planar import Planar
 from hpcclear.scene.points import Points
 from hpcclear.scene.table import read_points
 
@@ -34,37 +28,6 @@ def test_each_file_is_read_rightly_or_refused_with_the_cause(kind, tmp_path):
     assert right, shown
     refused = isinstance(kind.expected, str)
     assert shown.startswith("refused" if refused else "read")
-
-
-def test_there_are_enough_kinds():
-    assert len(ALL) >= 40
-    assert len({kind.data for kind in ALL}) == len(ALL)
-    assert sum(isinstance(kind.expected, str) for kind in ALL) > 15
-
-
-def test_files_stand_wherever_a_table_stands():
-    """By the declarations: no entry that may be a curve is left out."""
-    found = {}
-
-    def walk(annotation, prefix):
-        for model in _parts(annotation):
-            if not (isinstance(model, type) and issubclass(model, BaseModel)):
-                continue
-            for name, field in model.model_fields.items():
-                path = f"{prefix}.{name}"
-                kinds = [*field.metadata, *_parts(field.annotation)]
-                for one in kinds:
-                    if isinstance(one, CurveOf):
-                        found[path] = one.unit
-                    if isinstance(one, MotionTable):
-                        found[path] = "rad"
-                    if isinstance(one, Law) and one.x == "s":
-                        found[path] = one.unit
-                walk(field.annotation, f"{path}.*" if _named(field) else path)
-
-    for top, model in (*PHYSICAL.items(), ("mechanism", Planar)):
-        walk(model, top)
-    assert found == {**CURVES, **BY_TIME}
 
 
 def pressure_file(folder, angles, law, name="p.csv"):
@@ -284,50 +247,6 @@ def test_a_column_of_names_is_kept(tmp_path):
     assert back["label"].values.tolist() == ["A-17 as built", "B-02 lighter"]
     assert back["m2"].values.tolist() == [0.21, 0.18]
     assert "label" not in samples_of(Points(points.names, points.values, points.paths), records, {})
-
-
-def test_editors_take_files():
-    from jsonschema import Draft202012Validator
-
-    from hpcclear.scene import scene_schema
-
-    content = load_scene(JOBS / "slider_crank.toml").resolved()
-    validator = Draft202012Validator(scene_schema())
-    content["effects"]["slider_load"] = {
-        "file": "p.csv",
-        "angle": "deg",
-        "bore": "42 mm",
-        "ambient": "1 bar",
-    }
-    assert not list(validator.iter_errors(content))
-    content["effects"]["slider_load"]["bor"] = 1
-    assert list(validator.iter_errors(content))
-
-
-def test_a_sketch_draws_each_table():
-    from hpcclear.dynamics.planar.problem import poses_at_start
-    from hpcclear.report import sketch_figure
-    from hpcclear.report.figures.curves import tabulated
-
-    linkage = load_scene(LINKAGE)
-    (gas,) = tabulated(linkage)
-    assert (gas.key, gas.unit, gas.turns) == ("mechanism.loads.gas.size", "N", 2)
-    with_load = load_scene(
-        JOBS / "slider_crank.toml",
-        ["effects.slider_load=[[0, 1000], ['90 deg', -500], ['180 deg', 0]]"],
-    )
-    for scene, peak in ((linkage, None), (with_load, 1.0)):
-        figure = sketch_figure(scene, poses_at_start(scene))
-        curve = figure.axes[-1]
-        line = curve.get_lines()[0]
-        angles, values = line.get_data()
-        assert curve.get_xlim() == (0.0, 360.0 * tabulated(scene)[0].turns)
-        assert angles[0] == 0.0  # the seam is drawn closed
-        assert angles[-1] == pytest.approx(360.0 * tabulated(scene)[0].turns)
-        assert values[0] == pytest.approx(values[-1], abs=1e-9 * np.ptp(values))
-        assert "kN" in curve.get_title(loc="left")
-        assert peak is None or values.max() == peak
-    assert tabulated(load_scene(JOBS / "slider_crank.toml")) == []
 
 
 def test_the_page_draws_the_tables_of_a_scene(tmp_path):

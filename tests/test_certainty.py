@@ -6,16 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hpcclear.base.errors import InputError
 from hpcclear.base.student import student
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
-from hpcclear.scene.stages import REPLICATES, Verification
+from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import limits, moments, quantile, surely_less
-from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.statistics.search.infill import NEAR, TwoScales, believed_ends, proposals
-from hpcclear.study import by_f, tried, truth
+from hpcclear.statistics.search.infill import NEAR, believed_ends, proposals
+from hpcclear.study import truth
 from hpcclear.study.optimisation import Choice
 
 ROBUST = Path(__file__).parent.parent / "jobs" / "robust_slider_crank.toml"
@@ -37,40 +35,6 @@ def test_a_longer_sequence_begins_with_the_shorter_one():
     whole = points(scene, 64)
     np.testing.assert_array_equal(whole[:32], points(scene, 32))
     np.testing.assert_array_equal(whole[32:], points(scene, 32, first=32))
-
-
-def test_scramblings_purposes_and_seeds_differ():
-    scene = load_scene(ROBUST)
-    other = load_scene(ROBUST, ["study.seed=21"])
-    made = [
-        points(scene),
-        points(scene, replicate=1),
-        points(scene, purpose="search"),
-        points(other),
-    ]
-    for k, one in enumerate(made):
-        assert all((one != another).any() for another in made[:k])
-
-
-def test_every_scrambling_is_balanced_in_every_input():
-    """64 points: one in each 64th of every random input's range."""
-    scene = load_scene(ROBUST)
-    names = monte_carlo(scene, 64, random=CASE, design=DESIGN, replicate=3)
-    for name, (middle, half) in {
-        "m2": (0.2, 0.005),
-        "u2": (0.06, 0.02),
-        "C": (6.5e-4, 3.5e-4),
-    }.items():
-        place = (names.column(name) - middle) / half / 2 + 0.5
-        assert sorted(np.floor(place * 64).astype(int)) == list(range(64))
-
-
-def test_a_number_of_draws_asks_for_draws():
-    assert Verification().draws is None
-    assert Verification(samples=500).draws == 500
-    assert Verification(method="monte-carlo").draws == 10_000
-    with pytest.raises(InputError, match="follows from the accuracy"):
-        load_scene(ROBUST, ["study.verification.method=qmc", "study.verification.samples=100"])
 
 
 # -- limits -----------------------------------------------------------------------------------------
@@ -144,11 +108,6 @@ def test_failed_values_are_left_out_and_too_few_say_nothing():
     assert np.isnan([none.value, none.lower, none.upper]).all()
 
 
-def test_nothing_random_has_no_deviation():
-    mean, deviation = moments(np.full((16, 4), 2.5))
-    assert (mean.value, mean.error, deviation.value, deviation.error) == (2.5, 0.0, 0.0, 0.0)
-
-
 # -- what can be told apart -------------------------------------------------------------------------
 
 
@@ -187,10 +146,6 @@ def test_each_design_of_a_front_is_surely_better_than_each_other_somewhere():
     assert not found.one[0, 1]
     assert found.beaten.tolist() == [False] * 6 + [True, False]
     assert found.front(2) == [1, 4]
-
-
-def test_designs_that_are_one_make_a_front_of_one():
-    assert len(compared([(1, 2), (1.0001, 2.0001), (1.0002, 1.9999)]).front(5)) == 1
 
 
 # -- which end is one -------------------------------------------------------------------------------
@@ -263,16 +218,6 @@ def rippled(x):
     return np.column_stack([first, second - 0.1 + slope])
 
 
-def test_two_scales_see_a_ripple_on_a_slope():
-    rng = np.random.default_rng(6)
-    designs = BOUNDS[:, 0] + rng.random((60, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    designs[:30, 1] = -2.0
-    model = TwoScales(designs, rippled(designs)[:, 1], BOUNDS, rng)
-    line = np.column_stack([np.linspace(0.05, 0.95, 50), np.full(50, -2.0)])
-    assert abs(model.predict(line) - rippled(line)[:, 1]).max() < 0.02
-    assert model.variance(line).shape == (50,)
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_proposals_find_the_least_of_both(seed):
     rng = np.random.default_rng(seed)
@@ -312,63 +257,3 @@ def test_what_breaks_a_constraint_is_not_believed_to_be_an_end():
     (kept,) = believed_ends(designs, values, BOUNDS, rng, 0.5 - designs[:, 0])
     assert designs[free, 0] < 0.1
     assert 0.5 <= designs[kept, 0] < 0.6
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_more_is_looked_for_near_each_end(seed):
-    """Within a tenth of each range, and by the bolder belief where the other one rules out no less (candidates are drawn)."""
-    rng = np.random.default_rng(seed)
-    designs = BOUNDS[:, 0] + rng.random((40, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    models = [TwoScales(designs, column, BOUNDS, rng) for column in rippled(designs).T]
-    ends = [int(model.predict(designs).argmin()) for model in models]
-    found = infill._about(models, designs, ends, BOUNDS, rng, np.asarray)
-    assert found.shape == (2 * len(infill.NEARBY), 2)
-    assert ((found >= BOUNDS[:, 0]) & (found <= BOUNDS[:, 1])).all()
-    reach = 1.001 * infill.LOCAL * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    assert (abs(found - designs[ends * 2]) <= reach).all()
-    for k, model in enumerate(models):
-        careful, bold = model.predict(found[[k, k + 2]])
-        assert careful <= model.predict(designs[ends])[k] + 5e-3
-        own, other = np.sqrt(model.variance(found[[k + 2, k]]))
-        assert bold - 3.0 * own <= careful - 3.0 * other + 5e-3
-
-
-def test_small_steps_that_a_search_wins_count_together():
-    scene = load_scene(ROBUST)
-    run = SimpleNamespace(scene=scene, study=scene.required_study)
-    (case, *_) = (one.name for one in scene.required_study.cases)
-    share = scene.required_study.wanted.deviation
-    names = scene.required_study.design_variables(case)
-
-    def met(steps):
-        tables = [np.array([[1.0, (1.0 - step * share)]]) for step in steps]
-        nothing = np.zeros((1, len(names)))
-        return [
-            tried.Tried(names, nothing, table, np.full(1, -1.0), 0.0 * table) for table in tables
-        ]
-
-    assert not by_f.stands(run, case, met([0.0, 0.0, 0.0]))  # too few rounds
-    assert by_f.stands(run, case, met([0.0, 0.3, 0.6, 0.9]))
-    small = met([0.0, 0.4, 0.8, 1.2])
-    assert not by_f.stands(run, case, small)
-    assert by_f.won(run, case, small) == "the last one still lowered the least deviation by 0.6%"
-    assert by_f.stands(run, case, met([0.0, 2.0, 2.0, 2.0, 2.0]))
-
-
-def test_too_few_designs_for_a_model_are_refused():
-    with pytest.raises(InputError, match="too few valid samples"):
-        proposals(np.full((3, 2), 0.5), np.ones((3, 2)), BOUNDS, 4, np.random.default_rng(1))
-
-
-def test_a_round_that_proposes_nothing_ends_the_search():
-    """Of several variables too: nothing is added to what was tried."""
-    scene = load_scene(ROBUST)
-    run = SimpleNamespace(scene=scene, study=scene.required_study)
-    (case, *_) = (one.name for one in scene.required_study.cases)
-    names = scene.required_study.design_variables(case)
-    assert len(names) > 1
-    nothing = tried.simulated(run, [], "check-1")
-    before = tried.added(run, case, nothing, None)
-    assert before.coordinates.shape == (0, len(names))
-    after = tried.added(run, case, nothing, before)
-    assert after.values.shape == (0, 2)

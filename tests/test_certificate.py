@@ -7,7 +7,6 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-import page_numbers
 import pytest
 import tomli_w
 import xarray as xr
@@ -17,11 +16,9 @@ from scipy.interpolate import PchipInterpolator
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME, Flag, recast
 from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
-    Asked,
     Certificate,
     Plan,
     Seen,
@@ -29,11 +26,10 @@ from hpcclear.ensemble.certificate import (
     certificate,
     interaction,
 )
-from hpcclear.ensemble.trial import IMPLICIT, ROUNDS, Drawn, Trial
+from hpcclear.ensemble.trial import ROUNDS, Drawn, Trial
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import effects_figure
 from hpcclear.report.figures.effects import (
-    Saving,
     caption,
     label,
     named,
@@ -48,11 +44,10 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
-from hpcclear.scene.record import record_of
 from hpcclear.scene.switches import Off, switches
 from hpcclear.statistics.random.paired import deviation_change, mean_change, point_change
 from hpcclear.study import certificate as stage
-from hpcclear.study.extent import certificate_extent, certificate_samples, samples_of
+from hpcclear.study.extent import certificate_extent
 from hpcclear.study.run import StudyRun
 from hpcclear.study.simulations import Simulations
 
@@ -219,13 +214,6 @@ def test_what_calls_for_implicit_steps_goes_together():
     assert found.variants == ((), (0,), (1,), (2,), (0, 1, 2))  # none before it, none after
 
 
-def test_a_set_that_turns_out_dearer_is_not_recommended():
-    work = {(): 1.0, (0,): 0.8, (1,): 0.9, (0, 1): 3.0}
-    found = followed(lambda off: 0.001 * len(off), 2, works=work.get)
-    assert found.book.verdict((0, 1)) is Verdict.WITHIN
-    assert found.recommended == (0,)
-
-
 def test_of_two_models_alike_in_cost_the_one_with_less_in_it_is_taken():
     """0 is an effect, 1 what it has beyond a cheaper model, whose evaluations happen to be a few per cent fewer."""
     work = {(0,): 0.5, (1,): 0.48, (2,): 0.9, (0, 2): 0.45, (1, 2): 0.43, (): 1.0}
@@ -236,29 +224,11 @@ def test_of_two_models_alike_in_cost_the_one_with_less_in_it_is_taken():
     assert (1, 2) not in found.variants
 
 
-def test_what_takes_no_work_at_all_is_cheapest():
-    found = followed(lambda off: 0.006 * len(off), 2, works=lambda off: 0.0 if off == (1,) else 1.0)
-    assert found.recommended == (1,)
-
-
 def test_what_fails_is_not_simulated_on():
     found = followed(lambda off: np.nan if off == (0,) else 0.0, 2)
     assert found.book.verdict((0,)) is Verdict.UNDECIDED
     assert found.book.replicates((0,)) == 16
     assert found.recommended == (1,)
-
-
-def test_what_is_told_soon_leaves_its_share_to_what_is_not():
-    def told(budget):
-        found = followed(lambda off: 0.5 if off == (0,) else 0.0, 3, noise=0.12, budget=budget)
-        return found, [found.book.replicates((k,)) for k in range(3)]
-
-    found, (needed, *others) = told(450.0)
-    assert needed == 16
-    assert others == [64, 64]
-    assert found.book.spent() <= 450.0
-    assert told(math.inf)[1] == [16, 256, 256]
-    assert told(1.0)[1] == [16, 16, 16]  # first looks are always taken
 
 
 # ---- scenes with effects off -----------------------------------------------------------------------
@@ -331,14 +301,6 @@ def test_cheaper_models_of_an_effect_are_tried_besides_its_absence():
     wide = rich(f"joints.crank_rod.film={FILM % 0.08}")  # twice as long as its diameter
     closed = next(one for one in switches(wide) if one.name.startswith("finite"))
     assert Off(wide, [closed]).scene.films()["crank_rod"].model == "long"
-
-
-def test_numbers_of_a_cheaper_model_stand_where_they_stood():
-    scene = rich()
-    found = {one.name: one for one in switches(scene)}
-    off = Off(scene, [found["sticking in joints"], found["finite length of the film in crank_rod"]])
-    kept = ("effects.friction.coefficient", "joints.crank_rod.film.viscosity")
-    assert off.paths((*kept, "effects.friction.bristle_stiffness")) == kept
 
 
 def test_two_models_of_one_effect_are_no_set():
@@ -432,21 +394,6 @@ def test_a_load_without_its_variation_is_the_mean_of_the_curve_that_acts(seed, i
         assert load.size == pytest.approx(mean_that_acts(table, turns, interpolation), rel=1e-9)
 
 
-def test_an_evaluation_in_implicit_steps_weighs_more():
-    trial = Trial(rich())
-    records = np.zeros(4, OUTCOME)
-    records["rhs_evaluations"] = 600
-    plain = trial.seen(Asked((), 0, 1), records).work
-    records["flags"][1:] = int(Flag.STIFF | Flag.LATCHED)
-    weighed = trial.seen(Asked((), 0, 1), records)
-    np.testing.assert_array_equal(weighed.work / plain, [[1.0, *[IMPLICIT] * 3]])
-    np.testing.assert_array_equal(weighed.evaluations, 600)
-    rigid = [one.name for one in trial.switches].index("bending of rod")
-    assert (
-        trial.seen(Asked((rigid,), 0, 1), records).work[0, 0] / plain[0, 0] == 7 / 11
-    )  # six coordinates, ten
-
-
 def test_without_any_play_friction_in_it_goes_too():
     scene = load_scene(SCENE)
     plays = [one for one in switches(scene) if one.joint is not None]
@@ -500,12 +447,6 @@ def test_correlations_of_what_is_left_stay():
     np.testing.assert_array_equal(left.matrix, [[1.0, 0.5], [0.5, 1.0]])
 
 
-def test_a_moved_number_is_found_where_it_stands():
-    scene = load_scene(SCENE, ['drive={kind="torque", torque=1.0, initial_speed="3000 rpm"}'])
-    drive = next(one for one in switches(scene) if one.name == "speed fluctuation")
-    assert Off(scene, [drive]).paths(("drive.initial_speed", "drive.torque")) == ("drive.speed",)
-
-
 def test_a_linkage_has_its_effects_by_name():
     scene = load_scene(JOBS / "linkages" / "four_stroke.toml")
     found = {one.name: one for one in switches(scene)}
@@ -523,74 +464,6 @@ def test_a_study_that_would_have_nothing_to_vary_keeps_its_effect():
     trial = Trial(load_scene(JOBS / "linkages" / "quick_return.toml"))
     assert "clearance in o2" in trial.kept
     assert "clearance in o2" not in [one.name for one in trial.switches]
-
-
-def test_what_is_far_dearer_without_an_effect_ends_as_failed():
-    """Of a motion that the explicit method takes long over, friction stands for the effect."""
-    scene = load_scene(SCENE, ["numerics.max_steps=1000000"])
-    trial = Trial(scene)
-    records = np.zeros(4, OUTCOME)
-    records["rhs_evaluations"] = 600
-    assert trial.simulated((0,)).numerics.max_steps == 1_000_000  # nothing is known yet
-    for off in ((), (0,)):
-        trial.seen(Asked(off, 0, 1), records)
-    assert trial.simulated((0,)).numerics.max_steps == 5 * 600 // 6 + 1000
-    assert trial.simulated(()).numerics.max_steps == 1_000_000
-    assert (
-        trial.variant((0,)).scene.numerics.max_steps == 1_000_000
-    )  # what is recommended has its own
-    aimed = Trial(load_scene(SCENE, ["numerics.target_error=0.01"]))
-    records = recast(records, record_of(aimed.scene))
-    records["steady_revolutions"] = 50.0
-    aimed.seen(Asked((), 0, 1), records)
-    assert aimed.simulated((0,)).numerics.target_revolutions == 350
-
-
-def test_fewer_implicit_steps_make_as_many_evaluations():
-    steep = ["effects.friction.ramp_speed=1e-4", "effects.friction.coefficient=0.3"]
-    trial = Trial(load_scene(SCENE, [*steep, "effects.gravity=9.81"]))
-    records = np.zeros(4, OUTCOME)
-    records["rhs_evaluations"] = 96_000
-    trial.seen(Asked((), 0, 1), records)
-    names = [one.name for one in trial.switches]
-    most = {name: trial.simulated((names.index(name),)).numerics.max_steps for name in names}
-    assert most["gravity"] == 5 * 96_000 // 16 + 1000
-    assert most["friction in joints"] == 5 * 96_000 // 6 + 1000
-
-
-# ---- points ----------------------------------------------------------------------------------------
-
-
-def test_points_are_the_same_however_many_are_drawn():
-    for name, settings in (("quickstart.toml", ()), ("slider_crank.toml", ())):
-        drawn = Drawn(load_scene(JOBS / name, settings))
-        whole = drawn.points(0, 8).values
-        parts = np.concatenate([drawn.points(0, 4).values, drawn.points(4, 8).values])
-        np.testing.assert_array_equal(whole, parts)
-        assert len(whole) == 8 * drawn.size
-
-
-def test_replicates_scatter_about_designs_of_their_own():
-    scene = load_scene(JOBS / "quickstart.toml")
-    drawn = Drawn(scene)
-    values = drawn.points(0, 16)
-    mass = values.column("m2").reshape(16, drawn.size)
-    assert (np.ptp(mass, axis=1) <= 0.01).all()  # half-width 5 g
-    assert np.ptp(mass.mean(axis=1)) > 0.2  # all over the range
-    clearance = values.column("C").reshape(16, drawn.size)
-    assert (np.ptp(clearance, axis=1) > 0.4e-3).all()
-
-
-def test_a_certificate_takes_a_twentieth_of_its_study():
-    scene = load_scene(JOBS / "robust_slider_crank.toml")
-    effects, samples = len(switches(scene)), certificate_samples(scene)
-    assert samples * (effects + 2) <= 0.05 * sum(samples_of(scene).values())
-    assert samples >= 128
-    asked = scene.with_({"study.certificate": {"samples": 256}})
-    assert samples_of(asked) == {**samples_of(scene), "effects": 256 * (effects + 2)}
-    assert certificate_extent(scene) == (4096, samples * (effects + 2))
-    assert certificate_extent(scene, 256) == (256, math.inf)
-    assert certificate_samples(asked) == samples
 
 
 # ---- bad input -------------------------------------------------------------------------------------
@@ -681,19 +554,6 @@ def test_the_scene_that_is_printed_stays_within_the_tolerance(certified):
     )
 
 
-def test_what_is_needed_is_said_so(certified):
-    place, output = certified
-    content = dataset.read(place / "e.nc", "effects")
-    needed = {str(name) for name, row in zip(content["effect"].to_numpy(), content["off"].T, strict=True)
-              if int(content["decision"][int(np.argmax(row.to_numpy()))]) == Verdict.BEYOND}  # fmt: skip
-    assert needed == {"clearance in crank_rod", "contact damping"}
-    assert "Without clearance in crank_rod f changes by -100.00 %" in output
-    assert "Without contact damping f changes by" in output
-    flat = " ".join(output.split())
-    assert "Without gravity f changes by 0.0" in flat
-    assert "without friction in joints, gravity, slider load" in flat
-
-
 def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
     place, _ = certified
     timing = dataset.read(place / "e.timing.nc", "timing")
@@ -729,21 +589,6 @@ def test_savings_have_intervals_and_these_hold(certified, shift):
     assert saving(content, 1, seconds_of(old)).words == "about 75 %"
 
 
-@pytest.mark.parametrize(
-    ("share", "half", "words", "faster"),
-    [
-        (0.571, 0.021, "57.1 % ± 2.1 %", "2.2 to 2.5"),
-        (0.03, 0.05, "none significant (3.0 % ± 5.0 %)", "0.98 to 1.1"),
-        (-0.03, 0.05, "none significant (-3.0 % ± 5.0 %)", "0.93 to 1"),
-        (-1.5, 0.2, "none, it takes 150 % ± 20 % longer", "0.37 to 0.43"),
-        (0.5, float("nan"), "about 50 %, by evaluations", "2"),
-    ],
-)
-def test_savings_are_printed_with_their_intervals(share, half, words, faster):
-    found = Saving(share, half, 0 if np.isnan(half) else 5)
-    assert (found.words, found.speed_up) == (words, faster)
-
-
 def test_what_cannot_be_told_says_what_would_tell(certified):
     place, _ = certified
     content = dataset.read(place / "e.nc", "effects")
@@ -774,7 +619,6 @@ def test_figure_and_page(certified):
     assert "Without clearance in crank_rod f changes by" in page
     assert "paired measurements with its 95 % confidence interval" in page
     assert "run time saved, estimated from evaluations" in caption(content, None)
-    page_numbers.check(place)
 
 
 @pytest.mark.nightly

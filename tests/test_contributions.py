@@ -72,18 +72,6 @@ def test_inputs_that_vary_together_have_one_contribution():
     assert found.share[2] == pytest.approx(1.0 / 4.6, abs=0.02)
 
 
-def test_too_few_values_say_nothing_and_no_scatter_is_none():
-    x = drawn(5, 4, 4)
-    assert np.isnan(contributions(x, response(x), range(4)).share).all()
-    x = drawn(5, 2)
-    still = contributions(x, np.full(x.shape[:2], 3.0), range(2))
-    assert (still.share == 0.0).all()
-    assert still.rest == 0.0
-    failed = response(drawn(1, 4))
-    failed[3, ::2] = np.nan
-    assert np.isfinite(contributions(drawn(1, 4), failed, range(4)).share).all()
-
-
 def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     def numbers(*values):
         return ("design", "input"), [list(values)]
@@ -163,19 +151,3 @@ def test_a_chain_of_correlations_is_one_group_as_long_as_no_link_lacks():
     chain = Correlation(inputs=["a", "b", "c", "d"], matrix=matrix.tolist())
     assert chain.groups(["d", "c", "b", "a"]) == [0, 1, 1, 1]
     assert chain.groups(["a", "c", "d"]) == [0, 0, 0]
-
-
-def test_two_blocks_are_listed_as_two():
-    each = {name: (("design", "input"), [[0.3, 0.3, 0.2, 0.2, 0.1]]) for name in ("contribution", "halved")}  # fmt: skip
-    errors = {f"{name}_error": (("design", "input"), [[0.01] * 5]) for name in each}
-    content = xr.Dataset(
-        {
-            **each, **errors, "unexplained": ("design", [0.0]), "group": (("design", "input"), [[1, 1, 2, 2, 0]]),
-            "halved_together": ("design", [0.4321]), "halved_together_error": ("design", [0.004]),
-        },
-        {"design": ["case alpha"], "input": list("abcde")},
-    )  # fmt: skip
-    best = xr.Dataset(coords={"design": "case alpha"})
-    shares, _, first = scatter.lines({"contributions": content}, best)
-    assert "a+b (correlated) 30% ± 2%, c+d (correlated) 20% ± 2%, e 10% ± 2%" in shares.text
-    assert "them together lowers the standard deviation of f by 43% ± 1%" in first.text

@@ -12,33 +12,13 @@ from scipy import stats
 from hpcclear.report import merit
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
-from hpcclear.scene.goals import Constraint, Goal
-from hpcclear.scene.stages import MomentAccuracy, Verification
+from hpcclear.scene.goals import Constraint
+from hpcclear.scene.stages import Verification
 from hpcclear.study import goals, verdicts
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.verdicts import Standing
-from hpcclear.study.verification import _nearest
 
 # -- verdicts ---------------------------------------------------------------------------------------
-
-
-def test_the_accuracy_of_a_probability_follows_what_is_allowed():
-    rare = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
-    assert goals.wanted(rare, MomentAccuracy()) == (2e-5, False)
-    assert goals.wanted(rare, MomentAccuracy(exceedance=0.02)) == (0.02, False)
-    assert goals.wanted(Goal(statistic="exceedance", limit=1.0), MomentAccuracy()) == (0.01, False)
-
-
-def test_looks_and_designs_share_the_error():
-    settings = Verification(most_samples=4096)
-    spent = [1.0 - verdicts.level(settings, 10, 512 * 2**k) for k in range(4)]
-    assert sum(spent) <= 0.05 / 10
-    assert spent[-1] == pytest.approx(0.05 / 20)
-    assert verdicts.rivals([Choice("", "a", {}), Choice("", "b", {}), Choice("", "a", {})]) == [
-        2,
-        1,
-        2,
-    ]
 
 
 @pytest.mark.parametrize("share", [0.011, 0.05])
@@ -99,15 +79,6 @@ def test_what_the_tolerance_leaves_open_no_simulations_decide():
         case, "N", values, np.array([float(Standing.UNDECIDED)]), np.array([np.inf])
     )
     assert text.endswith(f"cannot be told ({merit.OPEN})")
-
-
-def test_designs_that_surely_satisfy_all_constraints_come_first():
-    kept, open_, broken = map(float, Standing)
-    rows, none = [0, 1, 2], np.zeros(3)
-    assert _nearest(rows, np.array([open_, kept, kept]), none) == [1, 2]
-    assert _nearest(rows, np.array([open_, open_, broken]), np.array([-0.1, 0.2, 0.1])) == [0]
-    assert _nearest(rows, np.array([broken, open_, open_]), np.array([2.0, 0.2, 0.1])) == [2]
-    assert _nearest(rows, np.array([broken] * 3), np.array([0.3, 0.2, 0.5])) == [1]
 
 
 # -- the answer -------------------------------------------------------------------------------------

@@ -19,20 +19,6 @@ from hpcclear.cli import cli
 from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 
-NOT_RUN = [
-    ("CONTRIBUTING.md", "it runs these tests"),
-    ("README.md", "it runs these tests"),
-    ("README.md", "needs a wheel"),
-    ("docs/how-to/cluster.md", "installs Slurm on this machine"),
-    ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
-    ("docs/how-to/cluster.md", "needs Slurm; tests/slurm/run.sh submits them"),
-    ("docs/how-to/cluster.md", "needs a cluster"),
-    ("docs/how-to/cluster.md", "needs a cluster"),
-    ("docs/how-to/cluster.md", "needs a container engine"),
-    ("docs/how-to/cluster.md", "the end of a batch script"),
-]
-"""Page and reason of every block that no test runs. A longer list needs a better reason."""
-
 BLOCKS = {str(page.relative_to(ROOT)): blocks(page) for page in PAGES}
 RUN = [name for name, found in BLOCKS.items() if any(b.runs and not b.slow for b in found)]
 SLOW = [name for name, found in BLOCKS.items() if any(b.runs and b.slow for b in found)]
@@ -62,11 +48,6 @@ def test_blocks_of_a_page_run_in_their_order(name, tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", SLOW)
 def test_slow_blocks_run_too(name, tmp_path, monkeypatch):
     follow([b for b in BLOCKS[name] if b.runs], tmp_path / "checkout", monkeypatch)
-
-
-def test_only_these_blocks_are_not_run():
-    found = [(b.page, b.no_run) for page in BLOCKS.values() for b in page if b.no_run is not None]
-    assert sorted(found) == NOT_RUN
 
 
 def test_blocks_that_are_only_read_hide_no_commands():
@@ -261,14 +242,3 @@ def test_no_code_of_ours_is_left_in_the_pages(site):
         assert "no-run:" not in text, path
         assert " slow:" not in text, path
         assert "<!--" not in text, path
-
-
-def test_a_newcomers_questions_are_answered_in_a_command_or_a_click():
-    """docs/questions.md, a click from the start: twenty rows and more, each with a command, an entry or a link."""
-    page = (ROOT / "docs" / "questions.md").read_text(encoding="utf-8")
-    rows = re.findall(r"(?m)^\| ([^|]+\?) \| (.+) \|$", page)
-    assert len(rows) >= 20
-    assert all("`" in answer or "](" in answer for _, answer in rows)
-    for word in ("lubrication", "four-stroke", "LuGre", "latched", "restart", "Hertz"):
-        assert word in page
-    assert "(questions.md)" in (ROOT / "docs" / "index.md").read_text(encoding="utf-8")

@@ -40,6 +40,7 @@ def residual(response) -> float:
 
 @pytest.mark.parametrize("rtol", BOUNDS)
 @pytest.mark.parametrize("contact", [LATCHED, CLIPPED, MILD], ids=["latched", "clipped", "mild"])
+@pytest.mark.shortened(4)
 def test_energy_balance_closes(contact: dict, rtol: float):
     response = simulate(paper_case(contact, rtol))
     assert response.status == 0

@@ -16,9 +16,8 @@ import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.report.export import FORMATS, export
-from hpcclear.report.tables import ROWS, to_table
+from hpcclear.report.tables import to_table
 from hpcclear.results import dataset
-from hpcclear.results.names import KINDS
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -30,12 +29,6 @@ SHORT = ["numerics.transient_revolutions=0", "output.instants_per_revolution=60"
 def ideal() -> xr.Dataset:
     """The response of a mechanism without clearance, which takes no kernel."""
     return hpcclear.simulate(hpcclear.load_scene("jobs/slider_crank.toml", [*IDEAL, *SHORT]))
-
-
-def test_every_kind_of_result_has_rows():
-    assert ROWS.keys() == KINDS.keys()
-    for kind, rows in ROWS.items():
-        assert set(rows) <= {dim for column in KINDS[kind].coords.values() for dim in column.dims}
 
 
 def test_a_response_without_clearance_has_a_row_for_each_instant(ideal):
@@ -194,13 +187,6 @@ def test_the_command_says_what_it_wrote_and_which_formats_there_are(tmp_path):
         cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / "s.doc")]
     )
     assert ".csv or .xlsx or .mat or .parquet" in str(done.exception)
-
-
-@pytest.mark.parametrize("command", ["simulate", "sample"])
-def test_a_command_that_is_to_write_a_table_names_export(command):
-    done = CliRunner().invoke(cli, [command, "jobs/quickstart.toml", "-o", "x.xlsx"])
-    assert done.exit_code == 2
-    assert "hpcclear export x.nc -o x.xlsx" in " ".join(done.output.split())
 
 
 def test_statistics_of_several_samples_stand_side_by_side(tmp_path):

@@ -8,7 +8,6 @@ import report_data as data
 from click.testing import CliRunner
 
 from hpcclear.accuracy import plan as planning
-from hpcclear.accuracy.plan import Plan, Row
 from hpcclear.base.outcome import OUTCOME, Status
 from hpcclear.cli import cli
 from hpcclear.cli.corners import lines
@@ -18,8 +17,6 @@ from hpcclear.ensemble.corners import MOST, corners, tried
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.report.failures import Column, explained, where
-from hpcclear.report.html import sections
-from hpcclear.report.html.content import Content
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -95,14 +92,6 @@ def test_the_answer_explains_failures_in_lines_of_their_own():
     assert "failed" not in model
     plain = answer({"verification": data.verification(), "samples": data.samples(failed=0 + 1)}, "")
     assert len([line for line in plain if line.label == "failed"]) == 1
-
-
-def test_the_page_says_where_samples_failed():
-    samples, _ = failing_samples()
-    parts = sections.trust(Content(Path("out"), {"samples": samples}, {}))
-    assert parts is not None
-    rows = parts[0].rows
-    assert any("all at m2 " in str(cell) for cell in rows[0])
 
 
 # -- corners ---------------------------------------------------------------------------------------------
@@ -213,30 +202,3 @@ def test_a_plan_answers_row_by_row(monkeypatch, capsys):
     )
     assert seen[1].startswith("settings of the file: 2 ms per sample, 10000 simulations take ")
     assert seen[2].startswith("error 0.01: ")
-
-
-def test_samples_of_a_plan_are_counted_as_they_come(monkeypatch):
-    styles = []
-
-    class Counting:
-        def __init__(self, label, style):
-            styles.append((label, style))
-
-    def simulated(scene, points, ranks, *, progress, stage):
-        assert isinstance(progress, Counting)
-        ranks.stage_seconds[stage] = np.ones((1, len(planning.COLUMNS)))
-        return np.zeros(len(points), OUTCOME)
-
-    monkeypatch.setattr(planning, "Progress", Counting)
-    monkeypatch.setattr(planning, "sample_points", simulated)
-    scene = crank_and_rod()
-    planning.cost(scene, corners(scene), alone(), 1.0, "0", "log")
-    assert set(styles) == {("plan", "log")}
-
-
-def test_a_preview_says_how_long_the_job_takes():
-    scene = crank_and_rod()
-    text = preview(Plan((Row(None, scene, 0.5, ""),), 1000, None, 3.0, 1e8, 2), 1)
-    assert (
-        text == "settings of the file: 500 ms per sample, 1000 simulations take 8:23 min on 1 rank"
-    )

@@ -1,7 +1,6 @@
 """Every figure is readable in print: axes labelled with units, 7 pt and more, nothing cut off or overlapping."""
 
 import re
-import sys
 from collections.abc import Callable, Iterator
 from itertools import combinations
 
@@ -17,11 +16,8 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from hpcclear import report
-from hpcclear.base.errors import InputError
 from hpcclear.report.figures import accuracy as accuracy_figures
-from hpcclear.report.figures import labels, motion, style, surrogates
-from hpcclear.statistics.surrogate.fitting import fit_kriging
-from hpcclear.statistics.surrogate.stored import models_in
+from hpcclear.report.figures import labels, motion, style
 
 DESIGNS = ("original", "deterministic alpha", "robust alpha", "deterministic beta", "robust beta")
 
@@ -73,13 +69,6 @@ def _guided() -> xr.Dataset:
     moved = {"body_y": made["slider_position"], "body_vy": made["slider_velocity"]}
     bodies = {name: one.expand_dims(body=["ram"], axis=1) for name, one in {**gone, **still, **moved}.items()}  # fmt: skip
     return made.drop_vars(["slider_position", "slider_velocity"]).assign(bodies)
-
-
-def test_a_model_with_another_kernel_says_so() -> None:
-    made = data.kriging()
-    made["kernel"] = ("model", np.array(["matern-5/2", "squared-exponential", "matern-5/2"]))
-    titles = [panel.get_title(loc="left") for panel in surrogates.parity_figure(made).axes[:3]]
-    assert ["matern" in title for title in titles] == [True, False, True]
 
 
 def test_what_slides_is_drawn_by_its_place() -> None:
@@ -261,15 +250,6 @@ def test_no_axis_cuts_its_data(request: pytest.FixtureRequest, figure: Figure) -
                 )
 
 
-def test_a_deeper_second_joint_is_not_cut_off() -> None:
-    response = data.response()
-    depth = response["penetration"]
-    response["penetration"] = depth * xr.DataArray([1.0, 3.0], dims="joint")
-    response["penetration"].attrs = depth.attrs
-    for panel in report.penetration_figure(response).axes:
-        assert panel.get_ylim()[1] >= max(np.max(line.get_ydata()) for line in panel.lines)
-
-
 def test_no_panel_is_empty(figure: Figure) -> None:
     for axes in figure.axes:
         assert not axes.axison or axes.has_data() or axes.get_label() == "<colorbar>"
@@ -290,59 +270,6 @@ def test_the_users_settings_are_left_alone() -> None:
         made = report.timing_figure(data.timing())
         assert matplotlib.rcParams["font.size"] == 3.0
         assert made.axes[0].get_facecolor()[:3] == (1.0, 1.0, 1.0)
-
-
-def test_saved_under_the_name_given(tmp_path) -> None:
-    path = report.save(report.timing_figure(data.timing()), tmp_path / "timing.svg")
-    assert path.read_text().startswith("<?xml")
-    with pytest.raises(InputError, match="png, svg or pdf"):
-        report.save(report.timing_figure(data.timing()), tmp_path / "timing.docx")
-    with pytest.raises(InputError, match="No such"):
-        report.save(report.timing_figure(data.timing()), tmp_path / "nowhere" / "timing.png")
-
-
-def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(InputError, match=r"pip install 'matplotlib>=3\.9'"):
-        report.timing_figure(data.timing())
-
-
-def test_refusals_name_what_is_missing() -> None:
-    with pytest.raises(InputError, match="no design variable"):
-        report.samples_figure(data.samples().drop_vars(list(data.NAMES)))
-    with pytest.raises(InputError, match="Sobol"):
-        report.sobol_figure(data.sensitivity().drop_vars("sobol_total"))
-    with pytest.raises(InputError, match="two design variables"):
-        report.surfaces_figure(data.kriging().isel(model=[2]))
-    with pytest.raises(InputError, match="4 whole revolutions"):
-        report.orbit_figure(data.response(4), revolutions=5)
-    with pytest.raises(InputError, match="no response to draw"):
-        report.bifurcation_figure([])
-
-
-@pytest.mark.parametrize(
-    ("units", "value", "factor", "shown"),
-    [
-        ("m", 0.17, 1e3, "mm"),
-        ("m", 2.0e-4, 1e3, "mm"),
-        ("m", 3.2e-5, 1e6, "µm"),
-        ("m", 1.5, 1.0, "m"),
-        ("m", np.nan, 1.0, "m"),
-        ("kg", 0.2, 1.0, "kg"),
-        ("kg*m**2", 2.5e-4, 1e6, "kg mm²"),
-        ("N", 8_000.0, 1e-3, "kN"),
-        ("m/s^2", 2e4, 1e-3, "km/s²"),
-        ("m/s", 30.0, 1.0, "m/s"),
-        ("N m", 200.0, 1.0, "N m"),
-        ("J", 2e-3, 1e3, "mJ"),
-        ("1", 5.0, 1.0, "–"),
-        ("rad", 5.0, 1.0, "rad"),
-    ],
-)
-def test_units_of_a_readable_size(units: str, value: float, factor: float, shown: str) -> None:
-    found = labels.scale(units, value)
-    assert found.unit == shown
-    assert found.factor == pytest.approx(factor)
 
 
 def test_objective_of_each_turn_is_the_time_mean() -> None:
@@ -368,64 +295,6 @@ def test_spectrum_finds_amplitude_and_order() -> None:
     peak = int(np.argmax(amplitude))
     assert order[peak] == pytest.approx(5.0)
     assert amplitude[peak] == pytest.approx(3.0, rel=1e-6)
-
-
-def test_models_of_a_file_predict_as_the_surrogate_does() -> None:
-    points, bounds = data.design(40, 2), np.column_stack([data.LOWER, data.UPPER])
-    oracle = fit_kriging(points, data.noisy(points, 2), bounds, rng=np.random.default_rng(2))
-    model = models_in(data.kriging())["m2 m3 u2 I2 C"]
-    fresh = data.design(20, 9)
-    np.testing.assert_array_equal(model.predict(fresh), oracle.predict(fresh))
-    with pytest.raises(InputError, match="does not extrapolate"):
-        model.predict(fresh * 10.0)
-
-
-def test_leave_one_out_is_what_a_model_without_the_point_predicts() -> None:
-    model = models_in(data.kriging())["u2 I2 C"].leaves[0]
-    inputs, others = model.to_unit(model.inputs), np.arange(len(model.values)) != 7
-    squares = np.square((inputs[:, None] - inputs) / model.length_scales).sum(axis=-1)
-    smooth = model.signal_variance * np.exp(-squares / 2)
-    matrix = smooth[others][:, others] + model.noise_variance * np.eye(others.sum())
-    weights = np.linalg.solve(matrix, (model.values[others] - model.mean) / model.scale)
-    expected = model.mean + model.scale * float(smooth[7, others] @ weights)
-    error = abs(expected - model.values[7])
-    assert model.leave_one_out()[7] == pytest.approx(expected, abs=1e-6 * error)
-
-
-def test_the_axes_of_a_front_are_what_its_case_makes_small() -> None:
-    front, verified = _other_goals()
-    made = report.front_figure(front, verified)
-    upper, lower = np.array(made.axes).reshape(2, 2)
-    assert upper[0].get_xlabel().split() == ["95th", "percentile", "of", "f", "(mm)"]
-    assert upper[0].get_ylabel() == "m2 + m3 (SI)"
-    assert lower[0].get_xlabel().startswith("mean")
-    assert lower[0].get_ylabel().startswith("standard deviation")
-    points = upper[0].lines[0].get_xydata()
-    one = front.isel(case=0, run=0)
-    np.testing.assert_allclose(points[:, 0], 1.5e3 * one["mean"])
-    np.testing.assert_allclose(points[:, 1], one["m2"] + one["m3"])
-    low, high = upper[1].get_ylim()
-    mass = verified["m2"] + verified["m3"]
-    assert low <= float(mass.min()) <= float(mass.max()) <= high
-
-
-def test_each_two_of_three_have_panels_and_each_end_a_letter() -> None:
-    front, verified = _three_goals()
-    made = report.front_figure(front, verified)
-    lines = np.array(made.axes).reshape(4, 2)  # three pairs of the first case, one of the second
-    starts = [(one.get_xlabel()[:4], one.get_ylabel()[:4]) for one in lines[:, 0]]
-    assert starts == [("mean", "stan"), ("mean", "((m2"), ("stan", "((m2"), ("mean", "stan")]
-    assert lines[1, 0].get_ylabel().endswith("… (SI)")
-    for panel in lines[:3, 0]:
-        letters = {text.get_text(): text for text in panel.texts}
-        assert set(letters) == set("αβγ")
-        assert letters["α"].xy == letters["γ"].xy  # one design, told apart by where they stand
-        assert letters["α"].xyann != letters["γ"].xyann
-    assert [text.get_text() for text in lines[3, 0].texts] == ["α", "β"]
-    points = lines[2, 0].lines[0].get_xydata()
-    one = front.isel(case=0, run=0)
-    np.testing.assert_allclose(points[:, 1], one["searched_third"])
-    assert not lines[0, 1].texts
 
 
 def test_drawing_leaves_a_figure_as_it_was():

@@ -164,6 +164,7 @@ def places(scene):
 @pytest.mark.parametrize(
     ("model", "load"), [("short", 20.0), ("short", 300.0), ("long", 300.0), ("long", 3000.0)]
 )
+@pytest.mark.shortened(2)
 def test_a_journal_settles_where_the_load_is_carried(model, load):
     """Eccentricity and attitude angle that its Sommerfeld number goes with."""
     place, response, rest = places(rotors.rotor(150.0, load, 60, model=model))

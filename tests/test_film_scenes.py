@@ -32,6 +32,7 @@ def oiled(rtol=1e-6, clearance="0.1 mm", joints=JOINTS, **film):
 
 @pytest.mark.parametrize("model", ["short", "long", "finite"])
 @pytest.mark.parametrize("clearance", ["0.02 mm", "0.3 mm"])
+@pytest.mark.shortened(3)
 def test_any_oil_ends_in_a_stated_way_and_keeps_the_energy_balance(model, clearance):
     """Viscosities from 1e-4 to 10 Pa s: from joints that strike through the film to such that creep in it."""
     for viscosity in (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0):
@@ -43,6 +44,7 @@ def test_any_oil_ends_in_a_stated_way_and_keeps_the_energy_balance(model, cleara
 
 
 @pytest.mark.parametrize("eccentricity", [0.99, 0.9999, 1.0, 1.02])
+@pytest.mark.shortened(2)
 def test_a_start_in_the_thinnest_film_or_in_contact(eccentricity):
     scene = oiled(viscosity=1e-3, clearance="0.2 mm")
     start = [eccentricity * 2e-4, 0.0]
@@ -54,6 +56,7 @@ def test_a_start_in_the_thinnest_film_or_in_contact(eccentricity):
 
 
 @pytest.mark.parametrize("roughness", ["0.1 um", "1 um", "50 um"])
+@pytest.mark.shortened(1)
 def test_film_and_contact_at_once(roughness):
     """So little oil that the journal meets its bearing through it: contact joins in, and nothing jumps."""
     scene = oiled(viscosity=1e-4, clearance="0.3 mm", length="0.5 mm", roughness=roughness)

@@ -38,6 +38,7 @@ def by_differences(eccentricity, ratio, angle, around, along):
 @pytest.mark.parametrize(
     ("eccentricity", "ratio", "angle"), [(0.3, 0.5, 1.5), (0.8, 1.0, 1.0), (0.6, 2.0, 2.6)]
 )
+@pytest.mark.shortened(1)
 def test_the_solution_is_that_of_differences(eccentricity, ratio, angle):
     """Two grids, extrapolated; the cut at ambient pressure costs differences some of their order."""
     coarse, fine = (by_differences(eccentricity, ratio, angle, n, n // 8) for n in (192, 384))
@@ -92,6 +93,7 @@ def test_beyond_what_is_fitted_a_film_still_pushes(ratio):
 
 
 @pytest.mark.parametrize("length", [pytest.param(0.01, marks=pytest.mark.nightly), 0.04])
+@pytest.mark.nightly
 def test_a_journal_settles_where_the_solution_carries_the_load(length):
     """Force as large as the load, against it; of a pure wedge w points across the eccentricity."""
     load, speed = 200.0, 150.0

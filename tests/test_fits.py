@@ -4,12 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
 from running import scene_with
 from scipy.special import ndtr, ndtri
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene import load_scene, scene_schema
+from hpcclear.scene import load_scene
 from hpcclear.scene.fits import law_of
 from hpcclear.scene.iso286 import PARTS, SIZES, fit_of
 
@@ -295,12 +294,3 @@ def test_a_share_of_the_number_it_is_about():
     bare = {"path": "mechanism.rod.mass", "distribution": "uniform", "half_width": "much %"}
     with pytest.raises(InputError, match="half_width"):
         scene_with({"study.variables.C": {"range": [1e-4, 2e-4]}, "study.random.m": bare})
-
-
-def test_editors_take_fits():
-    content = studied({"study.random.C12": {"distribution": "fit", "fit": "20 H7/f7"}}).resolved()
-    joint = content["joints"]["crank_rod"]
-    del joint["clearance"], joint["bearing_radius"]
-    joint["fit"] = "20 H7/f7"
-    content["study"]["random"]["C12"]["bore"] = {"range": ["20 mm", "20.02 mm"]}
-    assert not list(Draft202012Validator(scene_schema()).iter_errors(content))

@@ -46,6 +46,7 @@ KINDS = {
         pytest.param("percentile", marks=pytest.mark.full),
     ],
 )
+@pytest.mark.shortened(1)
 def test_a_study_takes_what_its_forecast_says(kind, monkeypatch, carried_out):
     """Within a factor of 1.5; all of them: ``python -m pytest tests/test_forecast.py -m ""``."""
     formula.replace_dynamics(monkeypatch.setattr)

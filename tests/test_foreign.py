@@ -39,6 +39,7 @@ def test_the_scene_knows_all_of_them_and_no_others():
 
 
 @pytest.mark.parametrize("name", foreign.ALGORITHMS)
+@pytest.mark.shortened(3)
 def test_the_front_of_dtlz2_is_found_with_the_evaluations_of_a_swarm(name):
     """The octant of the unit sphere: the hypervolume below 1.1 is 0.807 with endless points, 0.71 to 0.74 with 60."""
     asked = []
@@ -59,6 +60,7 @@ def test_the_front_of_dtlz2_is_found_with_the_evaluations_of_a_swarm(name):
 
 
 @pytest.mark.parametrize("name", foreign.ALGORITHMS)
+@pytest.mark.shortened(3)
 def test_a_seed_has_its_bits(name):
     first, again, other = (search(name, seed=seed) for seed in (3, 3, 4))
     assert first.points.tobytes() == again.points.tobytes()
@@ -67,6 +69,7 @@ def test_a_seed_has_its_bits(name):
 
 
 @pytest.mark.parametrize("name", foreign.ALGORITHMS)
+@pytest.mark.shortened(3)
 def test_constraints_are_handed_over_and_kept(name):
     """Least x and least y where x + y >= 1: without the constraint everything goes to nought, with it to a line."""
     broken = []

@@ -16,12 +16,11 @@ from patience import crowded
 
 from hpcclear.base import code_folder, private, remarks
 from hpcclear.base.errors import InputError, StorageError
-from hpcclear.base.plain import plain
 from hpcclear.base.private import private_folder
 from hpcclear.cli import cli
 from hpcclear.cli.terminal import console, remark, table
 from hpcclear.results import dataset, netcdf
-from hpcclear.results.crate import NAME, write_crate
+from hpcclear.results.crate import NAME
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -104,12 +103,6 @@ def test_one_damaged_file_does_not_hide_the_others(tmp_path, command):
         assert sum(one["@type"] == "File" for one in listed) == good
 
 
-def test_a_directory_of_damaged_files_makes_no_crate(tmp_path):
-    (tmp_path / "a.nc").write_text("nothing")
-    with pytest.raises(InputError, match="cut off"):
-        write_crate(tmp_path)
-
-
 # -- what reaches the terminal ----------------------------------------------------------------------
 
 EVIL = "\x1b]0;owned\x07\x9b31m\r\u202eabc\x7f"
@@ -119,14 +112,6 @@ def controls(text: str) -> list[str]:
     """Characters of a text that may command a terminal."""
     kinds = ("Cc", "Cf", "Cs", "Zl", "Zp")
     return [c for c in text if c not in "\n\t" and unicodedata.category(c) in kinds]
-
-
-def test_control_characters_are_written_out():
-    assert not controls(plain(EVIL))
-    assert "owned" in plain(EVIL)
-    assert plain("\x1b[0m") == "\\x1b[0m"
-    kept = "0.3 \u00b5m\n\t\u00fcber 20 \u00b0"
-    assert plain(kept) == kept
 
 
 def test_no_message_and_no_table_holds_control_characters(capsys):

@@ -12,10 +12,6 @@ from typing import Any
 import pytest
 from commands import CHEAP, SCENE, overrides, run, sample, warm_command
 
-from hpcclear.base.errors import InputError
-from hpcclear.results import dataset
-from hpcclear.results.checkpoint import Checkpoint
-from hpcclear.results.names import designs_in
 from hpcclear.scene import load_scene
 from hpcclear.scene.paths import flatten
 
@@ -380,42 +376,6 @@ def damaged(content: bytes, other: bytes, dice: random.Random) -> bytes:
     if bytes(data) == content:
         data.append(0)
     return bytes(data)
-
-
-@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=FULL)])
-@pytest.mark.timeout(1800)
-def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
-    _, output = result
-    content, timing = output.read_bytes(), output.with_suffix(".timing.nc").read_bytes()
-    good = dataset.read(output, "samples")
-    names, records = tuple(designs_in(good)), dataset.records(good)
-    values = list(designs_in(good).values())
-    dice, path, parts = random.Random(count), tmp_path / "x.nc", tmp_path / "parts"
-    key = {"command": "sample"}
-    checkpoint = Checkpoint(parts, key, names=names, interval=1e9)
-    for half in (slice(0, 20), slice(20, 40)):
-        checkpoint.add(records[half], [[v[i] for v in values] for i in range(40)[half]])
-        checkpoint.flush()
-    first, second = sorted(parts.iterdir())
-    part = first.read_bytes()
-    for _ in range(count):
-        path.write_bytes(damaged(content, timing, dice))
-        with pytest.raises(InputError):
-            dataset.read(path, "samples")
-        spoilt = damaged(part, content, dice)
-        first.write_bytes(spoilt)
-        if (
-            spoilt == content
-        ):  # all but the first bytes, which are the same: a whole file of another run
-            with pytest.raises(InputError, match="another run"):
-                Checkpoint(parts, key, names=names)
-            continue
-        again = Checkpoint(parts, key, names=names)
-        assert again.completed().tobytes() == records[20:].tobytes()
-        assert len(again.problems) == 1
-    first.write_bytes(part)
-    assert Checkpoint(parts, key, names=names).completed().tobytes() == records.tobytes()
-    assert second.exists()
 
 
 @pytest.mark.parametrize("count", [5, pytest.param(200, marks=FULL)])

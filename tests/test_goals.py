@@ -13,15 +13,11 @@ from scipy.stats import qmc
 from hpcclear.base.errors import InputError
 from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
-from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.formula import FormulaError, names_in, value_of
-from hpcclear.scene.goals import Constraint, Goal
-from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.statistics.random.replicates import exceedance, quantile
 from hpcclear.statistics.search.infill import proposals
-from hpcclear.study import goals
 
 QUICKSTART = Path(__file__).parent.parent / "jobs" / "quickstart.toml"
 RANDOM = ["C", "m2", "m3", "u2", "I2"]
@@ -176,34 +172,10 @@ def test_shifts_of_a_quantile_are_as_large_as_it_scatters(method: str, order: fl
         assert mean == pytest.approx(np.sqrt(order * (1 - order) / 512) / density, rel=0.15)
 
 
-def test_what_is_told_and_guessed_of_a_goal() -> None:
-    values = replicated(3, "qmc", 256)
-    asked = [Goal(statistic="mean"), Goal(statistic="deviation"), Goal(statistic="quantile", level=0.9),
-             Goal(statistic="exceedance", limit=3.0), Goal(formula="a*b")]  # fmt: skip
-    exact = [0.0, SPREAD, SPREAD * stats.norm.ppf(0.9), stats.norm.sf(3.0 / SPREAD), 6.0]
-    for goal, truth in zip(asked, exact, strict=True):
-        found = goals.goal_value(goal, values, {"a": 2.0, "b": 3.0}, 0.95)
-        assert found.lower <= truth <= found.upper
-        assert found.value == pytest.approx(truth, abs=0.06)  # of 4096 points
-        guess = goals.guessed(
-            goal, values.reshape(1, -1), {"a": np.array([2.0]), "b": np.array([3.0])}
-        )
-        assert guess == pytest.approx(found.value, abs=0.02)
-        assert goals.accurate(goal, found, MomentAccuracy(mean=0.9, deviation=0.1)) == (
-            goal.statistic != "mean"
-        )
-
-
-def test_the_worst_constraint_counts() -> None:
-    kept = (Constraint(statistic="mean", most=2.0), Constraint(formula="a", most=0.0))
-    values = np.array([[1.0, -0.1], [1.0, 0.3], [3.0, -1.0], [np.nan, 0.0]])
-    np.testing.assert_allclose(goals.excess(kept, values), [-0.1, 0.3, 0.5, np.nan])
-    assert (goals.excess((), values[:, :0]) < 0).all()
-
-
 # -- where to look next -----------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_proposals_keep_the_constraints() -> None:
     """Least x + y and least (x - 1)^2 where x + y >= 1: on the line, to x = 1."""
     rng = np.random.default_rng(4)
@@ -326,14 +298,6 @@ def test_the_answer_names_what_was_asked_for(study: tuple[Path, str]) -> None:
     ]
     assert "m2 + m3" in output
     assert "constraints" in output
-
-
-def test_the_page_tells_what_was_asked_for(study: tuple[Path, str]) -> None:
-    page = write_report(study[0]).read_text()
-    (study[0] / "report.html").unlink()
-    assert "95th percentile of f: 0." in page
-    assert ">objective 1<" in page
-    assert "probability of f above 0.0004 m" in page
 
 
 @pytest.mark.nightly

@@ -7,25 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rigid_slider as rigid
-from commands import overrides, run
-from dense_linkage import Contact, Dense, start_of
-from linkages import LINKAGES, slider_crank
-from scipy.integrate import solve_ivp
+from dense_linkage import Contact, Dense, comes_as, start_of
 from scipy.optimize import brentq
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.linkage.compiled import module_text
-from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.setup.problem import problem_of
-from hpcclear.ensemble.api import as_points
 from hpcclear.report.figures import guides, moving
 
 PUBLISHED = Path(__file__).parents[1] / "jobs" / "loose_slider.toml"
 ONE_TURN = {"numerics.averaged_revolutions": 1, "numerics.rtol": 1e-10}
-STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}
 SEPARATE, BLOCK = 0.7, 0.076 * (0.1**2 + 0.05**2) / 12
 """A restitution, and the inertia of a solid block, kg m^2, with which impacts are separate."""
 CHI, MU, RAMP, GRAVITY = 0.4, 0.05, 0.02, 9.81
@@ -37,6 +29,7 @@ def published():
 
 
 # ---- the published slider-crank ----------------------------------------------------------------------
+@pytest.mark.nightly
 def test_before_the_first_impact_the_motion_is_that_of_three_free_angles(published):
     """At 1 ms and up to the impact at 2.69 ms to 1e-6 of an own fine integration; contacts have no part in it."""
     response = simulate(published)
@@ -214,58 +207,13 @@ def test_random_guides_move_as_in_the_dense_model(seed):
     dense = Dense(mechanism, [laws], GRAVITY)
     start = start_of(dense)
     response = simulate(scene)
-    n, time = dense.n, response["time"].to_numpy()
+    time = response["time"].to_numpy()
     pressed = response["contact_force"].to_numpy().max(axis=1) > 1.0
     end = min(time[pressed.argmax()] + 1e-3, 6e-3)
-    early = time[time <= end]
-    y = solve_ivp(
-        lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, end), start.ravel(),
-        method="DOP853", rtol=1e-11, atol=1e-13, max_step=end / 50, t_eval=early,
-    ).y  # fmt: skip
-    for k, name in enumerate(("body_x", "body_y", "body_angle")):
-        seen = response[name].to_numpy()[: len(early)]
-        np.testing.assert_allclose(seen, y[k:n:3].T, rtol=0, atol=1e-8)
-    assert pressed[: len(early)].any()
+    met = comes_as(response, dense, start, end)
+    assert pressed[:met].any()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
-
-
-# ---- scenes -----------------------------------------------------------------------------------------
-def test_scenes_without_such_a_guide_compile_nothing_of_it(published):
-    plain = problem_of(load_scene(PUBLISHED.parent / "slider_crank.toml"))
-    text = module_text(plain.linkage._text(plain.linkage._on), ())
-    assert "joint_force" in text
-    assert "corner" not in text
-    problem = problem_of(published)
-    own = module_text(problem.linkage._text(problem.linkage._on), ())
-    assert own.count("= corner_force(") == 4
-    assert "joint_force" not in own
-    loose = LINKAGES["slider-crank, loose guide"]
-    bare = generate(loose, On(), Rows()).source
-    for word in ("spin_slider, None", "mj_guide_front_left,"):
-        assert word in bare
-    assert "mj_guide_front_left *" not in bare  # moments of friction
-    assert "corner" not in generate(slider_crank(), On(), Rows()).source
-
-
-@pytest.mark.full  # pytest -m full tests/test_guides.py -k bytes: two widths more to compile, a minute
-def test_bytes_are_the_same_for_any_ranks_and_lanes(published, tmp_path):
-    scene = published.with_({"numerics.rtol": 1e-6})
-    points = {"joints.guide.clearance": np.linspace(0.5e-3, 1.5e-3, 9)}
-    one, many = (evaluate_records(scene, as_points(scene, points), lanes=lanes) for lanes in (1, 8))
-    assert one.tobytes() == many.tobytes()
-    table = tmp_path / "designs.csv"
-    rows = [f"{value!r}" for value in points["joints.guide.clearance"].tolist()]
-    table.write_text("joints.guide.clearance\n" + "\n".join(rows) + "\n")
-    files = []
-    for ranks in (1, 2):
-        out = tmp_path / f"{ranks}.nc"
-        sets = overrides("numerics.rtol=1e-6", "numerics.averaged_revolutions=1")
-        words = ["sample", str(PUBLISHED), "--points", str(table), "-o", str(out), *sets]
-        code, output = run(words, ranks)
-        assert code == 0, output
-        files.append(out.read_bytes())
-    assert files[0] == files[1]
 
 
 def test_joints_and_contacts_are_named_by_f(published):

@@ -77,7 +77,12 @@ def check(run, rtol: float, expected: Expectation) -> None:
 @pytest.mark.parametrize(
     ("path", "rtol"),
     [
-        pytest.param(path, rtol, id=f"{path.stem}-{rtol:g}")
+        pytest.param(
+            path,
+            rtol,
+            id=f"{path.stem}-{rtol:g}",
+            marks=[] if rtol == 1e-6 else pytest.mark.nightly,
+        )
         for path in SIMULATED
         for rtol in (1e-3, 1e-6, 1e-8)
         if path.stem not in LONG_ONLY
@@ -128,14 +133,6 @@ def test_refused(path: Path):
         load_scene(path)
     assert caught.value.key == expectation(path).refused
     assert caught.value.remedy
-
-
-def test_every_case_says_what_makes_it_hard_and_what_must_hold():
-    assert len(CASES) >= 45
-    for path in CASES:
-        text = path.read_text()
-        for line in ("# hard: ", "# must hold: ", "# expect: "):
-            assert text.count(f"\n{line}") == 1, path.name
 
 
 @pytest.fixture(scope="module")

@@ -70,17 +70,6 @@ def test_times_beside_a_result_do_not_replace_a_users_file(tmp_path):
     assert (tmp_path / "samples.timing.nc").read_text() == "mine"
 
 
-def test_our_own_files_are_replaced_and_a_link_is_not_followed(thesis, tmp_path):
-    output = tmp_path / "out.nc"
-    netcdf.save(data.timing(), output)
-    netcdf.save(data.claims(), output)
-    link = tmp_path / "link.nc"
-    link.symlink_to(thesis)
-    netcdf.save(data.timing(), link)
-    assert not link.is_symlink()
-    assert thesis.read_bytes().startswith(b"three years")
-
-
 def test_devices_and_pipes_are_refused(tmp_path):
     pipe, device = tmp_path / "pipe.nc", tmp_path / "full.nc"
     os.mkfifo(pipe)
@@ -159,6 +148,7 @@ def limited(words: list[str], limit: int, amount: int) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("megabytes", [250, 500, 639, 700])
+@pytest.mark.shortened(2)
 def test_too_little_address_space_ends_in_a_message(tmp_path, megabytes):
     """With 400 or 500 MB Python, out of memory amid an import, once went on for ever."""
     words = sample(tmp_path / "x.nc", 40)
@@ -248,6 +238,7 @@ def on_two_ranks(first: list[str], second: list[str], *settings: str) -> tuple[i
 @pytest.mark.mpi
 @pytest.mark.parametrize("alone", [0, 1])
 @pytest.mark.parametrize("bad", [["--bogus"], ["--time-limit", "-3"]], ids=lambda bad: bad[0])
+@pytest.mark.shortened(2)
 def test_a_rank_that_alone_gets_a_bad_option_does_not_leave_the_others_waiting(
     tmp_path, bad, alone
 ):
@@ -321,13 +312,6 @@ def test_a_table_of_newlines_takes_no_memory(tmp_path):
     table.write_bytes(b"C\n" + b"," * 1_000_000)
     with pytest.raises(InputError, match="characters"):
         read_points(table, load_scene(SCENE))
-
-
-def test_blank_lines_and_comments_between_points_are_left_out(tmp_path):
-    table = tmp_path / "points.csv"
-    table.write_text('\n# mine\n"C [mm]"\n\n0.3\n , \n #x\n\n0.4\n')
-    points = read_points(table, load_scene(SCENE))
-    np.testing.assert_allclose(points.values, [[3e-4], [4e-4]])
 
 
 # -- forged results -----------------------------------------------------------------------------

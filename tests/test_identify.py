@@ -1,6 +1,5 @@
 """Unknown clearances from measured signals: features, posterior, calibration, model check, the command and its page."""
 
-import json
 import os
 import re
 import signal
@@ -22,7 +21,7 @@ from hpcclear.ensemble import single
 from hpcclear.identify import answer
 from hpcclear.identify.advice import advice, noise_of
 from hpcclear.identify.answer import identified as identified_dataset
-from hpcclear.identify.features import Layout, known_scatter
+from hpcclear.identify.features import Layout
 from hpcclear.identify.history import DAY, history, seconds_of
 from hpcclear.identify.inputs import Inputs, Unknown, design
 from hpcclear.identify.judgement import features_of, judged, prepare
@@ -37,7 +36,6 @@ from hpcclear.report.identified import interval, lines, warnings
 from hpcclear.results import dataset
 
 sys.path.insert(0, str(ROOT / "analysis"))
-import identify_machines
 
 SCENE = ROOT / "jobs" / "identify.toml"
 UNKNOWN = "joints.crank_rod.clearance=10um:150um"
@@ -344,12 +342,6 @@ def test_amplitudes_and_scatter_have_no_bias_from_noise():
     assert layout.values(Spectrum(true, np.ones(ORDERS + 1), 30))[0][-1] == pytest.approx(5**0.5)  # fmt: skip
 
 
-def test_few_revolutions_enlarge_their_scatter():
-    few, many = (Spectrum(np.zeros(65), np.ones(65), count) for count in (4, 100))
-    np.testing.assert_allclose(known_scatter(few).variance, 3.0)
-    np.testing.assert_allclose(known_scatter(many).variance, 99.0 / 97.0)
-
-
 # -- several dates ----------------------------------------------------------------------------------
 
 
@@ -391,6 +383,7 @@ def record(path: Path, noise: float, samples: int, change: float, form: str, see
     return table(path, {**axis, "crank_moment [N m]": values})
 
 
+@pytest.mark.nightly
 def test_each_record_is_judged_as_if_it_were_alone(made, scene, tmp_path, monkeypatch):
     """Good ones and one of another machine, beside loose, coarse, dead, free-running ones: verdicts stay to the last bit."""
     monkeypatch.setattr(answer, "simulated", lambda *_, **__: made[0])
@@ -561,17 +554,3 @@ def test_a_command_without_a_signal_or_with_an_unknown_one_is_refused(measured, 
     with pytest.raises(InputError, match="no such signal"):
         hpcclear.identify(scene, UNKNOWN, measured[0], of="crank_momen")
     assert Unknown.of(scene, UNKNOWN).unit == "m"
-
-
-def test_the_table_of_the_page_is_that_of_the_machines():
-    """`python analysis/identify_machines.py results/machines --rows analysis/identify_machines.json --page ...`."""
-    rows = json.loads((ROOT / "analysis" / "identify_machines.json").read_text(encoding="utf-8"))
-    page = (ROOT / "docs" / "how-to" / "identify.md").read_text(encoding="utf-8")
-    assert [row["machine"] for row in rows] == list(range(200))
-    assert identify_machines.table_of(rows) in page
-    right = [hit for row in rows if not row["lacks"] for hit in identify_machines.held(row)]
-    other = [row for row in rows if row["lacks"]]
-    fine = [not row["explained"] or all(identify_machines.held(row)) for row in other]
-    assert len(other) >= 60
-    assert np.mean(right) >= 0.93
-    assert np.mean(fine) >= 0.9

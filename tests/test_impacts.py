@@ -3,13 +3,11 @@
 Energy lost in impacts against the energy balance, counts against a dense series, the force on the frame against the momentum of
 the bodies, third-octave levels against scipy.signal."""
 
-import inspect
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import overrides, run
 from margins import at_most, bootstrap
 from running import HUNT_CROSSLEY, LATCHED, SCENE, scene_with
 from scipy import signal
@@ -19,10 +17,7 @@ from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import OURS
 from hpcclear.base.outcome import IMPACTS
-from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.setup.problem import effects_of, problem_of
 from hpcclear.ensemble.simulate import content_of
-from hpcclear.results import dataset
 from hpcclear.statistics import spectra
 
 COMPRESSOR = Path(__file__).parents[1] / "jobs" / "compressor.toml"
@@ -227,20 +222,6 @@ def test_each_measure_is_an_objective_and_asks_for_itself(name):
     assert OURS[name].unit == found["objective"].attrs["units"].replace("1", "")
 
 
-def test_what_is_not_asked_for_is_not_compiled():
-    scene = light().with_({"numerics.impacts": False})
-    problem = problem_of(scene)
-    assert effects_of(scene).impacts is None
-    text = inspect.getsource(problem.linkage.module(problem.effects))
-    assert "frame_x" not in text
-    measured = effects_of(scene, impacts=True)
-    assert "frame_x" in inspect.getsource(problem.linkage.module(measured))
-    names = {at.FRAME_X, at.BEGUN, at.IMPACT_POWERS}
-    assert names.isdisjoint(at.measures_of(problem.effects))
-    assert at.rules_of(problem.effects).impacts == 0
-    assert set(IMPACTS).isdisjoint(evaluate(scene, ONE).data_vars)
-
-
 LEVELS = ("frame_force_level", "contact_force_level")
 """Fields of the bands."""
 
@@ -285,37 +266,11 @@ def test_a_level_is_an_objective(heard):
     assert samples["objective"].attrs["units"] == "1"
 
 
-def test_a_file_with_levels_comes_back_as_its_records(heard):
-    _, samples, _ = heard
-    records = dataset.records(samples)
-    kept = samples.sizes["joint"], samples.sizes["band"]
-    levels = records["contact_force_level"][:, : kept[0], : kept[1]]
-    np.testing.assert_array_equal(levels, samples["contact_force_level"])
-    np.testing.assert_array_equal(records["band"][0, :2], samples["band"])
-
-
 def test_samples_recorded_side_by_side_are_those_recorded_alone(heard):
     scene, samples, _ = heard
     alone = evaluate(scene, {"joints.crank_rod.clearance": [6e-5]})
     for name in (*LEVELS, *(f"{one}_limit" for one in (*LEVELS, *IMPACTS))):
         np.testing.assert_array_equal(alone[name][0], samples[name][1])
-
-
-@pytest.mark.full
-def test_files_with_levels_are_the_same_for_any_ranks(tmp_path):
-    table, files = tmp_path / "designs.csv", []
-    table.write_text("joints.crank_rod.clearance\n2e-5\n4e-5\n6e-5\n8e-5\n")
-    sets = overrides(
-        "numerics.levels=[1000.0]", "numerics.averaged_revolutions=4", "numerics.transient_revolutions=1"
-    )  # fmt: skip
-    for ranks in (1, 2):
-        out = tmp_path / f"{ranks}.nc"
-        code, output = run(
-            ["sample", str(COMPRESSOR), "--points", str(table), "-o", str(out), *sets], ranks
-        )
-        assert code == 0, output
-        files.append(out.read_bytes())
-    assert files[0] == files[1]
 
 
 @pytest.mark.parametrize(

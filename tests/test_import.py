@@ -55,25 +55,6 @@ def test_points_are_where_the_file_has_them(text, tmp_path):
     assert scene.clearance_joints() == ()
 
 
-def test_bodies_and_joints_of_each(tmp_path):
-    mechanism = made(tmp_path, FOUR_BAR)["mechanism"]
-    assert list(mechanism["bodies"]) == ["crank", "coupler", "rocker"]
-    assert list(mechanism["joints"]) == ["A0", "A", "B", "B0"]
-    assert set(mechanism["bodies"]["coupler"]["points"]) == {"A", "B", "K"}
-    assert mechanism["drives"]["motor"]["body"] == "crank"
-    assert list(made(tmp_path, CHAIN)["mechanism"]["bodies"]) == ["bar1", "bar2", "bar3"]
-    slider = made(tmp_path, SLIDER)["mechanism"]
-    assert slider["joints"]["P_guide"] == {
-        "kind": "slide",
-        "point": "piston.P",
-        "line": "ground.P",
-        "angle": "0.0 deg",
-    }
-    assert "slider_P" in made(tmp_path, SLIDER.replace("rod piston", "rod"))["mechanism"]["bodies"]
-    three = FOUR_BAR.replace("coupler rocker", "coupler rocker link") + "D;150;90;link\n"
-    assert list(made(tmp_path, three)["mechanism"]["joints"]) == ["A0", "A", "B", "B_2", "B0"]
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

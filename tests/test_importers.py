@@ -8,27 +8,18 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from commands import run
+from import_files import DIGITS, digits
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report.figures.linkage_sketch import Placed
 from hpcclear.scene import load_scene
-from hpcclear.scene.importers import FORMATS, drawing_of, linkage_of
+from hpcclear.scene.importers import drawing_of, linkage_of
 
-DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 FOUR_BAR = {"A": (-12.25, -3.0), "B": (-9.5, 4.75), "C": (11.0, 9.125), "D": (13.5, -6.25)}
 SIZE = 25.4e-3 / 96
 SHOWN = 24.5e-3 / 96
 """m of a unit of the program Linkage, of which it shows millimetres."""
-
-
-def digits(value):
-    """An integer to the base 64, with a 0 in front of a negative one."""
-    made, left = "", abs(value)
-    while left or not made:
-        made, left = DIGITS[left % 64] + made, left // 64
-    return ("0" if value < 0 else "") + made
 
 
 def thousandths(value):
@@ -232,34 +223,6 @@ def test_sliders_of_pmks(tmp_path):
     assert made["joints"]["E_guide"]["angle"].startswith("90.0")
 
 
-def test_the_table_of_pmks_says_no_unit(tmp_path):
-    rows = [
-        f"{k},{n},{x},{y},1,0,{str(n in 'AD').lower()},{str(n == 'A').lower()},12,false"
-        for k, (n, (x, y)) in enumerate(FOUR_BAR.items())
-    ]
-    links = [f"{k},L{k},1,#aaa,0,0,{k}|{k + 1},,false,1,0" for k in range(3)]
-    text = "\n".join(
-        [
-            "--- j ---",
-            "Joint ID,...",
-            *rows,
-            "",
-            "--- l ---",
-            "Link ID,...",
-            *links,
-            "",
-            "--- c ---",
-            "ID",
-            "",
-        ]
-    )
-    path = written(tmp_path, text, "linkage.csv")
-    made = check(path, [(x / 1000, y / 1000) for x, y in FOUR_BAR.values()], "mm")
-    assert made["drives"]["motor"] == {"kind": "constant-speed", "body": "L0", "speed": "12 rpm"}
-    with pytest.raises(InputError, match="states no unit of lengths"):
-        drawing_of(path)
-
-
 @pytest.mark.parametrize(("units", "size"), [("Millimeters", SHOWN), ("Inches", SIZE)])
 def test_a_document_of_linkage(units, size, tmp_path):
     made = check(
@@ -378,32 +341,3 @@ def test_binary_drawings_and_odd_bytes_are_refused(tmp_path):
         drawing_of(written(tmp_path, dxf(LAYERS, unit=0)), "kg")
     with pytest.raises(InputError, match="no such regular file"):
         drawing_of(tmp_path / "none.dxf")
-
-
-def test_damaged_files_never_crash(tmp_path):
-    random = np.random.default_rng(3)
-    for text in (four_bar(), document(SLOT, SLOT_BARS), dxf(LAYERS)):
-        for _ in range(60):
-            data = bytearray(text.encode())
-            for place in random.integers(0, len(data), 3):
-                data[place] = random.integers(9, 126)
-            (tmp_path / "damaged").write_bytes(bytes(data))
-            try:
-                load_scene(linkage_of(tmp_path / "damaged"))
-            except InputError:
-                continue
-
-
-def test_the_command_takes_a_unit_and_prints_notes(tmp_path):
-    source = written(tmp_path, dxf(LAYERS, unit=0), "sketch.dxf")
-    made = tmp_path / "made.toml"
-    code, output = run(
-        ["import", str(source), str(made), "--unit", "mm", "--sketch", str(tmp_path / "s.svg")], 0
-    )
-    assert code == 0, output
-    assert "3 bodies, 4 joints" in output
-    assert "Not read: 1 ARC" in output
-    assert "# Not read: 1 ARC." in made.read_text()
-    assert [one.name for one in FORMATS[-1:]] == ["table of points"]
-    code, output = run(["check", str(made), "--no-cost"], 0)
-    assert code == 0, output

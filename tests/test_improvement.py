@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from formula_study import contents, formula, on_two_ranks, scene_of
 
-from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.results import dataset
 from hpcclear.scene.domain import box
@@ -138,24 +137,6 @@ def test_only_designs_of_a_catalogue_are_asked_for():
     np.testing.assert_allclose(known.designs[:, 0] * 10.0, np.round(known.designs[:, 0] * 10.0))
 
 
-def test_three_objectives_have_proposals_too_and_the_same_seed_the_same_bits():
-    rng = np.random.default_rng(7)
-    designs = BOUNDS[:, 0] + rng.random((20, 2)) * (BOUNDS[:, 1] - BOUNDS[:, 0])
-    values = np.column_stack([bowl(designs), designs[:, 0], -designs[:, 1]])
-    known = Known(designs, values, np.full((20, 3), 1e-3))
-    space = Space(BOUNDS, np.eye(3), np.eye(3)[0], (None, None, None))
-    found = [improvement.proposals(known, space, 6, np.random.default_rng(8)) for _ in range(2)]
-    assert found[0].shape == (6, 2)
-    np.testing.assert_array_equal(*found)
-
-
-def test_too_few_designs_for_a_model_are_refused():
-    known = Known(np.full((3, 2), 0.5), np.ones((3, 2)), np.ones((3, 2)))
-    space = Space(BOUNDS, np.eye(2), np.eye(2)[0], (None, None))
-    with pytest.raises(InputError, match="too few valid samples"):
-        improvement.proposals(known, space, 4, np.random.default_rng(1))
-
-
 # -- a study ----------------------------------------------------------------------------------------
 
 STUDY = """
@@ -225,6 +206,7 @@ def test_a_search_by_statistics_ends_at_the_front(done):
     assert samples.sizes["sample"] < sum(counted.values())
 
 
+@pytest.mark.nightly
 def test_a_search_by_statistics_that_is_stopped_ends_with_the_same_bytes(done, tmp_path, monkeypatch):  # fmt: skip
     formula.replace_dynamics(monkeypatch.setattr)
     assert formula.run_in_pieces(study(), str(tmp_path / "out"), alone()) > 4

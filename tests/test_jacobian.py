@@ -67,6 +67,7 @@ def differentiate(problem: Problem, m: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)
+@pytest.mark.shortened(1)
 def test_columns_are_the_derivatives(name: str):
     n, changes = TOPOLOGIES[name]
     problem, m = memory_of(changes)

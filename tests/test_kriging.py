@@ -14,7 +14,6 @@ from hpcclear.statistics.surrogate.kernels import KERNELS, MATERN, SQUARED_EXPON
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.likelihood import PART, maximise, negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import gaussian, matern
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 
@@ -100,18 +99,6 @@ def test_likelihood_and_gradient_are_those_of_scikit_learn(dims, count, noise, k
     found, slopes = negative_likelihood(theta, points - 0.5, values, kernel)
     assert found == pytest.approx(-value, rel=1e-6)
     np.testing.assert_allclose(slopes, -gradient, rtol=1e-6, atol=1e-6 * abs(gradient).max())
-
-
-@pytest.mark.parametrize("kernel", KERNELS)
-def test_gradient_of_the_likelihood_is_that_of_its_differences(kernel):
-    rng = np.random.default_rng(7)
-    points, values, step = rng.random((50, 4)) - 0.5, rng.standard_normal(50), 1e-5
-    theta = np.log([1.5, 0.2, 0.5, 1.0, 20.0, 1e-2])
-    _, slopes = negative_likelihood(theta, points, values, kernel)
-    for k, slope in enumerate(slopes):
-        ends = [theta + sign * step * (np.arange(6) == k) for sign in (1, -1)]
-        above, below = (negative_likelihood(end, points, values, kernel)[0] for end in ends)
-        assert (above - below) / (2 * step) == pytest.approx(slope, abs=1e-7 * abs(slopes).max())
 
 
 def of_many_points(points, seed=5):
@@ -206,17 +193,6 @@ def test_round_trip_is_bitwise(either):
     assert again.kernel == model.kernel
     assert (again.predict(places) == model.predict(places)).all()
     assert (again.variance(places) == model.variance(places)).all()
-
-
-def test_fit_is_deterministic(model):
-    again = refit(model, names=model.names)
-    for name, array in model.to_arrays().items():
-        assert (array == again.to_arrays()[name]).all(), name
-
-
-def test_stored_arrays_cannot_be_changed(model):
-    with pytest.raises(ValueError, match="read-only"):
-        model.alpha[0] = 1.0
 
 
 @pytest.mark.parametrize(
@@ -400,52 +376,3 @@ def test_a_smooth_function_stays_in_one_piece():
     pieces = fit_kinked(evaluate)
     assert len(pieces.leaves) == 1
     assert evaluate.calls == [70]
-
-
-def test_depth_and_resampling_are_limited():
-    evaluate = Counted(lambda p: np.sin(1e4 * p[:, 0]))  # noise, in effect
-    pieces = fit_kinked(evaluate, max_depth=1, max_resamples=2)
-    assert not pieces.accepted.any()
-    assert len(pieces.leaves) == 2
-    assert evaluate.calls == [70, 30, 30, 140, 60, 60]
-
-
-def test_grid_of_subintervals_and_borders():
-    pieces = fit_kinked(lambda p: p[:, 0] + p[:, 1], cuts=(2, 3))
-    assert len(pieces.leaves) == 6
-    places = np.array([[0.5, 2 / 3], [0.0, 0.0], [1.0, 2.0], [0.49, 2.0]])
-    corners = np.array([pieces.leaves[k].lower for k in pieces.locate(places)])
-    np.testing.assert_allclose(corners, [[0.5, 2 / 3], [0, 0], [0.5, 4 / 3], [0, 4 / 3]])
-    np.testing.assert_allclose(pieces.predict(places), places.sum(axis=1), atol=1e-3)
-    one = pieces.leaves[pieces.locate(places[3:])[0]]
-    assert pieces.predict(places[3:]) == one.predict(places[3:])
-
-
-def test_pieces_refuse_what_lies_outside():
-    pieces = fit_kinked(lambda p: p[:, 0], cuts=(2, 1))
-    with pytest.raises(InputError, match=r"x2 = 2\.1: outside"):
-        pieces.predict(np.array([[0.2, 2.1]]))
-
-
-def test_pieces_round_trip_is_bitwise():
-    pieces = fit_kinked(kinked)
-    arrays = {name: np.copy(array) for name, array in pieces.to_arrays().items()}
-    again = Piecewise.from_arrays(arrays, METHOD)
-    places = draw(200, 14, SQUARE)
-    assert (again.predict(places) == pieces.predict(places)).all()
-    assert (again.accepted == pieces.accepted).all()
-    for name in ("leaf0_upper", "leaf0_lower"):  # boxes that overlap or leave gaps
-        with pytest.raises(InputError):
-            Piecewise.from_arrays(arrays | {name: arrays[name] + 0.1}, METHOD)
-
-
-def test_pieces_are_deterministic_and_survive_failures():
-    def sometimes(points):
-        return np.where(points[:, 1] < 0.1, np.nan, kinked(points))
-
-    first, second = fit_kinked(sometimes), fit_kinked(sometimes)
-    for name, array in first.to_arrays().items():
-        assert np.array_equal(array, second.to_arrays()[name]), name
-    assert sum(leaf.dropped for leaf in first.leaves) > 0
-    with pytest.raises(InputError, match="too few valid samples"):
-        fit_kinked(lambda p: np.full(len(p), np.nan))

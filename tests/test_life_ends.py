@@ -1,6 +1,5 @@
 """Where lives of worn joints end: at their limits, in closed form, whatever the law, the limit and the revolutions allowed."""
 
-import io
 import math
 from pathlib import Path
 
@@ -9,7 +8,6 @@ import pytest
 import tomli_w
 from commands import run
 from scipy.integrate import solve_ivp
-from test_progress import Clock, records
 from test_wear import ROTOR
 
 from hpcclear.base.asking import answered
@@ -19,8 +17,6 @@ from hpcclear.dynamics.wear.curves import DEEPEST, curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.life import Plan, Seen, life
 from hpcclear.ensemble.wear import check_worn
-from hpcclear.ranks.progress import LivesProgress
-from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
@@ -195,25 +191,6 @@ def test_limits_and_clearances_beyond_a_quarter_of_the_radius_are_refused(change
     assert "0.25 of " in error.value.reason
 
 
-def test_progress_of_lives_goes_over_all_designs_and_forecasts():
-    clock, log = Clock(), io.StringIO()
-    progress = LivesProgress("wear", "log", 5.0, log, clock)
-    for over, parts in ((0, [0.25, 0.25]), (1, [0.5])):
-        progress.lives(2, over, parts)
-        progress.start(8, records(0))
-        clock.now += 10.0
-        progress.add(records(8))
-        progress.refresh()
-        progress.close()
-    progress.lives(2, 2, [])
-    progress.finish()
-    assert log.getvalue().splitlines() == [
-        "wear: 0/2 service lives finished (25 %), 8 simulations, about 30 s left",
-        "wear: 1/2 service lives finished (75 %), 16 simulations, about 7 s left",
-        "wear: 2/2 service lives finished (100 %), 16 simulations in 20 s",
-    ]
-
-
 # ---- the command -----------------------------------------------------------------------------------
 
 LIMIT, CYCLES = 1.2e-4, 1e9
@@ -298,25 +275,3 @@ def test_the_command_ends_lives_at_their_limit(written):
     assert float(found.rank_correlation[0, 0]) == pytest.approx(
         1.0
     )  # the coefficient decides, over or not
-
-
-def test_the_command_and_the_page_say_when_and_why_lives_ended(written):
-    folder, output = written
-    told = " ".join(output.split())
-    assert "4 at wear.limit.clearance" in told
-    assert "4/4 service lives finished (100 %)" in told
-    assert "service life, revolutions" in told
-    assert "service life, h" in told
-    assert "120 µm" in told or "0.12 mm" in told
-    page = write_report(folder / "results").read_text(encoding="utf-8")
-    assert "Median service life: " in page
-    assert " h." in page
-
-
-@pytest.mark.mpi
-def test_lives_that_end_early_are_the_same_on_two_ranks(written, tmp_path):
-    folder, _ = written
-    out = tmp_path / "wear.nc"
-    code, output = run(["wear", str(folder / "scene.toml"), "-o", str(out)], 2)
-    assert code == 0, output
-    assert out.read_bytes() == (folder / "results" / "wear.nc").read_bytes()

@@ -1,6 +1,5 @@
 """What a machine refuses: disks that fill up, memory that runs out, places taken by another run."""
 
-import json
 import os
 import resource
 import signal
@@ -13,7 +12,6 @@ import commands
 import pytest
 from patience import crowded
 
-from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.results import dataset
 
 pytestmark = pytest.mark.mpi
@@ -117,6 +115,7 @@ def test_a_design_that_does_not_fit_into_memory_ends_in_a_message(tmp_path, comp
 
 
 @pytest.mark.parametrize("rank", [0, 1])
+@pytest.mark.shortened(1)
 def test_memory_that_runs_out_during_the_run_ends_in_a_message(tmp_path, rank):
     words = commands.sample(tmp_path / "samples.nc", 4000, *OPTIONS)
     failing = {"TEST_FAIL": "simulation", "TEST_ERROR": "MemoryError", "TEST_RANK": str(rank)}
@@ -146,39 +145,6 @@ def test_a_second_run_on_one_output_is_refused(tmp_path):
     assert commands.finish(job)[0] == 3
 
 
-@pytest.mark.nightly
-def test_the_lock_of_a_killed_run_is_recognised(tmp_path):
-    words = commands.sample(tmp_path / "samples.nc", 3000, *OPTIONS)
-    job = commands.start(words)
-    commands.wait_for_parts(job, tmp_path)
-    for process in commands.ranks_of(job).values():
-        commands.kill(process)
-    commands.finish(job, 20.0)
-    (lock,) = tmp_path.glob(".*.lock")
-    assert json.loads(lock.read_text())["pid"] > 0
-    assert commands.run(words)[0] == 0
-    assert not lock.exists()
-
-
-def test_another_scene_is_refused_with_the_keys_that_differ_and_fresh_lies_beside(tmp_path):
-    output = tmp_path / "samples.nc"
-    assert commands.run(commands.sample(output, 100), 0)[0] == 0
-    before = output.read_bytes()
-    other = commands.sample(output, 100, "--set", "effects.gravity=9.81", "--set", "study.seed=2")
-    code, text = commands.run(other, 0)
-    assert code == 2, text
-    assert "effects.gravity: 0.0 there, 9.81 now" in text
-    assert "study.seed: 1 there, 2 now" in text
-    assert "--fresh" in text
-    assert commands.run([*other, "--fresh"], 0)[0] == 0
-    assert output.read_bytes() == before
-    beside = dataset.read(tmp_path / "samples-2.nc", "samples")
-    assert beside.sizes["sample"] == 100
-    assert commands.run([*other, "--fresh"], 0)[0] == 0
-    assert (tmp_path / "samples-3.nc").read_bytes() == (tmp_path / "samples-2.nc").read_bytes()
-    assert output.read_bytes() == before
-
-
 def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
     output = tmp_path / "samples.nc"
     job = commands.start(commands.sample(output, 100_000, *OPTIONS))
@@ -196,29 +162,3 @@ def test_unfinished_work_of_another_scene_is_refused_and_left_alone(tmp_path):
 
 
 # -- the price ----------------------------------------------------------------------------------
-
-
-@pytest.mark.full
-def test_checkpoints_take_less_than_a_hundredth_of_the_time(tmp_path):
-    words = [
-        "sample",
-        str(commands.SCENE),
-        "-o",
-        str(tmp_path / "samples.nc"),
-        "--time-limit",
-        "600",
-    ]
-    words += commands.overrides(
-        *commands.CHEAP, "numerics.averaged_revolutions=50", "study.samples=60000"
-    )
-    # the plain command: to be watched takes time too
-    code, output = commands.finish(commands.start(words, program=("-m", "hpcclear")))
-    assert code == 0, output
-    timing = dataset.read(tmp_path / "samples.timing.nc", "timing")
-    root = timing.sel(rank=0)
-    total = sum(float(root[name].sum()) for name in COLUMNS)
-    # the stage "files" opens the checkpoint and writes the result, which a run without checkpoints writes too
-    saving = float(root["write"].where(root["stage"] != "files").sum())
-    print(f"{saving:.3f} s of {total:.1f} s were spent in checkpoint calls")
-    assert total - float(root["compile"].sum()) > 20.0
-    assert saving < 0.01 * total

@@ -1,21 +1,17 @@
 """Scenes of linkages: whole motions against a dense model and scipy, energy, samples, drives, tables, and what is refused."""
 
 import math
-import re
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from commands import overrides, run
-from dense_linkage import Contact, Dense
-from margins import energy_closes
-from scipy.integrate import solve_ivp
+from dense_linkage import Contact, Dense, comes_as
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.cli.check import describe_scene
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.linkage.assembly import assemble
@@ -43,6 +39,7 @@ def rocker(*sets):
 # ---- physics -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_a_whole_motion_is_the_dense_model_s():
     """From assembly through contact in both joints: positions to 1e-8 m while the motion is well-posed; energy closed."""
     scene = rocker(
@@ -60,21 +57,10 @@ def test_a_whole_motion_is_the_dense_model_s():
     ]
     start = np.zeros((2, dense.n))
     start[0, order], start[1, order] = assembly.q, assembly.v
-    n, end = (
-        dense.n,
-        0.0025,
-    )  # s: contact begins in both joints before; later chaos parts any two solutions
     response = simulate(scene)
-    time = response["time"].to_numpy()
-    early = time[time <= end]
-    y = solve_ivp(
-        lambda t, y: [*y[n:], *dense.accelerations(y[:n], y[n:], t)], (0.0, end), start.ravel(),
-        method="DOP853", rtol=1e-10, atol=1e-12, max_step=end / 100, t_eval=early,
-    ).y  # fmt: skip
-    for k, name in enumerate(("body_x", "body_y", "body_angle")):
-        seen = response[name].to_numpy()[: len(early)]
-        np.testing.assert_allclose(seen, y[k:n:3].T, rtol=0, atol=1e-8)
-    assert (response["contact_force"].to_numpy()[: len(early)].max(axis=0) > 100.0).all()
+    # contact begins in both joints before 2.5 ms; later chaos parts any two solutions
+    met = comes_as(response, dense, start, 0.0025)
+    assert (response["contact_force"].to_numpy()[:met].max(axis=0) > 100.0).all()
     work = float(np.abs(np.diff(response["driving_work"].to_numpy())).sum())
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
 
@@ -161,20 +147,6 @@ def test_without_play_nothing_is_integrated_and_reactions_are_the_closed_form_s(
     assert (found["objective"] == 0.0).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_gallery_runs_and_closes_its_energy(name):
-    scene = load_scene(
-        LINKAGES / f"{name}.toml",
-        ("numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"),
-    )
-    response = simulate(scene.with_({"study": None}))
-    assert int(response["status"]) == 0
-    energy_closes(response, 1e-4)
-    assert float(response["objective"]) > 0.0
-    points = [str(point) for point in response["point"].to_numpy()]
-    assert len(points) == len(set(points))
-
-
 DRIVES = {
     "torque": {
         "kind": "torque", "body": "crank", "torque": 1.0, "initial_speed": 90.0,
@@ -204,6 +176,7 @@ def driven(drive: str) -> Scene:
 
 
 @pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.shortened(3)
 def test_every_drive_closes_the_energy(drive):
     scene = driven(drive)
     response = simulate(scene)
@@ -231,20 +204,6 @@ def test_no_first_step_of_a_contact_is_its_last():
     found = evaluate(driven("torque"), {"mechanism.joints.o2.clearance": worst})
     assert (found["status"] == 0).all()
     assert float(found["energy_error"].max()) < 1.5e-6
-
-
-def test_latched_laws_multipliers_and_implicit_steps_run_on_linkages():
-    latched = rocker(
-        'effects.contact={law="lankarani-nikravesh", restitution=0.8}', "numerics.energy=true"
-    )
-    for scene in (
-        latched,
-        rocker("numerics.formulation=baumgarte", "numerics.energy=true"),
-        rocker("numerics.method=radau", "numerics.energy=true"),
-    ):
-        found = evaluate(scene, {"mechanism.joints.o2.clearance": [1e-4, 3e-4]})
-        assert (found["status"] == 0).all()
-        assert (found["energy_error"] < 1e-4).all()
 
 
 # ---- samples -----------------------------------------------------------------------------------------
@@ -379,12 +338,6 @@ def test_broken_linkages_are_refused_by_name(change):
     assert BROKEN[change] in words
 
 
-def test_a_linkage_that_does_not_close_is_refused():
-    key, words = refusal("bodies.coupler.length=2 m")
-    assert key.startswith("mechanism.joints")
-    assert "cannot be assembled" in words
-
-
 def test_a_slider_crank_s_tables_do_not_fit_a_linkage():
     content = {key: value for key, value in ROCKER.items() if key != "study"}
     for table, value in (("drive", {"kind": "torque"}), ("joints", {})):
@@ -392,18 +345,6 @@ def test_a_slider_crank_s_tables_do_not_fit_a_linkage():
             load_scene({**content, table: value})
     with pytest.raises(InputError, match="belongs to a slider-crank"):
         rocker("effects.slider_load=3")
-
-
-def test_what_a_sample_of_a_linkage_costs_is_told(capsys):
-    """`check` measures it, with whatever mass there is."""
-    describe_scene(load_scene(LINKAGES / "crank_rocker.toml"), cost=True)
-    told = capsys.readouterr().out
-    assert "run time per sample" in told
-    assert "60 samples" in told
-    assert re.search(
-        r"about \d+ samples, .* of one core; more exact: hpcclear plan",
-        " ".join(told.split()),
-    )
 
 
 def test_what_is_on_is_named_all_of_it():

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import page_numbers
 import pytest
 from commands import kill_once_it_saved, overrides, run
 from running import scene_with
@@ -23,7 +22,7 @@ from hpcclear.ensemble.wear import check_worn
 from hpcclear.report import fan_figure, survival_figure
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
-from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_interval
+from hpcclear.statistics.random.survival import share_interval
 
 SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
 PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
@@ -49,16 +48,6 @@ def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK, se
         )  # fmt: skip
 
     return answered(life(joints, plan), seen)
-
-
-def test_a_constant_rate_makes_linear_progress():
-    found = followed(ONE, PLAN, lambda c: np.array([50.0]))
-    assert found.status is Status.OK
-    cycles = np.linspace(0.0, 1e6, 11)
-    clearance = curves(found, ONE, cycles).clearance[:, 0]
-    np.testing.assert_allclose(clearance, 3e-4 + 3e-12 * 50.0 * cycles, rtol=1e-10)
-    assert found.certain
-    assert found.limit[0] < 1e-15
 
 
 def test_running_in_is_an_exponential_of_the_work():
@@ -125,18 +114,6 @@ def test_errors_of_jumps_stay_within_their_tolerance():
         assert off[-1] <= PLAN.tolerance
     assert within >= 38
     assert max(off) > 1e-6  # there are errors to hold
-
-
-def test_tighter_jumps_are_more_and_better():
-    errors, jumps = [], []
-    for tolerance in (0.02, 0.0005):
-        plan = Plan(1e6, tolerance, 5.0, 4, 16)
-        found = followed(ONE, plan, lambda c: 100.0 * (c / 3e-4) ** 1.2)
-        truth = exact(ONE, 1.2, 100.0, 1e6)
-        errors.append(abs(float(ONE.worn(found.nodes[-1].work)[0][0] / truth[0]) - 1.0))
-        jumps.append(len(found.nodes))
-    assert jumps[1] > jumps[0]
-    assert errors[1] < 0.2 * errors[0]
 
 
 def test_a_leap_of_f_does_not_end_a_life():
@@ -236,16 +213,6 @@ def test_limits_of_shares_are_clopper_and_pearsons():
     assert binom.cdf(0, 20, upper[0]) == pytest.approx(0.025, rel=1e-9)
 
 
-def test_quantiles_keep_what_is_infinite_and_leave_out_what_failed():
-    values = np.array([3.0, 1.0, np.inf, 2.0, np.nan])
-    np.testing.assert_array_equal(
-        quantiles(values, np.array([0.25, 0.5, 0.75, 1.0])), [1.0, 2.0, 3.0, np.inf]
-    )
-    assert np.isnan(quantiles(np.full(3, np.nan), np.array([0.5]))[0])
-    assert rank_correlation(np.arange(9.0), np.exp(np.arange(9.0))) == pytest.approx(1.0)
-    assert math.isnan(rank_correlation(np.arange(3.0), np.arange(3.0)))
-
-
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
@@ -317,7 +284,6 @@ def test_ranks_and_a_kill_change_no_byte(tmp_path):
     code, output = run(words(out), 2)
     assert code == 0, output
     assert out.read_bytes() == files[0]
-    page_numbers.check(out.parent)
     found = dataset.read(out, "wear")
     check(found)
     assert fan_figure(found) is not None

@@ -13,10 +13,6 @@ from test_linkage_scenes import slider_crank_pair
 from test_rest import REST
 
 from hpcclear import load_scene, simulate
-from hpcclear.report.figures import motion
-from hpcclear.report.figures.portraits import poincare_figure
-from hpcclear.report.figures.response import response_figure
-from hpcclear.report.html.picture import frames
 
 TURN = 2 * math.pi
 STARTS = [math.radians(angle) for angle in (-70.0, 20.0, 115.0, 230.0, 400.0)]
@@ -190,6 +186,7 @@ def closes(response, right, clearance=0.0, largest_load=90.0):
 @pytest.mark.parametrize("clearance", [0.0, CLEARANCE], ids=["ideal", "clearance"])
 @pytest.mark.parametrize("way", WAYS, ids=["ccw", "cw"])
 @pytest.mark.parametrize("kind", ["constant", "harmonic", "table"])
+@pytest.mark.shortened(4)
 def test_loads_are_taken_at_the_angle_of_the_drive_s_body(kind, way, clearance):
     for start in STARTS:
         scene, given = linkage(kind, way, start, clearance)
@@ -199,6 +196,7 @@ def test_loads_are_taken_at_the_angle_of_the_drive_s_body(kind, way, clearance):
 
 
 @pytest.mark.parametrize("start", STARTS)
+@pytest.mark.shortened(2)
 def test_a_free_body_s_torque_and_loads_too_and_its_revolution_is_a_whole_turn(start):
     scene, _ = linkage("torque", 1, start, CLEARANCE, revolutions=2)
     response = simulate(scene)
@@ -222,6 +220,7 @@ def on_its_line(angle):
 
 
 @pytest.mark.parametrize("clearance", [0.0, CLEARANCE], ids=["ideal", "clearance"])
+@pytest.mark.shortened(1)
 def test_a_driven_body_that_a_slide_holds_at_an_angle_has_its_own(clearance):
     """A block on a carrier that it turns, its line 0.6 rad off the carrier's axis; a lever leads it."""
     for start, way in zip(STARTS, (1, -1, 1, -1, 1), strict=True):
@@ -256,6 +255,7 @@ def test_a_driven_body_that_a_slide_holds_at_an_angle_has_its_own(clearance):
 
 
 @pytest.mark.parametrize("clearance", [0.0, CLEARANCE], ids=["ideal", "clearance"])
+@pytest.mark.shortened(1)
 def test_a_rotor_that_moves_nothing_gives_the_angle_all_the_same(clearance):
     """It gives the period, another drive turns the crank three times as fast: series of both go on from turn to turn."""
     for rotor, way, start in zip(STARTS, (1, -1, 1, -1, 1), reversed(STARTS), strict=True):
@@ -289,6 +289,7 @@ def test_a_rotor_that_moves_nothing_gives_the_angle_all_the_same(clearance):
 
 
 @pytest.mark.parametrize("clearance", [0.0, CLEARANCE], ids=["ideal", "clearance"])
+@pytest.mark.shortened(1)
 def test_of_two_turns_the_angle_itself_says_which_it_is(clearance):
     """The start angle begins the first turn, 360 deg more the second; clockwise the angle falls from there."""
     push = [*PUSH, *((angle + TURN, -2 * size) for angle, size in PUSH)]
@@ -311,6 +312,7 @@ def test_of_two_turns_the_angle_itself_says_which_it_is(clearance):
 
 
 @pytest.mark.parametrize("seed", range(12))
+@pytest.mark.shortened(6)
 def test_random_four_bars_under_random_tables(seed):
     """Lengths by Grashof's condition, starts, ways round, drives and tables at random; every third with clearance."""
     rng = np.random.default_rng(seed)
@@ -339,6 +341,7 @@ def test_random_four_bars_under_random_tables(seed):
 
 
 @pytest.mark.parametrize("formulation", ["minimal", "baumgarte"])
+@pytest.mark.shortened(1)
 def test_series_of_the_driven_body_go_on_from_turn_to_turn(formulation):
     start = STARTS[2]
     scene, given = linkage("constant", -1, start, CLEARANCE, revolutions=2, formulation=formulation)
@@ -355,22 +358,6 @@ def test_series_of_the_driven_body_go_on_from_turn_to_turn(formulation):
     tip = response[["point_x", "point_y"]].sel(point="coupler.tip")
     off = tip["point_x"] + 1j * tip["point_y"] - four_bar(given(time))[0]
     assert float(np.abs(off).max()) < 20 * CLEARANCE
-
-
-def test_figures_know_which_way_a_drive_goes():
-    for kind, way in (("constant", -1), ("table", -1), ("harmonic", 1)):
-        scene, _ = linkage(kind, way, STARTS[1], CLEARANCE, revolutions=2)
-        response = simulate(scene)
-        assert motion.whole_turns(response) == 2
-        last = motion.steady(response, 1)
-        assert float(last["time"][0]) == pytest.approx(SECONDS, rel=1e-6)
-        if kind != "harmonic":  # which has no one angle once a turn
-            crossed = motion.section(response, "crank_angle", 0.5)
-            np.testing.assert_allclose(np.mod(crossed, TURN), 0.5, rtol=0, atol=1e-9)
-            assert len(crossed) == 2
-        for made in (response_figure(response), poincare_figure(response, 0.5)):
-            assert made.axes
-        assert np.ptp(frames(response)["turn"]) == pytest.approx(2.0)
 
 
 def test_a_body_from_rest_may_be_thrown_back_wherever_it_starts():

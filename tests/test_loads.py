@@ -113,6 +113,7 @@ def test_a_one_sided_spring_lets_go(acts):
 @pytest.mark.parametrize(
     "force", [6.0, [[0.05, 6.0], [5.0, 6.0]], [["100 mm", "8 N"], ["300 mm", "4 N"]]]
 )
+@pytest.mark.shortened(2)
 def test_a_cylinder_pushes_by_its_stroke(force):
     """Constant: x = x0 + F t^2/(2 m); falling with the stroke: a swing about where it would be nought."""
     mass, start = 0.3, 0.1

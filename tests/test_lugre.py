@@ -1,6 +1,5 @@
 """Friction by bristles: Stribeck's curve, stick-slip against an independent solver, energy, hard cases, what is refused."""
 
-import itertools
 import math
 
 import numpy as np
@@ -110,6 +109,7 @@ def shaft(bodies: dict, joints: dict, hub: dict, speed: float, rtol: float, **fr
 
 
 @pytest.mark.parametrize("speed", [0.004, 0.02, 0.05])
+@pytest.mark.shortened(1)
 def test_a_shaft_that_slides_steadily_has_the_friction_of_stribecks_curve(speed):
     """A rotor that lies in its bearing: 0.2, one, and 2.5 times Stribeck's speed."""
     scene = shaft(
@@ -245,18 +245,6 @@ def test_methods_agree():
 
 
 @pytest.mark.full
-def test_samples_beside_others_have_the_bits_of_single_ones():
-    scene = bristled()
-    rng = np.random.default_rng(0)
-    columns = {
-        ("mechanism.rod.mass",): rng.uniform(0.1, 0.4, 24),
-        ("effects.friction.coefficient",): rng.uniform(0.01, 0.15, 24),
-        ("effects.friction.bristle_stiffness",): 10 ** rng.uniform(3, 7, 24),
-    }
-    running.lanes_have_single_bits(scene, columns)
-
-
-@pytest.mark.full
 @pytest.mark.parametrize("ideal", ["crank_rod", "rod_slider"])
 def test_one_joint_alone_has_its_bristles(ideal):
     scene = bristled({f"joints.{ideal}": {"kind": "ideal"}}, 1e-8)
@@ -326,24 +314,6 @@ def test_bristles_that_are_none_are_refused_with_the_reason(entry, value, reason
     assert caught.value.remedy
 
 
-def test_other_laws_have_no_bristles():
-    coulomb = {"law": "coulomb", "coefficient": 0.1, "bristle_stiffness": 1e5}
-    with pytest.raises(InputError) as caught:
-        bristled({"effects.friction": coulomb})
-    assert caught.value.key == "effects.friction.bristle_stiffness"
-    assert caught.value.value == 1e5
-    assert "'coulomb' has no bristle_stiffness" in caught.value.reason
-
-
-def test_units_of_bristles_are_converted():
-    scene = bristled(
-        bristle_stiffness="100 mm^-1", stribeck_speed="1 cm/s", bristle_damping="2 s/m"
-    )
-    friction = scene.effects.friction
-    assert (friction.value("bristle_stiffness"), friction.value("stribeck_speed")) == (1e5, 0.01)
-    assert (friction.value("bristle_damping"), friction.value("viscous_coefficient")) == (2.0, 0.0)
-
-
 def test_points_keep_friction_at_rest_above_that_of_sliding():
     scene = bristled()
     paths = [f"effects.friction.{name}" for name in ("coefficient", "static_coefficient")]
@@ -371,38 +341,3 @@ def test_a_scene_tells_of_its_bristles():
     off = Off(scene, [friction])
     assert off.scene.bristles == 0
     assert off.paths(["effects.friction.bristle_stiffness"]) == ()
-
-
-def test_a_linkage_without_room_for_bristles_is_refused():
-    """A chain of seven free bars: 21 coordinates and seven bristles; and 61 pendulums beside it."""
-    bar = {"mass": 1.0, "length": 0.1, "inertia": 1e-3}
-    play = {
-        "kind": "clearance", "clearance": 1e-4, "bearing_radius": 0.01,
-        "materials": {"bearing": POLYMER, "journal": POLYMER},
-    }  # fmt: skip
-    names = ["shaft", *(f"bar{k}" for k in range(7))]
-    chain = {
-        f"pin{k}": play | {"journal": f"{one}.b", "bearing": f"{two}.a"}
-        for k, (one, two) in enumerate(itertools.pairwise(names))
-    }
-    axis = {"axis": {"kind": "revolute", "journal": "shaft.a", "bearing": "ground.o"}}
-    base = shaft({}, axis, {"journal": "shaft.o", "bearing": "ground.o"}, 1.0, 1e-6).resolved()
-    idle = [f"idle{k}" for k in range(61)]
-    pins = {
-        f"pin_of_{k}": {"kind": "revolute", "journal": f"{k}.a", "bearing": "ground.o"}
-        for k in idle
-    }
-    base["mechanism"]["bodies"] = dict.fromkeys([*names, *idle], bar)
-    base["mechanism"]["joints"] = axis | chain | pins
-    with pytest.raises(InputError) as caught:
-        problem_of(load_scene(base))
-    assert caught.value.key == "effects.friction.law"
-    assert "89 coordinates, of 88 at most" in caught.value.reason
-
-
-def test_bristles_give_way_at_most_where_friction_at_rest_holds_them():
-    """Their coordinates come before the mechanism's, and the deflections are the velocities of these."""
-    result = running.run(bristled())
-    deflections = result.v[:, :2]
-    largest = 1.5e-6  # static_coefficient over bristle_stiffness
-    assert 0.5 * largest < np.abs(deflections).max() < 1.001 * largest

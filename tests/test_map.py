@@ -70,6 +70,7 @@ def test_chaos_is_found_where_revolutions_differ_for_good():
     assert chaotic["objective_spread"] > 100.0 * regular["objective_spread"]
 
 
+@pytest.mark.nightly
 def test_periods_double_on_the_way_to_chaos():
     """Of 90 clearances from 0.1 to 1 mm 16 have the period 1, 6 two; of 48 in two of these stretches some 23 four or eight.
 

@@ -192,25 +192,3 @@ def test_coordinates_less_closures_are_the_degrees_of_freedom(name):
         rows = sum(2 if isinstance(one, (Revolute, Slide)) else 1 for one in trees.closures)
         assert len(trees.coordinates) - rows == freedom(mechanism)
         assert len(set(trees.coordinates)) == len(trees.coordinates)
-
-
-@pytest.mark.parametrize(
-    ("open_pins", "names"),
-    [
-        (("o12", "o23"), "x_rod y_rod angle_rod slide_slider"),
-        (("o12",), "angle_rod slide_slider"),
-        (("o23",), "angle_rod slide_slider"),
-        (("o14", "o12", "o23"), "x_crank y_crank x_rod y_rod angle_rod slide_slider"),
-    ],
-)
-def test_coordinates_of_the_slider_crank(open_pins, names):
-    found = forest(slider_crank(*open_pins)).coordinates
-    assert [one.name for one in found] == names.split()
-
-
-def test_guides_enter_the_trees_before_pins():
-    """So that what closes a loop is a pin, whose rows have no angle."""
-    for name in ("slider-crank, ideal", "v-twin, ideal, torque", "quick-return, ideal"):
-        closures = forest(LINKAGES[name]).closures
-        assert closures
-        assert all(isinstance(one, Revolute) for one in closures)

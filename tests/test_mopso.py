@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from margins import at_least, at_most
 
-from hpcclear.base.errors import InputError
 from hpcclear.statistics.search.mopso import ParticleSwarm, minimise
 from hpcclear.statistics.search.pareto import Archive, best_subset, cut, hypervolume, relative_gain
 from hpcclear.statistics.search.settings import SwarmSettings
@@ -33,21 +32,6 @@ def dtlz2(x):
     g = 1 + ((x[:, 2:] - 0.5) ** 2).sum(axis=1)
     a, b = x[:, 0] * np.pi / 2, x[:, 1] * np.pi / 2
     return np.stack([g * np.cos(a) * np.cos(b), g * np.cos(a) * np.sin(b), g * np.sin(a)], axis=1)
-
-
-def bnh(x):
-    """Binh and Korn's constrained problem: objectives and violations."""
-    first, second = x[:, 0], x[:, 1]
-    values = np.stack([4 * first**2 + 4 * second**2, (first - 5) ** 2 + (second - 5) ** 2], axis=1)
-    violations = np.stack(
-        [(first - 5) ** 2 + second**2 - 25, 7.7 - (first - 8) ** 2 - (second + 3) ** 2], axis=1
-    )
-    return values, violations
-
-
-def narrow(x):
-    """ZDT1 where only 0.4 <= x1 <= 0.6 is allowed and a random start is mostly infeasible."""
-    return zdt1(x), np.abs(x[:, 0] - 0.5) - 0.1
 
 
 def unit(dimensions):
@@ -120,11 +104,6 @@ def test_front_is_the_closed_form(shift):
     assert np.allclose(zdt1(front.points), front.values, rtol=0, atol=1e-14)
 
 
-def test_without_mutation_it_is_still_a_swarm(shift):
-    front = run(zdt1, 30, 1 + shift, 250, settings=SwarmSettings(mutation_share=0.0))
-    at_least(moocore.hypervolume(front.values, 1.1), 0.8700)
-
-
 def test_velocity_follows_equations_22_and_23():
     # one objective, so P_g is known: the archive's only point. With three variables the two pulls
     # span a plane, and the change of velocity stays in it only if r1 and r2 are scalars
@@ -146,54 +125,6 @@ def test_velocity_follows_equations_22_and_23():
             assert np.allclose(pulls @ shares, rest, atol=1e-12)
             assert np.all(shares >= -1e-9)
             assert np.all(shares <= 1.8 + 1e-9)
-
-
-def test_speed_is_limited_and_turned_back_at_bounds():
-    settings = SwarmSettings(mutation_share=0.0, speed_limit=0.3)
-    swarm = ParticleSwarm(unit(5), 30, np.random.default_rng(2), settings=settings)
-    turned = 0
-    for _ in range(29):
-        before = swarm.ask()
-        tell(swarm, zdt1(before))
-        positions, velocities = swarm._positions, swarm._velocities
-        assert np.abs(velocities).max() <= 0.3
-        back = before - velocities  # where a particle that was turned back had wanted to go
-        left = (back < 0.0) | (back > 1.0)
-        went_on = np.isclose(positions, before + velocities, rtol=0, atol=1e-15)
-        turned_back = left & (positions == np.clip(back, 0.0, 1.0))
-        assert np.all(went_on | turned_back)
-        turned += np.count_nonzero(turned_back & ~went_on)
-    assert turned > 50
-
-
-def test_without_feasible_points_the_least_violation_leads():
-    settings = SwarmSettings(mutation_share=0.0, tournament=2000)  # all but sure to draw the best
-    swarm = ParticleSwarm(unit(3), 5, np.random.default_rng(0), settings=settings)
-    points = swarm.ask()
-    violations = 1.0 + points.sum(axis=1)
-    tell(swarm, points[:, :2], violations)
-    toward = points[violations.argmin()] - points
-    velocities, moved = swarm._velocities, swarm.ask()
-    inside = np.all((moved > 0.0) & (moved < 1.0), axis=1)
-    free = inside & (np.abs(velocities).max(axis=1) < 0.5)
-    assert free.sum() > 20
-    assert np.allclose(np.cross(velocities, toward)[free], 0.0, atol=1e-14)
-    assert np.all((velocities * toward)[free].sum(axis=1) >= 0.0)
-
-
-def test_archive_is_the_brute_force_front_of_all_points_told():
-    seen = []
-    swarm = ParticleSwarm(unit(4), 3, np.random.default_rng(4))
-    while swarm.iteration < swarm.iterations:
-        values = np.round(dtlz2(swarm.ask()), 2)  # rounding makes ties and duplicates
-        seen.append(values)
-        tell(swarm, values)
-    everything = np.concatenate(seen)
-    expected = np.unique(everything[brute_force_front(everything)], axis=0)
-    archive = swarm._archive.values
-    assert len(archive) < 400  # nothing was thinned
-    assert np.array_equal(np.unique(archive, axis=0), expected)
-    assert len(archive) == len(expected)
 
 
 @pytest.mark.parametrize("function", [zdt3, dtlz2])
@@ -256,23 +187,6 @@ def test_best_subset_is_the_best_of_all_subsets(size):
     assert best_subset(values, size).tolist() == list(sets[int(np.argmax(reached))])
 
 
-def test_elite_is_what_the_front_would_lose_most_without():
-    first = np.array([0.3, 0.0, 0.31, 1.0, 0.6])
-    archive = Archive(10, np.empty((0, 1)), np.empty((0, 0)))
-    archive.add(first[:, None], np.stack([first, 1000 * (1 - first)], axis=1))
-    rows, lost = archive.elite(4)
-    assert archive.positions[rows, 0].tolist() == [0.3, 0.0, 1.0, 0.6]  # 0.31 had least to lose
-    assert np.allclose(lost, [300 * 0.3, np.inf, np.inf, 300 * 0.4])  # to the next, up to the last
-
-
-def test_cut_of_many_objectives_keeps_the_best_of_each():
-    values = np.abs(np.random.default_rng(7).normal(size=(60, 5)))
-    values /= np.linalg.norm(values, axis=1)[:, None]
-    kept = cut(values, 12)
-    assert len(kept) == 12
-    assert np.array_equal(values[kept].min(axis=0), values.min(axis=0))
-
-
 def test_hypervolume_of_known_sets():
     assert hypervolume(np.array([[0.25, 0.5]]), np.ones(2)) == pytest.approx(0.375, abs=1e-15)
     six = np.full((1, 6), 0.5)
@@ -281,29 +195,6 @@ def test_hypervolume_of_known_sets():
     assert np.isnan(relative_gain(np.empty((0, 2)), np.ones((1, 2))))
     # one objective, small numbers: half the value left to win is half of what counts
     assert relative_gain(np.array([[2.05e-4]]), np.array([[2e-4]])) == pytest.approx(0.025 / 1.1)
-
-
-def test_constrained_front_of_bnh(shift):
-    rng = np.random.default_rng(5 + shift)
-    front = minimise(bnh, [(0, 5), (0, 3)], iterations=100, rng=rng)
-    _, violations = bnh(front.points)
-    assert violations.max() <= 0.0
-    assert 0 < front.infeasible < front.evaluations
-    # Pareto set: x1 = x2 up to 3, then x2 = 3 (Binh and Korn 1997)
-    along = np.linspace(0, 5, 2000)
-    known, _ = bnh(np.stack([along, np.minimum(along, 3)], axis=1))
-    scale = known.max(axis=0)
-    at_most(moocore.igd_plus(front.values / scale, known / scale), 3e-3)
-    worst = np.array([140.0, 50.0])
-    at_most(abs(hypervolume(front.values, worst) / hypervolume(known, worst) - 1.0), 5e-3)
-
-
-def test_swarm_finds_a_narrow_feasible_band(shift):
-    front = run(narrow, 10, 2 + shift, 100)
-    assert np.all(np.abs(front.points[:, 0] - 0.5) <= 0.1)
-    f1 = np.linspace(0.4, 0.6, 300)
-    known = np.stack([f1, 1 - np.sqrt(f1)], axis=1)
-    at_most(moocore.igd_plus(front.values, known), 1e-3)
 
 
 def osy(x):
@@ -404,18 +295,6 @@ def test_no_feasible_point_is_said_and_not_invented():
     assert "0.25" in front.remark
 
 
-def test_among_infeasible_points_the_smaller_violation_is_remembered():
-    settings = SwarmSettings(particles=3)
-    swarm = ParticleSwarm(unit(2), 5, np.random.default_rng(0), settings=settings)
-    first = swarm.ask()
-    tell(swarm, np.ones((3, 2)), [0.5, 0.5, 0.0])
-    second = swarm.ask()
-    # larger violation, better objectives; smaller violation, worse ones; feasible but dominated
-    tell(swarm, [[0.0, 0.0], [9.0, 9.0], [2.0, 2.0]], [0.6, 0.4, 0.0])
-    assert np.array_equal(swarm._personal_positions, np.stack([first[0], second[1], first[2]]))
-    assert np.allclose(swarm._personal_violations, [0.5, 0.4, 0.0])
-
-
 def test_bounds_hold_for_every_point_asked():
     bounds = np.array([(-1e-4, 3e-4), (1e6, 1e6 + 1), (-5.0, 0.1), (0.1, 0.3)])
     swarm = ParticleSwarm(bounds, 60, np.random.default_rng(3))
@@ -427,11 +306,6 @@ def test_bounds_hold_for_every_point_asked():
         scaled = (points - bounds[:, 0]) / np.ptp(bounds, axis=1)
         tell(swarm, np.stack([scaled.sum(axis=1), -scaled[:, 0] + scaled[:, 1]], axis=1))
     assert met[:, 0].all()  # optima on a bound are reached exactly
-
-
-def test_a_front_smaller_than_its_objectives_is_refused():
-    with pytest.raises(InputError, match="size"):
-        run(zdt1, 5, 0, 2, size=1)
 
 
 def test_same_seed_same_bits_and_other_seed_other_bits():
@@ -448,14 +322,6 @@ def test_scale_of_the_objectives_does_not_matter():
     scaled = run(lambda x: zdt3(x) * scale, 6, 3, 40)
     assert plain.points.tobytes() == scaled.points.tobytes()
     assert plain.gain == pytest.approx(scaled.gain, abs=1e-12)
-
-
-def test_asking_twice_changes_nothing():
-    swarm = ParticleSwarm(unit(3), 5, np.random.default_rng(0))
-    points = swarm.ask()
-    points[:] = 7.0  # what a caller does with the points is no concern of the swarm
-    assert np.all(swarm.ask() <= 1.0)
-    assert swarm.ask().tobytes() == swarm.ask().tobytes()
 
 
 def test_failed_points_never_enter_the_archive(shift):

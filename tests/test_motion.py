@@ -329,6 +329,7 @@ def check_rates(effects, mech, rates, v):
 @pytest.mark.parametrize(
     ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
+@pytest.mark.shortened(9)
 def test_minimal_accelerations_equal_the_dense_model(topology, effects):
     effects = effects | TOPOLOGIES[topology]
     contacts_met = 0
@@ -353,6 +354,7 @@ def test_minimal_accelerations_equal_the_dense_model(topology, effects):
 @pytest.mark.parametrize(
     ("topology", "effects"), MOTIONS + FURTHER, ids=lambda x: x if isinstance(x, str) else ""
 )
+@pytest.mark.shortened(9)
 def test_power_balance_closes_at_every_instant(topology, effects):
     """Kinetic, potential and stored energy change by what the balance says, state by state."""
     effects = effects | TOPOLOGIES[topology] | {"energies", "series"}
@@ -386,6 +388,7 @@ def test_power_balance_closes_at_every_instant(topology, effects):
     ],
     ids=lambda x: x if isinstance(x, str) else "",
 )
+@pytest.mark.shortened(3)
 def test_baumgarte_accelerations_equal_the_dense_solve(topology, effects):
     """Also where constraints are violated, so that the feedback matters."""
     effects = effects | TOPOLOGIES[topology] | {"baumgarte"}

@@ -56,6 +56,7 @@ def test_a_run_up_is_that_of_the_reduced_inertia(formulation):
 
 @pytest.mark.parametrize("formulation", ["minimal", "baumgarte"])
 @pytest.mark.parametrize("torque", [8.0, [[0.0, 10.0], [np.pi, 4.0], [2 * np.pi, 10.0]]])
+@pytest.mark.shortened(2)
 def test_with_play_the_energy_closes_and_an_ensemble_says_the_same(formulation, torque):
     scene = driven({"numerics.formulation": formulation}, torque=torque)
     response = simulate(scene)

@@ -111,8 +111,6 @@ FILES: dict[Callable[..., None], str] = {
 }  # fmt: skip
 """Each command that writes, and a file that it writes."""
 
-IN_DIRECTORIES = (raw, run, accuracy)
-
 
 def contents(place: Path) -> dict[str, bytes]:
     found = {str(path.relative_to(place)): path for path in sorted(place.rglob("*.nc"))}
@@ -345,13 +343,6 @@ def test_a_response_replaces_no_result_of_a_study(studied):
     done = CliRunner().invoke(cli, words)
     assert isinstance(done.exception, InputError)
     assert (studied / "samples.nc").read_bytes() == before
-
-
-def test_neither_ranks_nor_lanes_are_in_a_key():
-    from hpcclear.ensemble import identity
-
-    for command in ("sample", "run", "accuracy"):
-        assert not {"ranks", "lanes"} & set(identity.run_key(study_scene(), command))
 
 
 # -- names of results -------------------------------------------------------------------------------

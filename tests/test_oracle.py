@@ -77,6 +77,7 @@ WELL_POSED = [
 
 
 @pytest.mark.parametrize(("contact", "clearance", "friction"), WELL_POSED)
+@pytest.mark.shortened(8)
 def test_objective_where_the_problem_is_well_posed(
     contact: dict, clearance: float, friction: float
 ):

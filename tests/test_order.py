@@ -126,10 +126,6 @@ def largest_miss(a: np.ndarray, b: np.ndarray, order: int) -> float:
     )
 
 
-def test_there_are_as_many_trees_as_there_should_be():
-    assert [len(trees(size)) for size in range(1, 10)] == [1, 1, 2, 4, 9, 20, 48, 115, 286]
-
-
 @pytest.mark.parametrize("tableau", TABLEAUS.values(), ids=lambda t: t.name)
 def test_both_solutions_of_a_pair_meet_the_conditions_of_their_orders_and_no_more(tableau: Tableau):
     for weights, order in (

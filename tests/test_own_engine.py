@@ -8,12 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from own_engine import engine
 
 import hpcclear
 from hpcclear.base.objectives import OURS
-from hpcclear.cli import cli
 from hpcclear.cli.printing import describe_samples, describe_statistics
 from hpcclear.cli.response import describe_response
 from hpcclear.cli.terminal import quantity
@@ -21,10 +19,7 @@ from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks.boundary import alone
-from hpcclear.ranks.progress import grouped
-from hpcclear.report import bearings, samples_figure
-from hpcclear.report.html import gallery, sections
-from hpcclear.report.html.content import read
+from hpcclear.report import bearings
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.plausibility import implausible
@@ -47,16 +42,6 @@ def compared(scene, **design):
 def test_responses_are_compared_at_the_plays_of_the_scene():
     assert [compared(engine(), shank=0.4).number(path) for path in PLAYS] == [30e-6, 15e-6]
     assert compared(engine(), play=4e-5).number(PLAYS[0]) == 4e-5
-
-
-def test_responses_are_compared_at_the_play_the_study_names():
-    scene = engine("study.verification.response_clearance=20 um")
-    assert [compared(scene, play=4e-5).number(path) for path in PLAYS] == [20e-6, 20e-6]
-
-
-@pytest.mark.parametrize("job", ["quickstart", "robust_slider_crank"])
-def test_the_papers_jobs_name_the_play_their_responses_are_compared_at(job):
-    assert load_scene(JOBS / f"{job}.toml").study.verification.response_clearance == 3e-4
 
 
 def test_a_response_says_what_was_simulated(tmp_path, monkeypatch):
@@ -125,29 +110,6 @@ def test_streamed_statistics_are_of_the_objective_asked_for(tmp_path):
     describe_samples(run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")))
 
 
-@pytest.mark.parametrize("name", UNITS)
-def test_report_and_summary_call_the_objective_by_its_name(tmp_path, monkeypatch, capsys, name):
-    scene = engine(*QUICK, f"study.objective={name}")
-    made = run_sample(scene, tmp_path / "samples.nc", alone(), options=Options(style="quiet"))
-    describe_samples(made)
-    printed = " ".join(capsys.readouterr().out.split())
-    words = sections.summary(read(tmp_path))["words"]
-    unit = UNITS[name].split("/")[0]
-    assert OURS[name].words in printed
-    assert any(OURS[name].words in one and unit in one for one in words)
-    if name != "mean-gap":
-        assert "clearance circle" not in " ".join([printed, *words])
-        assert " mm" not in printed
-
-
-def test_long_names_say_what_a_variable_drives():
-    found = hpcclear.evaluate(engine(*QUICK), {"m1": [0.05], "play": [30e-6], "shank": [0.4]})
-    meant = "position of the mass centre of the rod, from its first joint"
-    assert found["m1"].attrs["long_name"] == meant
-    assert found["play"].attrs["long_name"] == "radial clearance of the joint crank_rod"
-    assert found["shank"].attrs["long_name"] == "mass of the rod"
-
-
 @pytest.mark.parametrize(
     ("change", "fragments"),
     [
@@ -193,39 +155,6 @@ def test_a_response_holds_the_load_that_was_applied(more):
     assert np.allclose(found.crank_speed, 100 * np.pi)
 
 
-def test_no_load_no_column():
-    assert "slider_load" not in hpcclear.simulate(engine("effects.slider_load=none", study=False))
-
-
-def test_a_run_says_which_stage_of_how_many_it_is_at(tmp_path, monkeypatch, capsys):
-    formula.replace_dynamics(monkeypatch.setattr)
-    run_study(engine(), tmp_path / "out", alone(), progress_style="log")
-    told = re.findall(r"(?m)^stage (\d) of (\d): .+ \(\d+ s so far\)$", capsys.readouterr().err)
-    numbers = [int(number) for number, _ in told]
-    assert {of for _, of in told} == {"4"}  # no sensitivities asked for, nothing of the paper's
-    assert numbers == sorted(numbers)
-    assert set(numbers) == {1, 2, 3, 4}
-    run_study(engine(), tmp_path / "quiet", alone(), progress_style="quiet")
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "shown"),
-    [
-        (29916.0, "N", "29.92 kN"),
-        (6.78e-6, "m", "6.78 µm"),
-        (3e-4, "m", "0.3 mm"),
-        (1.06e11, "Pa", "106 GPa"),
-        (0.0, "m", "0 m"),
-        (np.nan, "m", "nan"),
-    ],
-)
-def test_numbers_in_the_terminal_have_prefixes(value, unit, shown):
-    assert quantity(value, unit) == shown
-    assert grouped(1249.6) == "1 250"
-    assert grouped(3.217) == "3.22"
-
-
 def test_a_peak_between_the_instants_of_the_series_is_said_to_be_one(tmp_path, capsys):
     response = hpcclear.simulate(engine("output.instants_per_revolution=12", study=False))
     describe_response(response, tmp_path / "response.nc")
@@ -238,32 +167,6 @@ def test_a_peak_between_the_instants_of_the_series_is_said_to_be_one(tmp_path, c
         if shown < (1.0 - bearings.MISSED) * peak:
             assert f"averaged revolutions {quantity(shown, 'N')}" in told
     assert "largest stored value" in told  # 12 instants miss one of them at least
-
-
-def test_every_command_that_simulates_warns_of_a_slip(tmp_path):
-    path = tmp_path / "slip.toml"
-    path.write_text(engine("drive.speed=5000", study=False).to_toml())
-    where = str(tmp_path / "out.nc")
-    words = ["--set", "numerics.max_steps=50"]
-    done = CliRunner().invoke(cli, ["simulate", str(path), "-o", where, *words])
-    assert done.stderr.count("47746 rpm") == 1
-
-
-def test_figures_say_at_which_plays_responses_were_simulated():
-    response = hpcclear.simulate(engine(study=False))
-    assert (
-        gallery._clearances(response) == ", at radial clearances of 30 µm in O12 and 15 µm in O23"
-    )
-
-
-def test_the_figure_of_samples_marks_none_as_failed_where_the_scatter_is_not_known(tmp_path):
-    scene = engine(*QUICK, "study.objective=peak-contact-force")
-    found = run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")).content
-    figure = samples_figure(found)
-    crosses = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "x"]
-    assert sum(len(line.get_xdata()) for line in crosses) == 0
-    words = " ".join(text.get_text() for axes in figure.axes for text in axes.texts)
-    assert "not available for this objective" in words
 
 
 def test_a_free_cranks_speed_and_its_drift_are_told(tmp_path, capsys):

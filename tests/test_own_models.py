@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_plugins import install
+from formula_study import PROGRAMS, contents, formula
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
@@ -20,13 +20,9 @@ from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.regression import RegressionMethod
 from hpcclear.statistics.surrogate.stored import models_in
-from hpcclear.study import run_study, surrogates
+from hpcclear.study import run_study
 
-PROGRAMS = Path(__file__).parent / "mpi_programs"
 MPIEXEC = Path(sys.executable).parent / "mpiexec"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
 
 FOREST = """
 from sklearn.ensemble import ExtraTreesRegressor
@@ -77,10 +73,6 @@ def written(folder: Path, model: str = FOREST, search: str = RANDOM) -> Path:
     return folder / "scene.toml"
 
 
-def contents(place: Path) -> dict[str, bytes]:
-    return {p.name: p.read_bytes() for p in sorted(place.glob("*.nc")) if p.name != "timing.nc"}
-
-
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     patch = pytest.MonkeyPatch()
@@ -127,20 +119,6 @@ def test_an_edited_file_is_another_run(results, tmp_path):
     edited = load_scene(written(tmp_path / "edited", FOREST.replace("20", "21")))
     with pytest.raises(InputError, match="mymodels"):
         run_study(edited, results / "out", alone(), progress_style="quiet")
-
-
-def test_an_installed_package_offers_both(tmp_path, monkeypatch):
-    folder = tmp_path / "site"
-    install(folder, "hpcclear.surrogates", "trees", "their_models:Model")
-    (folder / "their_models.py").write_text(FOREST + RANDOM)
-    with (folder / "their_shapes-1.2.dist-info" / "entry_points.txt").open("a") as file:
-        file.write("[hpcclear.searches]\nany = their_models:Random\n")
-    monkeypatch.syspath_prepend(folder)
-    names = ["study.surrogate.model=trees", "study.swarm.algorithm=any"]
-    scene = load_scene(written(tmp_path / "scene"), names)
-    run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
-    found = dataset.read(tmp_path / "out" / "kriging.nc", "kriging")
-    assert found["surrogate"].to_numpy().tolist() == ["trees"]
 
 
 @pytest.mark.parametrize(
@@ -200,13 +178,6 @@ def test_predictions_that_are_none_are_refused(answer, said):
     with pytest.raises(InputError, match=said) as caught:
         leaf.predict(leaf.inputs)
     assert caught.value.key == "study.surrogate.model"
-
-
-def test_a_fit_that_does_not_come_out_again_is_refused():
-    source = np.random.default_rng(0)
-    method = RegressionMethod(lambda: Constant(lambda X: source.random(len(X))), "mine")
-    with pytest.raises(InputError, match="it is two models"):
-        method.restored(fitted(method.source).to_arrays())
 
 
 def test_units_are_taken_off_and_put_on_again():
@@ -318,10 +289,3 @@ def test_an_algorithm_of_pymoo_with_settings_of_ones_own_is_a_search(tmp_path):
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
     front = dataset.read(tmp_path / "out" / "front.nc", "front")
     assert np.isfinite(front["mean"]).sum() > 4
-
-
-def test_the_default_is_kriging_by_name_or_without(tmp_path):
-    scene = load_scene(written(tmp_path / "scene"))
-    for model in (None, "kriging"):
-        found = surrogates.method_of(scene.with_({"study.surrogate.model": model}))
-        assert found.label == ""

@@ -12,9 +12,8 @@ from scipy.integrate import simpson
 
 from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import MEAN_GAP, OF_ALL, OF_JOINTS, OURS, RECORDED, Objective
-from hpcclear.base.outcome import FIELDS, OUTCOME
-from hpcclear.dynamics.laws.objectives import _RANGES, _ROWS, rate_in_lanes
+from hpcclear.base.objectives import Objective
+from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.identity import run_key
 from hpcclear.results import dataset
 
@@ -239,29 +238,3 @@ def test_a_value_that_fails_in_use_names_the_objective():
     with pytest.raises(InputError, match="its value raised KeyError: 'mine'"):
         Objective("", "N", fails, name="mygoals:Fails").of(records)
     assert np.isnan(Objective("", "N", fails).of(records[:1])).all()  # of a failed sample
-
-
-# ---- how they are declared -------------------------------------------------------------------------------------
-def test_every_word_of_a_rate_has_its_row_and_its_range():
-    assert set(_ROWS) == OF_JOINTS.keys() | OF_ALL.keys() >= _RANGES.keys()
-    assert RECORDED.keys() <= FIELDS.keys()
-
-
-def test_ours_are_written_as_a_user_writes_them():
-    assert OURS["mean-gap"] is MEAN_GAP
-    for name, one in OURS.items():
-        assert (one.name, one.rate) == (name, None)
-        assert one.words
-        assert one.asks <= RECORDED.keys()
-
-
-def test_a_rate_in_the_lanes_is_known_by_its_text():
-    def one(normal_force):
-        return 2.0 * normal_force
-
-    def other(normal_force):
-        return 2.0 * normal_force
-
-    first, second = (rate_in_lanes(Objective("", "N", rate=f)) for f in (one, other))
-    assert first == second
-    assert rate_in_lanes(Objective("", "N", rate=one, made="peak")) != first

@@ -11,8 +11,6 @@ from test_loads import INERTIA, PIN, START, STIFFNESS, angle_of, machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.linkage.compiled import module_text
-from hpcclear.dynamics.setup.problem import problem_of
 
 SLIDER_CRANK = Path(__file__).parents[1] / "jobs" / "slider_crank.toml"
 MASS, GRAVITY = 0.5, 9.81
@@ -151,18 +149,6 @@ def test_with_clearance_elsewhere_and_a_free_crank_energies_close():
     assert float(np.abs(found["energy_residual"]).max()) < 1e-7 * work
     loss = np.diff(found["dissipated_energy"].to_numpy())
     assert (loss > -1e-9 * work).all()
-
-
-def test_without_it_nothing_is_compiled(held):
-    for scene, there in (
-        (load_scene(SLIDER_CRANK), False),
-        (load_scene(SLIDER_CRANK).with_({"joints.crank_frame": {"kind": "ideal", "friction": RUBS}}), True),
-    ):  # fmt: skip
-        problem = problem_of(scene)
-        text = module_text(problem.linkage._text(problem.linkage._on._replace(energies=True)), ())
-        assert ("unit_vector" in text) == there
-        bare = module_text(problem.linkage._text(problem.linkage._on), ())
-        assert "unit_vector" not in bare  # friction of the driven crank's pin moves nothing
 
 
 @pytest.mark.parametrize(

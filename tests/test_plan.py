@@ -1,24 +1,18 @@
 """The plan: cost measured on samples, the job that follows from it."""
 
 import re
-import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import hpcclear.accuracy.plan as planning
 from hpcclear.accuracy.plan import Plan, Row, measure
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import OUTCOME
 from hpcclear.cli import cli
-from hpcclear.cli.plan import RESERVE, describe, preview, slurm
+from hpcclear.cli.plan import RESERVE, describe, slurm
 from hpcclear.ensemble.samples import design, sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
-from hpcclear.scene.stages import REPLICATES
-from hpcclear.study import chaos, extent, tolerance
 
 JOBS = Path(__file__).parent.parent / "jobs"
 SCENE = load_scene(JOBS / "hunt_crossley.toml").with_(
@@ -42,13 +36,6 @@ def made() -> Plan:
     return Plan(rows, 100_000, None, 3.0, 400e6, 5)
 
 
-def test_core_seconds_and_wall_time_add_up(made: Plan):
-    assert made.core_seconds(made.rows[0], 100_000, 2) == pytest.approx(200.0 + 6.0)
-    assert made.wall_seconds(made.rows[0], 100_000, 1) == pytest.approx(203.0)
-    assert 100.0 + 3.0 < made.wall_seconds(made.rows[0], 100_000, 2) < 110.0 + 3.0
-    assert made.disk(1000) > 1000 * (OUTCOME.itemsize + 40)
-
-
 def test_the_job_asks_for_enough(made: Plan):
     lines = "\n".join(slurm(made, made.rows[0], 100_000, 2))
     hours, minutes, seconds = map(int, re.search(r"--time=(\d+):(\d+):(\d+)", lines).groups())
@@ -68,27 +55,6 @@ def test_what_is_printed_is_the_row_that_was_asked_for(made: Plan, capsys):
     assert "hpcclear sample jobs/x.toml" in shown
     describe(made, "jobs/x.toml", None, 2)
     assert "target_error" not in capsys.readouterr().out
-
-
-def test_simulations_of_a_study_are_counted():
-    def counted(draws: int, rounds: int) -> int:
-        more = [
-            f"study.verification.{k}={n}"
-            for k, n in (("samples", draws), ("infill_rounds", rounds))
-        ]
-        return sum(extent.samples_of(load_scene(JOBS / "robust_slider_crank.toml", more)).values())
-
-    verified = load_scene(JOBS / "robust_slider_crank.toml").study.verification
-    designs = 2 * (4 + verified.designs + 1) + 4  # printed in the paper's Table 4
-    each = REPLICATES * tolerance.FEW
-    pairs = designs * (each - 10)
-    assert counted(10_000, 0) - counted(10, 0) == designs * 9_990 + pairs
-    rays, swarm = 2 * 6 * 4, 2 * (4 + verified.designs)
-    search = rays + swarm + 2 * 3 * verified.infill_designs
-    beside = (
-        2 * 2 * 2 * (10_000 + each + 2 * chaos.PAIRS)
-    )  # runners-up, and what is believed to be the ends
-    assert counted(10_000, 3) - counted(10_000, 0) == search * verified.infill_samples + beside
 
 
 def test_a_measured_plan_orders_the_ladder_and_names_its_settings():
@@ -136,41 +102,3 @@ def test_core_seconds_of_a_long_run_are_predicted():
     sample_points(scene, points, ranks, stage="long")
     busy = ranks.stage_seconds["long"][0, 0]
     assert plan.rows[0].seconds * count == pytest.approx(busy, rel=0.2)
-
-
-def test_a_forecast_states_how_far_it_holds():
-    records = np.zeros(100, OUTCOME)
-    records["sample"] = np.arange(100)
-    records["rhs_evaluations"] = 1000 + 100 * (-1) ** np.arange(100)
-    share = planning._spread(
-        np.concatenate([records, records])
-    )  # the same samples again tell nothing
-    assert share == pytest.approx(1.96 * 0.1 / 10, rel=0.01)
-    assert np.isnan(planning._spread(records[:1]))
-    text = preview(
-        Plan((Row(None, SCENE, 2e-3, "", share),), 1000, None, 3.0, 400e6, 5, first=True), 1
-    )
-    assert text.startswith(
-        "first look, settings of the file: 2 ms per sample, 1000 simulations take"
-    )
-    assert text.endswith("(± 2 % between designs; probably less: a short batch leaves lanes idle)")
-
-
-def test_the_first_answer_takes_less_than_ten_seconds():
-    """Of processor time, once the motion is compiled; the rest of the ladder refines it."""
-
-    class Answered(Exception):
-        pass
-
-    def show(made):
-        assert made.first
-        raise Answered
-
-    scene = load_scene(JOBS / "quickstart.toml")
-    design(scene, None)
-    for _ in range(2):  # the first time may compile
-        begin = time.process_time()
-        with pytest.raises(Answered):
-            measure(scene, alone(), show=show)
-        spent = time.process_time() - begin
-    assert spent < 8.0  # and some two seconds to start the program

@@ -18,7 +18,6 @@ from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene.planar import Planar
-from hpcclear.scene.points import Points
 from hpcclear.scene.validation import validated
 
 TEXT = """
@@ -177,30 +176,6 @@ def test_the_slider_crank_written_out_starts_where_the_scene_does(changes):
     first = row("contact", scene.effects.contact.law, "stiffness")
     found = [par[0, one.block + first] for one in at.JOINTS[:2]]
     np.testing.assert_allclose(stiffness, found, rtol=1e-15)
-
-
-def test_parameters_of_samples_are_those_of_their_scenes():
-    """Of a template: each entry stands for that of the linkage, lengths and the offset among them."""
-    scene = scene_with(
-        {"mechanism.offset": 0.01, "effects.slider_load": -50.0, "effects.gravity": 9.81}
-    )
-    paths = [
-        f"mechanism.{entry}"
-        for entry in ("offset", "crank.length", "crank.mass_center", "slider.mass")
-    ]
-    paths += [
-        "joints.rod_slider.clearance",
-        "effects.slider_load",
-        "drive.speed",
-        "effects.gravity",
-    ]
-    values = np.array([
-        [0.01, 0.05, 0.025, 0.14, 3e-4, -50.0, 500.0, 9.81],
-        [-0.02, 0.03, 0.01, 0.2, 5e-4, 70.0, 300.0, 1.0],
-    ])  # fmt: skip
-    points = Points(tuple(paths), values, tuple((path,) for path in paths))
-    of_scenes = [parameters(scene.with_(dict(zip(paths, row, strict=True))))[0] for row in values]
-    np.testing.assert_allclose(parameters(scene, points), of_scenes, rtol=1e-12)
 
 
 def test_guide_friction_and_load_are_written_out_too():

@@ -1,6 +1,5 @@
 """Plug-ins by name: from files beside a scene and from installed packages; whose source is run, and when."""
 
-import inspect
 import json
 import subprocess
 import sys
@@ -18,11 +17,11 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.cli.options import remarked
 from hpcclear.ensemble.identity import run_key
-from hpcclear.plugins import KINDS, Registry, run_source, trusting, using
+from hpcclear.plugins import Registry, run_source, trusting, using
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.plugged import UntrustedSource, modules_named
+from hpcclear.scene.plugged import UntrustedSource
 
 QUICKSTART = Path("jobs/quickstart.toml")
 SOURCE = """
@@ -60,10 +59,6 @@ def carrying(source: str = SOURCE) -> dict:
     """The content of a scene that carries Python source."""
     content = load_scene(QUICKSTART).resolved()
     return {**content, "plugins": {"files": {"shapes": {"source": source}}}}
-
-
-def test_every_kind_has_a_group_of_its_own():
-    assert len({one.group for one in KINDS}) == len(KINDS) == 6
 
 
 def test_a_name_is_one_of_ours_a_package_s_or_a_file_s(shapes, tmp_path, monkeypatch):
@@ -130,20 +125,6 @@ def test_files_are_not_looked_for_where_python_looks(shapes, tmp_path, monkeypat
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=r"there is no elsewhere\.py beside the scene file"):
         shapes.get("elsewhere:Mine")
-
-
-def test_two_texts_of_one_name_are_two_modules_whose_lines_can_be_read():
-    first = run_source("shapes", SOURCE)
-    second = run_source("shapes", SOURCE.replace("**2", "**3"))
-    assert run_source("shapes", SOURCE) is first
-    assert (first.Mine(2.0).area(), second.Mine(2.0).area()) == (4.0, 8.0)
-    assert "self.size**2" in inspect.getsource(first.Mine.area)
-    assert "self.size**3" in inspect.getsource(second.Mine.area)
-
-
-def test_references_are_found_wherever_they_stand():
-    content = {"a": [{"b": "mylaws:Mine"}, "12:30"], "c": "no reference: here", "d": ("x:Y",)}
-    assert modules_named(content) == {"mylaws", "x"}
 
 
 def test_source_that_a_scene_carries_counts_and_is_not_run_unasked():

@@ -12,19 +12,16 @@ from test_figures import _other_goals
 
 from hpcclear import load_scene, report
 from hpcclear.base.errors import InputError
-from hpcclear.base.outcome import Flag
 from hpcclear.cli import cli
 from hpcclear.cli.response import describe_response
 from hpcclear.ranks.stopping import Stopped
-from hpcclear.report import bearings
 from hpcclear.report.answer import answer
-from hpcclear.report.figures import fits, labels, motion
-from hpcclear.report.html import gallery, picture
+from hpcclear.report.figures import labels, motion
+from hpcclear.report.html import picture
 from hpcclear.report.html.content import Content
 
 ROOT = Path(__file__).parent.parent
 SLIDER_CRANK = ROOT / "jobs" / "slider_crank.toml"
-FOUR_BAR = ROOT / "jobs" / "linkages" / "crank_rocker.toml"
 
 
 # -- launchers, and early stops -----------------------------------------------------------------------
@@ -99,31 +96,11 @@ def test_first_order_and_total_indices_stand_apart_with_their_errors():
     assert "may exceed 100 %" in whole
 
 
-def test_indices_that_are_hardly_known_say_what_to_raise():
-    vague = lines_of(sensitivity=indices([0.3, 0.2], [0.6, 0.7], error=0.2))
-    assert any("study.sensitivity.sobol_samples" in text for text in vague["warning"])
-    assert "warning" not in lines_of(sensitivity=indices([0.3, 0.2], [0.6, 0.7]))
-
-
 def badly_fitted() -> tuple[xr.Dataset, xr.Dataset]:
     surfaces, models = data.sensitivity(), data.kriging()
     surfaces["r2"][0, 0, 2] = -0.31
     models["r2"][0] = 0.69
     return surfaces, models
-
-
-@pytest.mark.parametrize(
-    ("r2", "words"),
-    [
-        (0.95, ""),
-        (0.69, "indicative only"),
-        (-0.31, "worse than a constant"),
-        (np.nan, "not known"),
-    ],
-)
-def test_a_fit_has_a_verdict(r2, words):
-    assert words in fits.verdict(r2)
-    assert bool(fits.verdict(r2)) == bool(words)
 
 
 @pytest.mark.parametrize(
@@ -141,17 +118,6 @@ def test_a_figure_of_a_poor_fit_says_so_across_its_panel(draw, which, words):
     assert any(words in text for text in told)
     told = [text.get_text() for panel in draw(good).axes for text in panel.texts]
     assert not any("constant" in text or "indicative" in text for text in told)
-
-
-def test_captions_and_the_answer_name_surrogates_that_do_not_fit():
-    surfaces, models = badly_fitted()
-    files = {"sensitivity": surfaces, "kriging": models}
-    drawn = [what for what, _ in gallery._drawings(content(files))]
-    assert sum("worse than a constant" in text for text in drawn) == 2
-    assert sum("R² = 0.69" in text for text in drawn) == 2
-    told = " ".join(lines_of(**files)["warning"])
-    assert "response surface in m2, m3: R² = -0.31, worse than a constant" in told
-    assert "Kriging model in m2, m3, C: R² = 0.69" in told
 
 
 # -- the front on the page -----------------------------------------------------------------------------
@@ -192,13 +158,6 @@ def test_the_front_on_the_page_shows_the_two_objectives_of_its_case():
     assert ["m2 + m3", labels.quantity(float(one["second_true"]), "")] in beta["direct"]
 
 
-def test_a_plain_front_shows_mean_and_deviation():
-    shown = picture.front(content({"front": data.front(), "verification": data.verification()}))
-    assert shown["x"].startswith("mean of f")
-    assert shown["y"].startswith("standard deviation of f")
-    assert "axes" not in shown
-
-
 # -- one response --------------------------------------------------------------------------------------
 
 
@@ -214,12 +173,6 @@ def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys):
     shown = " ".join(capsys.readouterr().out.split())
     assert "largest stored value of the averaged revolutions 1 kN" in shown
     assert "2 kN" not in shown
-
-
-def test_a_joint_that_flew_is_not_said_to_have_never_left_contact():
-    (text,) = bearings.flag_remarks(Flag.LATCHED)
-    assert "never" not in text
-    assert "at least one averaged revolution" in text
 
 
 @pytest.mark.parametrize("flights", [0, 1, 2, 5, 100, 400, 1999, 2000])

@@ -12,7 +12,7 @@ import pytest
 from patience import crowded
 
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ranks.progress import Progress, duration, launching_terminal, log_interval
+from hpcclear.ranks.progress import Progress
 
 PROGRAM = pathlib.Path(__file__).parent / "mpi_programs" / "bar.py"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
@@ -64,17 +64,6 @@ def test_what_an_earlier_run_did_counts_as_done_but_not_as_fast():
     ]
 
 
-def test_the_rate_forgets_after_half_a_minute():
-    clock, log = Clock(), io.StringIO()
-    progress = Progress("", "log", 5.0, log, clock)
-    progress.start(10_000, records(0))
-    for rate in [100] * 60 + [1] * 60:
-        clock.now += 1.0
-        progress.add(records(rate))
-        progress.refresh()
-    assert log.getvalue().splitlines()[-1].split(", ")[1] == "1 samples/s"
-
-
 def test_quiet_writes_nothing_and_an_empty_design_is_complete():
     log = io.StringIO()
     for style in ("quiet", "log"):
@@ -82,39 +71,6 @@ def test_quiet_writes_nothing_and_an_empty_design_is_complete():
         progress.start(0, records(0))
         progress.close()
     assert log.getvalue() == "none: 0/0 (100 %), 0 samples/s in 0 s\n"
-
-
-def test_a_stream_that_is_no_terminal_gets_a_log():
-    log = io.StringIO()
-    progress = Progress("sampling", "auto", 0.0, log, Clock())
-    progress.start(2, records(1))
-    progress.refresh()
-    progress.close()
-    assert "\x1b" not in log.getvalue()
-    assert log.getvalue().count("sampling: 1/2 (50 %)") == 2
-
-
-def test_a_bar_shows_the_numbers():
-    clock, screen = Clock(), io.StringIO()
-    progress = Progress("sampling", "bar", None, screen, clock)
-    progress.start(10, records(0))
-    progress.add(records(10, failed=3))
-    clock.now += 2.0
-    progress.close()
-    assert "10/10 (100 %), 3 failed, 5 samples/s" in screen.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0.4, "0 s"), (59.7, "1:00 min"), (185.0, "3:05 min"), (3723.0, "1:02:03 h")],
-)
-def test_durations_read_naturally(seconds, text):
-    assert duration(seconds) == text
-
-
-def test_batch_logs_stay_short():
-    assert log_interval({"SLURM_JOB_ID": "12"}) == 30.0
-    assert log_interval({}) == 5.0
 
 
 def run_on_a_terminal(command: list[str], errors: int | None = None) -> str:
@@ -159,7 +115,3 @@ def test_errors_sent_to_a_file_get_a_log_even_at_a_terminal(launch, tmp_path):
     assert seen == ""
     assert "\x1b" not in (tmp_path / "log").read_text()
     assert (tmp_path / "log").read_text().count("sampling: ") >= 3
-
-
-def test_no_terminal_is_looked_for_without_a_launcher():
-    assert launching_terminal() is None

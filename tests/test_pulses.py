@@ -97,6 +97,7 @@ WIDTHS = (30.0, 10.0, 3.0, 1.0, 0.3)  # deg
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.shortened(2)
 def test_work_of_a_pulse_is_its_virtual_work(kind):
     for number, width in enumerate(WIDTHS):
         at = (5.0, 100.0, 203.0, 307.3, 61.7)[(number + KINDS.index(kind)) % 5]

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 from margins import at_most
 from scipy import stats
-from scipy.integrate import quad
 from scipy.special import gamma
 
-from hpcclear.base import quantiles
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.sampling import latin_hypercube, monte_carlo, sampled
-from hpcclear.statistics.random.rules import kernel_integral, rule
 from hpcclear.statistics.surrogate.kernels import MATERN, SQUARED_EXPONENTIAL, Kernel
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.piecewise import Piecewise
@@ -271,45 +268,7 @@ def test_every_method_correlates(method: str) -> None:
     assert abs(_correlation(points.column("m2"), points.column("u2"))) < 0.06
 
 
-def test_the_first_input_and_those_outside_keep_their_numbers() -> None:
-    plain = monte_carlo(ROBUST, 50, design=DESIGN)
-    mixed = monte_carlo(ROBUST.with_({"study.correlation": MOULD}), 50, design=DESIGN)
-    for name in ("m3", "u2", "I2"):
-        assert (plain.column(name) == mixed.column(name)).all()
-    assert (plain.column("m2") != mixed.column("m2")).all()
-    alone = monte_carlo(
-        ROBUST.with_({"study.correlation": MOULD}), 50, random=("m2",), design=DESIGN
-    )
-    assert (plain.column("m2") == alone.column("m2")).all()
-
-
 # --- moments of surrogates -----------------------------------------------------------------------
-
-LAWS = {
-    "lognormal": quantiles.lognormal(0.5, 0.1, 0.2, 1.4),
-    "weibull": quantiles.weibull(0.5, 2.2, 0.3),
-    "beta": quantiles.beta((2.5, 4.0), -1.0, 2.0),
-}
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_rules_and_kernel_integrals_agree_with_quadrature(name: str) -> None:
-    law = LAWS[name]
-    low, high = law.chances
-    for length, centre in ((0.3, 0.4), (1.0, 0.9)):
-
-        def kernel(x: np.ndarray, c: float = centre, h: float = length) -> np.ndarray:
-            return np.exp(-0.5 * ((x - c) / h) ** 2)
-
-        exact = quad(lambda x: kernel(x) * law.whole.pdf(x), *law.span, epsabs=1e-11, limit=200)[
-            0
-        ] / (high - low)
-        np.testing.assert_allclose(
-            kernel_integral(law, np.array([centre]), length)[0], exact, atol=1e-7
-        )
-        nodes, weights = rule(law, 16)
-        assert weights.sum() == pytest.approx(1.0)
-        np.testing.assert_allclose(weights @ kernel(nodes), exact, atol=1e-5)
 
 
 def _model(scene: Scene, length: float = 1.2, kernel: Kernel = SQUARED_EXPONENTIAL) -> Piecewise:
@@ -326,19 +285,6 @@ def _model(scene: Scene, length: float = 1.2, kernel: Kernel = SQUARED_EXPONENTI
         kernel=kernel,
     )  # fmt: skip
     return Piecewise((leaf,), np.ones(1), np.zeros(1), np.array([True]))
-
-
-def test_a_model_that_found_noise_is_averaged_by_draws() -> None:
-    """No rule has nodes enough for length scales of a hundredth: a study of rattling linkages stopped there."""
-    wide = {"study.random.C": {"distribution": "uniform", "range": ["0.3 mm", "1 mm"]}}
-    scene = ROBUST.with_(wide)
-    problem = problem_of(scene, "robust", _model(scene, 0.01))
-    design = np.array([[DESIGN[name] for name in problem.names]])
-    moments = problem.objective(design)
-    assert np.isfinite(moments).all()
-    np.testing.assert_array_equal(
-        problem.objective(design), moments
-    )  # the same draws for every design
 
 
 @pytest.mark.parametrize(

@@ -12,14 +12,10 @@ from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
-from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
-from hpcclear.scene.stages import Verification
 from hpcclear.statistics.random import indices, tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare, reach
-from hpcclear.statistics.random.replicates import Limited
 from hpcclear.study import edge, rare, verdicts
-from hpcclear.study.verdicts import Standing
 
 # -- indices ----------------------------------------------------------------------------------------
 
@@ -31,13 +27,6 @@ def test_an_index_is_extrapolated_beyond_the_largest_value(exact, shift):
     found = tail.index(5.0 + 2.0 * rng.standard_normal((200, 256)), 5.0 + 2.0 * exact)
     assert found.mean() == pytest.approx(exact, abs=0.12)
     assert found.std() < 0.6
-
-
-def test_values_that_do_not_scatter_are_on_one_side():
-    np.testing.assert_array_equal(tail.index(np.full((1, 20), 1.0), 2.0), [tail.MOST])
-    np.testing.assert_array_equal(tail.index(np.full((1, 20), 3.0), 2.0), [-tail.MOST])
-    assert tail.of_share(0.0) == tail.MOST
-    assert tail.of_share(1e-3) == pytest.approx(3.0902, abs=1e-4)
 
 
 # -- probabilities ----------------------------------------------------------------------------------
@@ -156,39 +145,6 @@ def test_where_weights_are_worth_nothing_all_draws_are_plain_and_count(limit, be
         assert not estimated(f, dimensions, 3.1, 1).plain
 
 
-def test_what_the_tolerance_takes_of_plain_draws_is_part_of_their_interval():
-    made, choice = Rare(3, 6.0, 1e-12, (5, 8192)), SimpleNamespace(case="made")
-    answered(made.prepared(np.random.default_rng(1)), chaotic)
-    one, wider = (
-        rare._interval(rare.Failing(choice, None, (), by), made, 0.95) for by in (0.0, 1e-4)
-    )
-    assert (wider.lower, wider.upper) == pytest.approx((one.lower - 1e-4, one.upper + 1e-4))
-
-
-def test_open_constraints_are_sampled_with_what_plain_samples_and_pairs_say(monkeypatch):
-    goal = Constraint(statistic="exceedance", limit=1.0, most=1e-3)
-    case = SimpleNamespace(goals=(None,), kept=(goal, goal))
-    study = SimpleNamespace(case=lambda name: case, verification=Verification())
-    run, asked = SimpleNamespace(study=study), []
-
-    def met(run, failing, many, stage, purpose):
-        asked.extend(failing)
-        return [
-            rare.Found(*[Limited(2e-3, np.zeros(2), 1e-3, 3e-3)] * 2, 7, 9, 0.0) for _ in failing
-        ]
-
-    monkeypatch.setattr(rare, "probabilities", met)
-    monkeypatch.setattr(verdicts, "decided", lambda run, choices, true: true)
-    true = {name: np.full((1, 2), 1e-3) for name in ("sure_lower", "sure_upper", "counted")}
-    true |= {name: np.array([[5.0, 1e-3, 2e-3]]) for name in ("goal", "goal_lower", "goal_upper")}
-    true |= {"samples": np.array([4096]), "failed": np.array([96]), "taken": np.array([[0.1, 0.2]])}
-    true["standing"] = np.array([[Standing.KEPT, Standing.UNDECIDED]])
-    choice = SimpleNamespace(case="made")
-    found = rare.decided(run, [choice], true, "edge")
-    assert asked == [rare.Failing(choice, goal, (8, 4000), 0.2)]
-    assert (found["counted"][0, 1], found["rare_samples"][0], found["goal"][0, 2]) == (9, 7, 2e-3)
-
-
 def test_values_that_failed_are_left_out_and_weights_are_bounded():
     def failing(u):
         return np.where(u[:, 2] > 0.0, np.nan, plane(u[:, :2]))
@@ -236,14 +192,6 @@ def test_draws_of_many_designs_show_level_and_slopes_of_an_index(shift):
     np.testing.assert_allclose(model(ends), 3.0 - ends @ [8.0, -4.0], atol=0.15)
     nothing = indices.fitted(places, np.zeros(8192), 1e-3)
     assert (nothing(ends) > 4.0).all()  # no draw fails: safer than what is asked
-
-
-def test_a_polynomial_follows_values_that_are_known():
-    bounds = np.array([[0.0, 2.0], [1.0, 5.0]])
-    at = np.random.default_rng(3).uniform(*bounds.T, (40, 2))
-    values = 1.0 + 2.0 * at[:, 0] - at[:, 0] * at[:, 1]
-    model = indices.quadratic(at, np.where(at[:, 0] < 0.2, np.nan, values), bounds)
-    np.testing.assert_allclose(model(at), values, atol=0.05)
 
 
 # -- a study ----------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import pytest
 from commands import SCENE
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.check import _study_rows
 from hpcclear.ensemble.maps import axis
 from hpcclear.identify.inputs import Unknown
 from hpcclear.scene import load_scene
@@ -225,13 +224,6 @@ def test_a_load_s_entry_is_read_and_printed_in_the_unit_of_its_kind(kind, entry,
     place = tmp_path / "points.csv"
     place.write_text(f"own [k{unit}]\n0.5\n", encoding="utf-8")
     assert read_points(place, scene).values[0, 0] == pytest.approx(500.0)
-
-
-def test_check_prints_a_spring_in_newtons_per_metre():
-    path = "mechanism.loads.return_spring.stiffness"
-    table = {"variables": {"spring": {"path": path, "range": ["50 N/m", "600 N/m"]}}, "samples": 40}
-    rows = dict(_study_rows(QUICK_RETURN.with_({"study": table})))
-    assert rows["spring"].startswith("50 N/m to 600 N/m: ")
 
 
 # ---- units of our own table -------------------------------------------------------------------------

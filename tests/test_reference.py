@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from running import integrate, kept_steps
 
-from hpcclear.base.errors import InputError
-from hpcclear.dynamics.evaluation import evaluate_records, evaluator
+from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.setup.parameters import parameters
@@ -130,6 +129,7 @@ def test_order_of_samples_does_not_change_one_bit():
     assert alone == [forward[7]]
 
 
+@pytest.mark.nightly
 def test_the_number_of_lanes_does_not_change_one_bit():
     scene = paper_case(LATCHED, 0.3e-3, 0, 1, rtol=1e-6).with_(
         {"numerics.energy": True, "numerics.responses": True}
@@ -140,27 +140,6 @@ def test_the_number_of_lanes_does_not_change_one_bit():
     for records in others:
         for name in records.dtype.names:
             assert records[name].tobytes() == one[name].tobytes(), name
-
-
-def test_lanes_fit_the_processor_or_the_environment(monkeypatch):
-    monkeypatch.delenv("HPCCLEAR_LANES", raising=False)
-    for doubles, kib, lanes in (
-        (8, 48, 32),
-        (8, 64, 32),
-        (8, 32, 16),
-        (8, 8, 16),
-        (4, 48, 16),
-        (2, 32, 16),
-    ):
-        monkeypatch.setattr(evaluator, "doubles_in_a_vector", lambda doubles=doubles: doubles)
-        monkeypatch.setattr(evaluator, "first_level_cache", lambda kib=kib: kib * 1024)
-        assert evaluator.default_lanes() == lanes
-    monkeypatch.setenv("HPCCLEAR_LANES", "24")
-    assert evaluator.default_lanes() == 24
-    for wrong in ("0", "many", "-8", "2000", "1.5"):
-        monkeypatch.setenv("HPCCLEAR_LANES", wrong)
-        with pytest.raises(InputError, match="HPCCLEAR_LANES"):
-            evaluator.default_lanes()
 
 
 @pytest.mark.parametrize("budgets", [(1,), (7, 64, 1, 3)])
@@ -206,6 +185,7 @@ def ideal_slider(scene: Scene, time: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("contact", [HUNT_CROSSLEY, LATCHED], ids=lambda c: c["law"])
+@pytest.mark.shortened(1)
 def test_motion_tends_to_the_ideal_mechanism(contact: dict):
     """Slowly, so that penetration stays below the clearance: the joints hold within about c."""
     for clearance in (1e-3, 1e-4, 1e-5):

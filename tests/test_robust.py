@@ -77,14 +77,6 @@ CASES = pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:
 
 
 @pytest.mark.parametrize("distribution", SCIPY, ids=str)
-def test_draws_follow_the_distribution(distribution):
-    draws = rules.draw(distribution, 20_000, np.random.default_rng(0))
-    assert stats.kstest(draws, SCIPY[distribution].cdf).pvalue > 0.01
-    low, high = distribution.span
-    assert low <= draws.min() <= draws.max() <= high
-
-
-@pytest.mark.parametrize("distribution", SCIPY, ids=str)
 def test_rule_integrates_polynomials(distribution):
     """N nodes are exact to degree 2 N - 1 (a normal's support is cut at 6 deviations)."""
     oracle = SCIPY[distribution]
@@ -121,25 +113,6 @@ def test_kernel_integral(distribution):
             assert value == pytest.approx(exact, rel=1e-8, abs=3e-9)
 
 
-@pytest.mark.parametrize("distribution", SCIPY, ids=str)
-def test_pieces_add_up(distribution):
-    edges = np.array([-np.inf, -3.5, 0.0, 1.6, 2.2, 4.3, np.inf])
-    nodes, weights = rules.pieces(distribution, 40, edges[:-1], edges[1:])
-    assert weights.sum() == pytest.approx(1.0, abs=1e-8)
-    cdf = SCIPY[distribution].cdf(edges)
-    np.testing.assert_allclose(weights.sum(axis=1), np.diff(cdf), atol=1e-8)
-    assert (weights * nodes).sum() == pytest.approx(SCIPY[distribution].mean(), abs=1e-7)
-
-
-def test_nodes_are_as_few_as_the_tolerance_allows():
-    even = Uniform(0.0, 0.5)
-    counts = [rules.nodes_needed(even, length, 1e-8, 48) for length in (0.1, 0.3, 1.0, 10.0, 100.0)]
-    assert counts == sorted(counts, reverse=True)
-    assert counts[-1] == 2
-    assert rules.nodes_needed(even, 1.0, 1e-4, 48) < rules.nodes_needed(even, 1.0, 1e-12, 48)
-    assert rules.nodes_needed(even, 1e-3, 1e-8, 48) == 0
-
-
 # Standard errors
 
 
@@ -163,14 +136,6 @@ def test_standard_errors_are_honest(shift):
         at_most(covered.mean(), 0.98)
 
 
-def test_few_or_equal_samples():
-    with pytest.raises(InputError, match="too few"):
-        sample_moments(np.zeros((1, 3)))
-    found = sample_moments(np.full((2, 9), 4.0))
-    assert (found.deviation == 0).all()
-    assert (found.deviation_error == 0).all()
-
-
 # The three routes
 
 
@@ -183,17 +148,6 @@ def test_quadrature_is_the_closed_form(inputs):
     assert abs(found[:, 1] / exact[:, 1] - 1).max() < 1e-5
     finer = RobustObjective(surrogate(), DESIGN, inputs, tolerance=1e-12)(places)
     assert abs(finer / exact - 1).max() < 2e-7
-
-
-@CASES
-def test_quadrature_agrees_with_a_million_samples(inputs):
-    objective = RobustObjective(surrogate(), DESIGN, inputs)
-    places = designs(2)
-    found = objective(places)
-    sampled = objective.monte_carlo(places, 1_000_000, np.random.default_rng(3))
-    assert (abs(found[:, 0] - sampled.mean) < 3 * sampled.mean_error).all()
-    assert (abs(found[:, 1] - sampled.deviation) < 3 * sampled.deviation_error).all()
-    assert (sampled.deviation_error < 2e-3 * sampled.deviation).all()
 
 
 def test_moments_of_the_predictor_by_brute_force():
@@ -220,24 +174,6 @@ def test_nothing_random_about_the_design_or_at_all():
     assert calm(places[:0]).shape == (0, 2)
 
 
-def test_a_design_does_not_depend_on_its_batch():
-    for inputs in (UNIFORM, NORMAL[:1]):
-        objective = RobustObjective(surrogate(), DESIGN, inputs)
-        places = designs(13)
-        alone = np.concatenate([objective(place[None]) for place in places])
-        assert (alone == objective(places)).all()
-
-
-def test_monte_carlo_objective():
-    arguments = (surrogate(), DESIGN, UNIFORM)
-    by_chance = [
-        RobustObjective(*arguments, draws=(4000, np.random.default_rng(0))) for _ in range(2)
-    ]
-    places = designs(4)
-    assert (by_chance[0](places) == by_chance[1](places)).all()
-    np.testing.assert_allclose(by_chance[0](places), RobustObjective(*arguments)(places), rtol=0.1)
-
-
 # Inputs that are derived: trained in r = I / m, tolerances in I and m
 
 RATIO = (Derived("r", ("I", "m"), lambda inertia, mass: inertia / mass),)
@@ -259,40 +195,6 @@ def test_derived_inputs_agree_with_a_fine_rule_and_with_samples():
     sampled = objective.monte_carlo(places[:2], 1_000_000, np.random.default_rng(4))
     assert (abs(found[:2, 0] - sampled.mean) < 3 * sampled.mean_error).all()
     assert (abs(found[:2, 1] - sampled.deviation) < 3 * sampled.deviation_error).all()
-
-
-def test_a_map_over_all_inputs_is_the_product_rule():
-    """One group of everything, that is, no use made of the product, gives the same."""
-    everything = tuple(
-        Derived(f"all_{name}", NAMES, lambda *v, k=k: v[k] + 0 * sum(v))
-        for k, name in enumerate(NAMES)
-    )
-    mapped = RobustObjective(
-        surrogate(names=tuple(one.name for one in everything)),
-        DESIGN,
-        UNIFORM,
-        derived=everything,
-        probes=designs(5),
-    )
-    direct = RobustObjective(surrogate(), DESIGN, UNIFORM)
-    places = designs(3)
-    assert abs(mapped(places) / direct(places) - 1).max() < 1e-6
-
-
-def test_derived_inputs_that_do_not_scatter():
-    model = surrogate(names=RATIO_NAMES, upper=RATIO_UPPER)
-    objective = RobustObjective(model, DESIGN, UNIFORM[:1], derived=RATIO)
-    places = designs(3)
-    ratio = np.column_stack([places[:, 0], places[:, 1], places[:, 2] / places[:, 0]])
-    plain = RobustObjective(model, ("m", "u", "r"), UNIFORM[:1])(ratio)
-    np.testing.assert_allclose(objective(places), plain, rtol=1e-12)
-
-
-def test_derived_inputs_need_probes_and_have_no_closed_form():
-    with pytest.raises(InputError, match="give designs"):
-        in_ratio(probes=None)
-    with pytest.raises(InputError, match="no closed form"):
-        in_ratio().closed_form(designs(1))
 
 
 def test_derived_support_must_stay_inside():
@@ -330,27 +232,6 @@ def test_piecewise_model_is_integrated_piece_by_piece(inputs):
     assert abs(finer(places) / found - 1).max() < 1e-6
 
 
-def test_piecewise_with_derived_inputs_takes_monte_carlo():
-    leaves = tuple(
-        surrogate(names=RATIO_NAMES, lower=lower, upper=upper)
-        for lower, upper in [
-            (LOWER, np.array([1.5, *RATIO_UPPER[1:]])),
-            (np.array([1.5, *LOWER[1:]]), RATIO_UPPER),
-        ]
-    )
-    model = Piecewise(leaves, np.ones(2), np.zeros(2), np.ones(2, bool))
-    with pytest.raises(InputError, match="derived on a piecewise model"):
-        RobustObjective(model, DESIGN, UNIFORM, derived=RATIO, probes=designs(3))
-    objective = RobustObjective(
-        model,
-        DESIGN,
-        UNIFORM,
-        derived=RATIO,
-        draws=(1000, np.random.default_rng(0)),
-    )
-    assert np.isfinite(objective(designs(3))).all()
-
-
 # Refusals
 
 
@@ -378,16 +259,6 @@ def test_an_input_over_many_length_scales_is_refused():
 
 
 # A kernel that is no product of its inputs
-
-
-def test_matern_has_no_tensor_rule_and_no_closed_form():
-    rough = replace(surrogate(), kernel=MATERN)
-    with pytest.raises(InputError, match="not a product") as caught:
-        RobustObjective(rough, DESIGN, UNIFORM[:1])
-    assert caught.value.key == "surrogate"
-    averaged = RobustObjective(rough, DESIGN, UNIFORM[:1], draws=(64, np.random.default_rng(0)))
-    with pytest.raises(InputError, match="no closed form"):
-        averaged.closed_form(designs(1))
 
 
 def test_moments_under_matern_are_those_of_a_dense_grid():

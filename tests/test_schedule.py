@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hpcclear.ranks.leading import WorkQueue
-from hpcclear.ranks.schedule import QUANTUM, HandOut, Need, allot
+from hpcclear.ranks.schedule import QUANTUM, HandOut
 
 
 class SimulatedWorker:
@@ -98,96 +98,12 @@ def test_expensive_samples_at_the_end_of_a_table_are_shared():
     assert simulate(np.sort(tenfold(12000, 0.005)), 2, 1) > 0.97
 
 
-def test_expensive_samples_at_the_start_of_a_table_are_shared():
-    assert simulate(np.sort(tenfold(12000, 0.005))[::-1].copy(), 2, 1) > 0.97
-
-
 def test_many_ranks_stay_busy():
     assert simulate(tenfold(64 * 400, 0.05), 64, 1) > 0.95
 
 
-@pytest.mark.parametrize("rate", [0.0, 0.5, 1e4])
-@pytest.mark.parametrize("lanes", [1, 16])
-@pytest.mark.parametrize("ranks", [1, 2, 10_000])
-def test_a_block_is_never_empty_while_something_remains_and_never_more(ranks, lanes, rate):
-    for remaining in (1, 2, 17, 1000, 10**6):
-        for pending in (0, lanes, 3 * lanes):
-            size, ask_below = allot(remaining, ranks, Need(lanes, pending, rate))
-            assert 1 <= size <= remaining
-            assert ask_below >= lanes
-    assert allot(0, ranks, Need(lanes, 0, rate)).size == 0
-
-
-def test_blocks_shrink_towards_the_end():
-    sizes = []
-    remaining = 10_000
-    while remaining:
-        sizes.append(allot(remaining, 4, Need(1, 0, 1e4)).size)
-        remaining -= sizes[-1]
-    assert sizes == sorted(sizes, reverse=True)
-    assert sizes[-4:] == [1, 1, 1, 1]
-
-
-def test_a_rank_that_starts_gets_its_lanes_filled_and_few_samples_are_shared():
-    assert allot(10_000, 2, Need(16, 0, 0.0)).size == 32
-    assert allot(16, 2, Need(16, 0, 0.0)).size == 8
-
-
 def records(samples: list[int]) -> np.ndarray:
     return np.array([(sample,) for sample in samples], [("sample", np.int64)])
-
-
-def test_hand_out_leaves_out_what_is_completed_and_ends_when_all_is_back():
-    book = HandOut(6, np.array([1, 4]), 1)
-    handed = []
-    while book.remaining:
-        handed += book.grant(Need(2, 0, 0.0))[0].tolist()
-    assert handed == [0, 2, 3, 5]
-    book.accept(records([5, 0, 3]))
-    assert (book.outstanding, book.done) == (1, False)
-    book.accept(records([2]))
-    assert book.done
-
-
-def test_who_hands_out_knows_that_the_end_is_near():
-    book = HandOut(1000, np.empty(0, np.int64), 2)
-    near = []
-    while book.remaining:
-        book.grant(Need(4, 0, 500.0))
-        near.append((book.remaining, book.ending))
-    assert [ending for left, ending in near] == [0 < left <= 300 for left, _ in near]
-    assert 0.2 < np.mean([ending for _, ending in near]) < 1.0
-    unknown = HandOut(1000, np.empty(0, np.int64), 2)
-    assert not unknown.ending
-
-
-def test_the_pace_of_a_stage_is_known_to_the_next_like_it():
-    recent = np.zeros(2)
-    for expected in (0.0, 10.0):
-        worker = SimulatedWorker(1)
-        queue = WorkQueue(worker, lambda worker=worker: worker.now, recent)
-        assert queue.need.rate == pytest.approx(expected)
-        queue.take(np.arange(20), np.column_stack([np.full(20, 0.1)]).ravel(), 1)
-        while not queue.idle:
-            queue.work(1.0)
-
-
-def test_a_rank_looks_out_before_it_is_hungry():
-    worker = SimulatedWorker(1)
-    queue = WorkQueue(worker, lambda: worker.now, np.array([1000.0, 1.0]))  # a thousand a second
-    queue.take(np.arange(200), np.full(200, 1e-3), 10)
-    assert not queue.soon_hungry
-    queue.work(0.15)  # 50 are left, which it finishes within two quanta
-    assert not queue.hungry
-    assert queue.soon_hungry
-    queue.exhausted = True
-    assert not queue.soon_hungry
-
-
-@pytest.mark.parametrize("completed", [[3], [-1], [1, 1]])
-def test_completed_samples_that_do_not_fit_the_design_are_refused(completed):
-    with pytest.raises(ValueError, match="complet"):
-        HandOut(3, np.array(completed), 1)
 
 
 def test_a_desk_knows_its_samples_when_the_worker_raises():

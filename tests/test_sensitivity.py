@@ -8,7 +8,6 @@ from margins import FALSE_RED, at_least, at_most, fewest, most
 from SALib.test_functions import Ishigami, Sobol_G
 from scipy import stats
 
-from hpcclear.base.errors import InputError
 from hpcclear.statistics.sensitivity import (
     Influence,
     IntervalSettings,
@@ -62,28 +61,6 @@ def sobol_indices(
 # the design ---------------------------------------------------------------------------------------
 
 
-def test_intervals_shrink_together_about_their_midpoints() -> None:
-    design = design_intervals(
-        BOUNDS, CLEARANCES, np.random.default_rng(0), IntervalSettings(steps=5, shrink=0.2)
-    )
-    assert design.intervals.shape == (5, 2, 2)
-    np.testing.assert_array_equal(design.intervals[0], BOUNDS)
-    np.testing.assert_allclose(design.intervals.mean(axis=2), np.tile(MIDDLE, (5, 1)), rtol=1e-14)
-    lengths = np.ptp(design.intervals, axis=2) / np.ptp(BOUNDS, axis=1)
-    np.testing.assert_allclose(lengths, np.outer(0.8 ** np.arange(5), [1, 1]), rtol=1e-12)
-    blocks = design.points.reshape(5, 3, 50, 3)
-    assert (blocks[..., 2] == CLEARANCES[:, np.newaxis]).all()
-    inside = blocks[..., :2] - design.intervals[:, np.newaxis, np.newaxis, :, 0]
-    assert (inside >= 0).all()
-    assert (inside <= np.ptp(design.intervals, axis=2)[:, np.newaxis, np.newaxis]).all()
-    assert len(np.unique(design.points, axis=0)) == len(design.points)  # every surface its own
-
-
-def test_refuses_points_that_leave_nothing_for_scatter() -> None:
-    with pytest.raises(InputError, match="n_points"):
-        history(curved, n_points=10)
-
-
 # midpoint sensitivity -----------------------------------------------------------------------------
 
 
@@ -101,14 +78,6 @@ def test_midpoint_sensitivity_of_a_cubic_is_exact_at_every_clearance() -> None:
     assert (found.failed == 0).all()
     verdict = convergence_intervals(found)
     assert not verdict.found.any()  # one interval shows no convergence
-
-
-def test_a_cubic_converges_at_once() -> None:
-    verdict = convergence_intervals(history(lambda p: p[:, 2] + p[:, 0] ** 3 - p[:, 1]))
-    assert (verdict.interval == 1).all()
-    assert (verdict.plateau == 0).all()
-    expected = np.tile([3 * MIDDLE[0] ** 2, -1.0], (3, 1))
-    np.testing.assert_allclose(verdict.sensitivity, expected, rtol=1e-8)
 
 
 # the convergence loop -----------------------------------------------------------------------------
@@ -132,16 +101,6 @@ def test_loop_finds_the_interval_and_the_derivative(sigma: float, shift: int) ->
     # fifty repeats no less than 0.02 below
     wanted = {0.0: 1.9, 1e-6: 1.9, 1e-5: 1.4, 5e-5: 0.9}[sigma]
     at_least(np.concatenate(steps).mean(), wanted)
-
-
-def test_wide_interval_alone_would_be_wrong() -> None:
-    """The loop is there for a reason: over the global interval truncation exceeds the error."""
-    found = history(with_noise(curved, 1e-6, 0))
-    off = np.abs(found.sensitivity - slopes(CLEARANCES)) / found.standard_error
-    verdict = convergence_intervals(found)
-    assert (off[0, :, 0] > 4).all()
-    assert (verdict.interval[:, 0] >= 2).all()
-    assert verdict.found.all()
 
 
 def test_noise_amplification_in_short_intervals_is_in_the_standard_error() -> None:
@@ -185,17 +144,6 @@ def test_a_kink_at_the_midpoint_has_no_slope() -> None:
         assert not convergence_intervals(history(kink, seed)).found.any()
 
 
-def test_constant_function_is_not_determined() -> None:
-    found = history(lambda p: np.full(len(p), 2.7e-4))
-    assert (found.sensitivity == 0.0).all()
-    assert np.isnan(found.r2).all()
-    verdict = convergence_intervals(found)
-    assert not verdict.found.any()
-    chosen = select_influential(["m2", "I2"], *best_estimates(found, verdict), 2 * HALF)
-    assert chosen.selected == ()
-    assert (chosen.influence == Influence.UNDECIDED).all()
-
-
 def test_still_changing_is_told_from_not_distinguishable() -> None:
     """Slope 1/length: it never stops changing, and says so."""
     design = design_intervals(BOUNDS, CLEARANCES, np.random.default_rng(0))
@@ -206,14 +154,6 @@ def test_still_changing_is_told_from_not_distinguishable() -> None:
     assert not verdict.found[:, 0].any()
     assert (verdict.plateau[:, 0] == -1).all()
     assert np.isnan(best_estimates(found, verdict)[0][:, 0]).all()
-
-
-def test_converged_marks_the_interval_and_all_shorter_ones() -> None:
-    verdict = convergence_intervals(history(with_noise(curved, 1e-6, 3), 3))
-    for c, j in np.ndindex(3, 2):
-        at = verdict.interval[c, j]
-        assert at > 0
-        np.testing.assert_array_equal(verdict.converged[:, c, j], np.arange(6) >= at)
 
 
 def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
@@ -233,17 +173,6 @@ def test_failed_simulations_are_counted_and_a_starved_surface_is_nan() -> None:
     verdict = convergence_intervals(found)
     assert verdict.found.all()  # the gap is stepped over
     assert (verdict.interval[1] != 1).all()
-
-
-def test_all_failed_is_refused() -> None:
-    with pytest.raises(InputError, match="fit a surface"):
-        history(lambda p: np.full(len(p), np.nan))
-
-
-def test_history_repeats_bit_for_bit_and_points_do_not_depend_on_values() -> None:
-    one, two = history(curved, 0), history(curved, 0)
-    np.testing.assert_array_equal(one.sensitivity, two.sensitivity)
-    np.testing.assert_array_equal(one.standard_error, two.standard_error)
 
 
 # selection ----------------------------------------------------------------------------------------
@@ -291,28 +220,6 @@ def test_selection_is_stable_across_clearances() -> None:
     assert calm.order_stable
     blurred = select_influential(names, slope, error * 300, lengths)
     assert blurred.order_stable  # no change that the errors do not explain
-
-
-def test_missing_estimates_neither_help_nor_harm() -> None:
-    slope = np.array([[1.0, 0.5, np.nan], [np.nan, np.nan, np.nan], [1.0, np.nan, np.nan]])
-    chosen = select_influential(["a", "b", "c"], slope, np.full((3, 3), 1e-3), [1.0] * 3)
-    assert chosen.selected == ("a", "b")
-    np.testing.assert_array_equal(chosen.share, [1, 1, np.nan])
-    np.testing.assert_array_equal(chosen.rank, [[1, 2, 0], [0, 0, 0], [1, 0, 0]])
-    assert np.isnan(chosen.effect[0, 2])
-
-
-def test_a_variable_in_two_surfaces_is_selected_once() -> None:
-    names = ["m1", "m2", "m2", "m3"]
-    chosen = select_influential(names, [[0.0, 1.0, 0.02, 0.4]], [[1e-3] * 4], [1.0] * 4)
-    assert chosen.selected == ("m2", "m3")
-    assert chosen.influence[0, 0] == Influence.NEGLIGIBLE
-
-
-def test_selection_of_a_constant_is_empty() -> None:
-    chosen = select_influential(["a", "b"], np.zeros((4, 2)), np.full((4, 2), 1e-18), [1.0, 1.0])
-    assert chosen.selected == ()
-    assert chosen.order_stable
 
 
 # Sobol indices ------------------------------------------------------------------------------------
@@ -394,15 +301,6 @@ def test_limits_hold_the_truth_as_often_as_they_say_and_are_no_wider_than_needed
     at_least(float(wider.mean()), 0.9)
 
 
-def test_wider_confidence_gives_wider_limits_around_the_estimate() -> None:
-    narrow, wide = small(1, confidence=0.5), small(1, confidence=0.99)
-    np.testing.assert_array_equal(narrow.first, wide.first)
-    assert (np.ptp(wide.total_interval, axis=1) > np.ptp(narrow.total_interval, axis=1)).all()
-    assert (
-        (wide.total_interval[:, 0] < wide.total) & (wide.total < wide.total_interval[:, 1])
-    ).all()
-
-
 def test_additive_function_on_a_skewed_box_shares_its_variance_exactly(shift: int) -> None:
     bounds = np.array([[0.0, 1.0], [5.0, 7.0], [-1e-3, 1e-3]])
     found = sobol_indices(
@@ -428,19 +326,6 @@ def test_failed_rows_are_dropped_whole_and_counted() -> None:
     np.testing.assert_array_equal(found.first, same.first)
     # three of 1024 rows stand in the replicate beside theirs: each share of the error moves by a few per cent
     np.testing.assert_allclose(found.total_interval, same.total_interval, atol=0.01)
-
-
-def test_constant_has_no_indices_and_a_seed_of_zero_is_a_seed() -> None:
-    found = small(0, lambda x: np.full(len(x), 0.1))
-    assert np.isnan(found.first).all()
-    assert np.isnan(found.total_interval).all()
-    np.testing.assert_array_equal(small(0).total_interval, small(0).total_interval)
-    assert (small(0).first != small(1).first).any()
-
-
-def test_sobol_refuses() -> None:
-    with pytest.raises(InputError, match="nearly every row"):
-        analyse_sobol(np.full(50, np.nan), 3)
 
 
 def test_chaotic_scatter_is_no_inputs(shift: int) -> None:

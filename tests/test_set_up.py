@@ -74,12 +74,6 @@ def test_an_old_python_is_named_in_one_line(checkout, tmp_path, version):
     assert not (checkout / ".venv").exists()
 
 
-def test_the_python_of_the_path_is_taken_unless_one_is_named(checkout, tmp_path):
-    fake_python(tmp_path / "old", "3.9")
-    path = f"{tmp_path / 'old'}:{os.environ['PATH']}"
-    assert_one_line(set_up(checkout, PYTHON="", PATH=path), "3.11", "python3 is 3.9")
-
-
 def test_no_python_at_all(checkout):
     assert_one_line(set_up(checkout, PYTHON="/nowhere/python3"), "/nowhere/python3", "3.11")
 
@@ -126,16 +120,6 @@ def test_no_registry_is_said_in_one_line_with_the_reason_of_pip(prepared):
     assert not (prepared / ".venv" / ".installed-mpich,analysis").exists()
 
 
-def test_an_error_of_another_kind_is_shown_as_pip_says_it(prepared):
-    (prepared / "jobs" / "locks" / HERE / "mpich,analysis.txt").write_text(
-        "not a requirement at all"
-    )
-    done = set_up(prepared, PYTHON="")
-    assert done.returncode == 2
-    assert "failed:" in done.stderr
-    assert "not a requirement at all" in done.stderr
-
-
 def test_an_unwritable_checkout(checkout, place_of_all):
     place = place_of_all
     shutil.copytree(checkout, place / "checkout")
@@ -161,10 +145,6 @@ def test_a_failed_set_up_leaves_the_shell_alive(checkout):
     )
     assert done.stdout == "code 2\n"
     assert_one_line(subprocess.CompletedProcess(done.args, 2, done.stdout, done.stderr), "/nowhere")
-
-
-def test_unknown_versions_are_refused(checkout):
-    assert_one_line(set_up(checkout, VERSIONS="oldest"), "locked, latest or lowest", "oldest")
 
 
 def test_lowest_versions_exist_for_the_oldest_python_only(checkout, tmp_path):

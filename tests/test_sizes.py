@@ -2,20 +2,17 @@
 
 import dis
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numba import njit
 from running import scene_with
-from some_laws import effects_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH, lane_function
-from hpcclear.base.numbered import Rows
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.views import Outcome, Start
+from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.stepping.explicit import tableau as tab
@@ -23,7 +20,6 @@ from hpcclear.dynamics.stepping.explicit.combine import Step, stage_state, step_
 from hpcclear.dynamics.stepping.explicit.steps import weigh_rates
 from hpcclear.dynamics.stepping.implicit.columns import leave
 from hpcclear.dynamics.stepping.implicit.newton import observe_stages
-from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import load_scene
 
 W = 4
@@ -106,19 +102,6 @@ def test_a_scene_of_too_many_coordinates_is_refused_with_their_number():
     assert "88 at most" in caught.value.reason
 
 
-def test_an_end_is_a_start():
-    rows = np.random.default_rng(0).normal(size=(3, Outcome.size))
-    outcome = Outcome(rows)
-    outcome.coordinates(4)[0, 2] = np.nan
-    start = outcome.end()
-    assert start.coordinates(4)[0, 2] == 0.0
-    np.testing.assert_array_equal(start.velocities(4), outcome.velocities(4))
-    np.testing.assert_array_equal(start.active, outcome.active)
-    np.testing.assert_array_equal(
-        start.state(2)[1], np.r_[rows[1, at.OUT_STATE :][:2], start.velocities(2)[1]]
-    )
-
-
 # ---- what is integrated ----------------------------------------------------------------------------
 
 
@@ -128,90 +111,3 @@ def test_every_stepper_integrates_all_of_the_list(traversal):
     seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
     assert "measures" in seen
     assert {"begin", "end"} <= seen or traversal is commit_measures
-
-
-def test_what_is_measured_goes_by_the_effects():
-    every, whole = (SimpleNamespace(whole=flag, largest=None) for flag in (None, 1))
-    everything = at.Effects(*[1] * len(at.Effects._fields))._replace(
-        joints=at.MAX_JOINTS, first=0, objective=every
-    )
-    assert list(at.measures_of(everything)) == [one.rate for one in at.MEASURES]
-    responses = at.Effects(joints=2, responses=1)
-    followed = [at.FOLLOWED_ACCELERATION, at.FOLLOWED_SQUARE, at.FOLLOWED_ACROSS]
-    assert list(at.measures_of(responses)) == [at.FORCE, at.FORCE + 1, *followed]
-    assert list(at.measures_of(responses._replace(joints=1, first=1))) == [at.FORCE + 1, *followed]
-    assert list(at.measures_of(at.Effects(joints=3, responses=1)))[:3] == [
-        at.FORCE + k for k in range(3)
-    ]
-    assert len(at.measures_of(effects_with({"latched"}, joints=1))) == 0
-    worn = at.Effects(joints=1, first=1, wear=1)
-    assert list(at.measures_of(worn)) == [at.JOINTS[1].sliding_power]
-    judged = at.Effects(joints=1, first=1, objective=every)
-    assert list(at.measures_of(judged)) == [at.JOINTS[1].objective_rate]
-    assert list(at.measures_of(judged._replace(objective=whole))) == [at.OBJECTIVE_RATES]
-    for mask, largest in (
-        (at.MEASURE_MASK, max(one.rate for one in at.MEASURES)),
-        (at.JOINT_MASK, at.MAX_JOINTS - 1),
-        (at.COORDINATE_MASK, at.MAX_COORDINATES - 1),
-    ):
-        assert all(number & mask == number for number in range(largest + 1))
-    assert (
-        at.MEASURE_MASK < at.RATES
-    )  # what the compiler then knows of the distance between two rows
-
-
-def test_rows_stand_one_behind_the_other_and_have_names():
-    """Nobody counts them: a row that is declared moves all behind it."""
-    values = {value for value in vars(at).values() if type(value) is int}
-    buffers = [one for one in vars(at).values() if isinstance(one, Rows)]
-    assert len(buffers) == 7
-    for rows in buffers:
-        firsts = [row.first for row in rows.declared]
-        assert firsts == [0, *np.cumsum([row.size for row in rows.declared])[:-1]]
-        assert rows.end == rows.declared[-1].first + rows.declared[-1].size
-        assert set(firsts) <= values
-        assert all(row.words for row in rows.declared)
-    asked = {row.asked_by for row in at.WRITTEN.declared if row.asked_by}
-    assert asked - {"steps"} <= set(at.Effects._fields)  # the latter are summed up between steps
-
-
-def test_rules_are_numbers_of_one_kind():
-    """So that one compiled stepper serves all effects."""
-    for effects, on in (
-        (at.Effects(), set()),
-        (effects_with({"latched", "torque"}), {"latched", "free"}),
-        (effects_with({"baumgarte", "coulomb", "wear"}), set()),
-    ):
-        rules = at.rules_of(effects)
-        assert {name for name in rules._fields[:-3] if getattr(rules, name)} == on
-        assert {type(value) for value in rules} == {int}
-
-
-def test_rules_say_which_joints_are_open():
-    for effects, places in (
-        (at.Effects(joints=2), (0, 2)),
-        (at.Effects(joints=1, first=1), (1, 2)),
-        (at.Effects(joints=5), (0, 5)),
-        (at.Effects(torque=1), (0, 0)),
-    ):
-        rules = at.rules_of(effects)
-        assert (rules.begin, rules.end) == places
-
-
-def test_all_mechanisms_share_a_stepper():
-    changes = (
-        {},
-        {"effects.gravity": 9.81, "numerics.energy": True},
-        {"joints.rod_slider": {"kind": "ideal"}},
-        {"numerics.formulation": "baumgarte"},
-    )
-    steppers = {Lanes(problem_of(scene_with(change)), 4)._step for change in changes}
-    assert len(steppers) == 1
-
-
-def test_lanes_begin_where_a_line_of_the_cache_does():
-    """Of any width; else every vector is fetched from two lines, or none is, by chance."""
-    for width in (1, 4, 32):
-        lanes = Lanes(problem_of(scene_with()), width)
-        assert lanes._block.work.ctypes.data % 64 == 0
-        assert (lanes._block.work == 0.0).all()

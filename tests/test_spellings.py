@@ -7,7 +7,6 @@ import pytest
 
 from hpcclear.report.figures import labels
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.unit_names import REFUSED, SPELLINGS, UNITS
 from hpcclear.scene.units import UnitError, to_si
 
 INCH, POUND, G = 0.0254, 0.45359237, 9.80665
@@ -149,12 +148,6 @@ def test_what_is_printed_is_read_back():
         for power in range(-12, 13):
             written = labels.quantity(1.5 * 10.0**power, unit)
             assert to_si(written, unit) == pytest.approx(1.5 * 10.0**power, rel=1e-12), written
-
-
-def test_spellings_do_not_contradict_each_other():
-    assert not SPELLINGS.keys() & UNITS.keys()
-    assert not REFUSED.keys() & (UNITS.keys() | SPELLINGS.keys())
-    assert set(SPELLINGS.values()) <= UNITS.keys()
 
 
 @pytest.mark.parametrize("unit", ["N/mm^1.4", "N/mm^(7/5)", "N/mm**1.4", "N*mm^-1.4", "kN/m^1.4"])

@@ -1,11 +1,9 @@
 """A design in parts, as a job array makes them, merged: the bytes of one run."""
 
 import contextlib
-import itertools
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from commands import CHEAP, SCENE, kill, overrides, run, sample, start
 from patience import crowded
@@ -98,13 +96,6 @@ def test_parts_of_any_kind_of_sampling_are_the_bytes_of_one_run(tmp_path, settin
     run_sample(scene, one, alone(), options=QUIET)
     make(scene, parts, *(Part(k, 3) for k in (2, 3, 1)))
     assert merged(scene, parts) == one.read_bytes()
-
-
-def test_parts_share_the_samples_among_them():
-    for samples, count in itertools.product((20, 21, 39, 1000), (1, 2, 7, 20)):
-        rows = [Part(k, count).rows(samples) for k in range(1, count + 1)]
-        assert np.array_equal(np.concatenate(rows), np.arange(samples))
-        assert max(map(len, rows)) - min(map(len, rows)) <= 1
 
 
 @pytest.mark.parametrize("words", ["0/3", "4/3", "3", "a/b", "1/0", "-1/3", "1/3/5", "1/9999999"])

@@ -1,6 +1,5 @@
 """Statistics of samples: limits that hold as often as they say, and nothing stated that samples do not determine."""
 
-import html
 import re
 from pathlib import Path
 
@@ -8,14 +7,12 @@ import numpy as np
 import pytest
 import report_data as data
 import xarray as xr
-from click.testing import CliRunner
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, OURS
 from hpcclear.base.outcome import Flag
-from hpcclear.cli import cli
 from hpcclear.report import spread
-from hpcclear.report.html.page import MOST_DRAWN, write_report
+from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.statistics.random.survival import fewest, order_interval
 
@@ -176,27 +173,6 @@ def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_p
         assert len(ids) == len(set(ids))
         assert len([one for one in ids if one.startswith("figure-")]) >= 2
     assert text.count("The command that made these results") == 0  # run times were not chosen
-
-
-def test_a_page_of_many_samples_names_the_commands_that_draw_one(tmp_path):
-    """Figures of 50 files took 46 s and 11 MB; a page of many has their numbers, and none of them is drawn unasked."""
-    for k in range(MOST_DRAWN + 1):
-        dataset.write(drawn(100, 1 + k), tmp_path / f"fit{k}.nc")
-    page = write_report(tmp_path).read_text()
-    heads = re.findall(r"<h2 [^>]*>([^<]*)</h2>", page)
-    assert [head for head in heads if "figures" in head.lower()] == ["Figures of single files"]
-    assert all(f"fit{k}: statistics of the samples" in heads for k in range(MOST_DRAWN + 1))
-    assert "data:image" not in page
-    commands = re.findall(
-        r"hpcclear ((?:plot|report) [^<]*? -o [^ <]*?)\. ", page.replace(".</p>", ". ")
-    )
-    assert len(commands) == 2
-    for command in commands:
-        *words, target = html.unescape(command).split()
-        done = CliRunner().invoke(cli, [*words, str(tmp_path / "made" / Path(target).name)])
-        assert done.exit_code == 0, done.output
-    assert "data:image" in next((tmp_path / "made").glob("*.html")).read_text()
-    assert list((tmp_path / "made").rglob("*.png"))
 
 
 def test_statistics_say_of_how_many_revolutions_a_peak_is_the_largest():

@@ -2,24 +2,16 @@
 
 import itertools
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from hpcclear.dynamics.evaluation.steady import ensemble, judging
-from hpcclear.dynamics.evaluation.steady.copies import scales
 from hpcclear.dynamics.evaluation.steady.effort import Effort, Mean, Sample
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.evaluation.steady.look import look
-from hpcclear.dynamics.evaluation.steady.procedure import loosest
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
-from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.start import start_states
-from hpcclear.scene import load_scene
-
-JOBS = Path(__file__).parent.parent / "jobs"
 
 RNG_SEEDS = range(400)
 
@@ -126,11 +118,6 @@ def test_a_transient_is_left_out_and_a_steady_series_is_kept():
     assert judging.spin_up(np.concatenate([np.full(10, 5.0), np.zeros(30)])) == 10
 
 
-def test_copies_count_from_where_they_have_parted():
-    between = np.array([1e-12, 1e-6, 0.1, 0.9, 1.1, 1.0, 0.8, 1.0])
-    assert judging.parted(between) == 3
-
-
 def test_a_common_drift_shows_though_copies_differ_for_good():
     rng = np.random.default_rng(2)
     places = rng.standard_normal(32)
@@ -169,33 +156,6 @@ def test_noise_alone_is_hardly_ever_cut():
     assert np.mean([judging.spin_up(one, 1.0) for one in noise]) < 0.6
 
 
-def test_noise_of_known_variance_hides_no_transient():
-    noise = np.random.default_rng(1).standard_normal(40)
-    assert judging.spin_up(noise + 20.0 * np.exp(-np.arange(40) / 3.0), 1.0) >= 8
-
-
-def test_the_projection_has_the_objective_for_its_mean():
-    gaps = np.random.default_rng(3).uniform(0.5, 1.5, (5, 8, 2))
-    mean = gaps.reshape(-1, 2).mean(axis=0)
-    assert judging.projected(gaps).mean() == pytest.approx(np.hypot(*mean), rel=1e-14)
-
-
-@pytest.mark.parametrize(("play", "share"), [(3e-4, 1.0), (1e-4, 1.0), (2e-5, 0.2)])
-@pytest.mark.parametrize(("job", "usual"), [("hunt_crossley", 1e-5), ("slider_crank", 1e-6)])
-def test_chaotic_means_begin_at_a_tolerance_that_the_play_allows(job, usual, play, share):
-    """The smaller of the two plays counts; a damping that keeps the impact speed asks for more."""
-    scene = load_scene(JOBS / f"{job}.toml").with_({"joints.rod_slider.clearance": play})
-    par = parameters(scene)
-    sample = Sample(par, start_states(scene, par), scales(scene), job == "slider_crank", False)
-    assert loosest(sample) == pytest.approx(share * usual, rel=1e-12)
-
-
-def test_a_joint_without_play_asks_for_nothing():
-    scene = load_scene(JOBS / "hunt_crossley.toml").with_({"joints.rod_slider": {"kind": "ideal"}})
-    par = parameters(scene)
-    assert loosest(Sample(par, start_states(scene, par), scales(scene), False, False)) == 1e-5
-
-
 def noise_of_a_mean(seed: int, n: int, copies: int = 32) -> tuple[list[np.ndarray], float]:
     """Two groups of copies, shape (n, copies / 2), neighbours correlated by 0.4; variance of the mean of one copy."""
     drawn = np.random.default_rng(seed).standard_normal((n + 1, copies))
@@ -215,17 +175,6 @@ def test_stretches_tell_the_variance_of_a_mean_more_surely_than_copies_alone(n: 
     assert np.mean(found) == pytest.approx(1.0, abs=0.06)
     assert np.std(found) < 0.9 * np.std(between)
     assert np.median(sure) > 50.0
-
-
-def test_copies_that_differ_for_good_count_alone():
-    groups, _ = noise_of_a_mean(0, 20)
-    places = np.random.default_rng(1).standard_normal((1, 16))
-    told, freedom = judging.variance_of_mean([group + places for group in groups])
-    means = np.concatenate(
-        [(group + places).mean(axis=0) - group.mean() - places.mean() for group in groups]
-    )
-    assert freedom == 30
-    assert told == pytest.approx(float((means**2).sum()) / 30.0, rel=1e-12)
 
 
 def a_sample(latched: bool = False, free: bool = False) -> Sample:
@@ -270,19 +219,3 @@ def test_a_tolerance_that_is_off_is_not_averaged_with_the_stricter_one():
     f = np.array([objective(mean.gaps) for mean in found])
     assert abs(f.mean() - 1.0) < 3e-3  # half of it would be 1.5e-2
     assert all(mean.rtol < ensemble.LOOSEST for mean in found)
-
-
-@pytest.mark.parametrize(
-    ("growth", "segments"), [(11.0, 4), (2.5, 5), (1.0, 6), (-1.0, 6), (np.nan, 6)]
-)
-def test_slow_kicks_wait_longer_for_the_first_look(growth: float, segments: int):
-    assert ensemble._first(a_sample(), growth) == segments
-    assert ensemble._first(a_sample(latched=True), growth) == 6
-    assert ensemble._first(a_sample(free=True), growth) == 6
-
-
-def test_a_difference_of_tolerances_counts_by_what_chance_does_not_make_of_it():
-    assert ensemble._excess(0.9, doubt=1.0, usual=10.0) == 0.0
-    assert ensemble._excess(1.5, doubt=1.0, usual=10.0) == pytest.approx(1.25)
-    assert ensemble._excess(-1.5, doubt=1.0, usual=0.2) == pytest.approx(0.04)  # more is chance
-    assert ensemble._excess(-3.0, doubt=1.0, usual=0.2) == pytest.approx(8.0)  # is none

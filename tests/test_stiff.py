@@ -60,6 +60,7 @@ def settled(name: str) -> Start:
 
 
 @pytest.mark.parametrize("name", STIFF)
+@pytest.mark.shortened(2)
 def test_automatic_choice_is_right_and_cheaper(name: str):
     state = settled(name)
     exact = one_turn(scene_of(name, "dormand-prince", 1e-12), state)

@@ -9,6 +9,8 @@ from pathlib import Path
 import grimp
 import pytest
 
+from hpcclear import __version__
+
 ROOT = Path(__file__).parents[1]
 DOORS = {"hpcclear", "hpcclear.__main__"}
 
@@ -58,3 +60,12 @@ def test_the_architecture_page_names_files_that_are_there_and_its_walk_is_short(
         name for name in named if not any((ROOT / top / name).exists() for top in ("", "hpcclear"))
     }
     assert not missing
+
+
+def test_the_version_stands_in_one_place():
+    files = ["pyproject.toml", "CITATION.cff", ".zenodo.json", "README.md", "tests/release.sh"]
+    paths = [ROOT / name for name in files]
+    paths += [path for path in (ROOT / "packaging").rglob("*") if path.is_file()]
+    assert len(paths) > 8
+    for path in paths:
+        assert __version__ not in path.read_text(encoding="utf-8"), path

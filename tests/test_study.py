@@ -3,7 +3,6 @@
 import json
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -12,6 +11,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from commands import warm
+from formula_study import PROGRAMS, contents, formula
 from patience import crowded
 
 from hpcclear.base.errors import InputError
@@ -39,13 +39,9 @@ from hpcclear.study.paper import claims
 from hpcclear.study.paper.printed import printed_designs
 from hpcclear.study.paper.recognition import is_the_papers, own_names
 from hpcclear.study.problem import problem_of
-from hpcclear.study.stages import STAGES, files_of
+from hpcclear.study.stages import files_of
 
-PROGRAMS = pathlib.Path(__file__).parent / "mpi_programs"
 MPIEXEC = pathlib.Path(sys.executable).parent / "mpiexec"
-sys.path.insert(0, str(PROGRAMS))
-
-import formula  # noqa: E402
 
 Z = ("m2", "m3", "u2", "I2")
 HALF = {"m2": 0.005, "m3": 0.005, "u2": 0.02, "I2": 0.5e-4}
@@ -71,14 +67,6 @@ def results(tmp_path_factory):
     patch.undo()
     assert all("ended with its rounds" in text for text in told)  # there is one round
     return place
-
-
-def contents(place: pathlib.Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(place)): path.read_bytes()
-        for path in sorted(place.rglob("*.nc"))
-        if path.name != "timing.nc"
-    }
 
 
 def truth(design: dict[str, float], robust: bool) -> tuple[float, float]:
@@ -404,6 +392,7 @@ def test_a_run_stopped_amid_simulations_goes_on(results, tmp_path, monkeypatch):
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.shortened(1)
 def test_the_number_of_ranks_changes_no_byte(results, tmp_path, ranks):
     scene = tmp_path / "scene.toml"
     scene.write_text(scene_of().text)
@@ -513,22 +502,6 @@ def test_bad_input_is_refused_before_any_simulation(tmp_path, overrides, message
         run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
 
 
-@pytest.mark.parametrize("name", ["peak-contact-force", "peak-crank-moment"])
-def test_a_study_of_another_objective_is_not_compared_with_the_paper(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(formula, "FIELD", name.replace("-", "_"))
-    scene, place = scene_of(f"study.objective={name}"), tmp_path / "out"
-    run_study(scene, place, alone(), progress_style="quiet")
-    samples = dataset.read(place / "samples.nc")
-    assert samples["objective"].attrs["units"] == scene.objective.unit
-    assert samples["mean_gap"].attrs["units"] == "m"
-    assert not (place / "claims.nc").exists()
-    assert not (place / "readings.nc").exists()
-    assert "mean_paper" not in dataset.read(place / "verification.nc")
-    told: list[str] = []
-    run_study(scene, place, alone(), progress_style="quiet", notify=told.append)
-    assert told == [f"{place} holds the finished study."]
-
-
 OWN_NAMES = {
     "m1": "crank_mass",
     "u1": "crank_centre",
@@ -588,29 +561,6 @@ def test_the_papers_scene_is_recognised_by_what_it_holds(entry, cites, compares)
     assert bool(printed_designs(scene)) == compares
 
 
-OF_THE_PAPER = re.compile(
-    r"paper|claim|table 4|printed|readings|varying joint clearance", re.IGNORECASE
-)
-
-
-def test_a_study_of_ones_own_has_nothing_of_the_paper(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["hpcclear", "run", "own.toml"])  # kept with the timing
-    scene, place = own_scene("mechanism.rod.length=0.13"), tmp_path / "out"
-    run_study(scene, place, alone(), progress_style="quiet")
-    written = {path.name for path in place.glob("*.nc")}
-    kinds = "samples sensitivity kriging front verification contributions chaos timing"
-    assert written == {f"{kind}.nc" for kind in kinds.split()}
-    for path in place.rglob("*.nc"):
-        found = dataset.read(path)
-        assert "references" not in found.attrs
-        assert not any(name.endswith("_paper") for name in found.data_vars)
-    assert not any("paper" in name for name in dataset.read(place / "front.nc")["case"].values)
-    shutil.rmtree(place / "responses")  # those of the formula lack what figures draw
-    page = write_report(place).read_text(encoding="utf-8")
-    page = re.sub(r'(?s)src="data:[^"]*"|<style>.*?</style>|<script>.*?</script>', "", page)
-    assert OF_THE_PAPER.findall(page.replace(str(tmp_path), "")) == []
-
-
 OF_THE_OBJECTIVE = {
     "chaos.nc": "chaos_deviation",
     "samples.nc": "objective objective_spread objective_uncertainty",
@@ -636,6 +586,7 @@ OF_THE_OBJECTIVE = {
         ("peak-crank-moment", "N m", "(N m)^2"),
     ],
 )
+@pytest.mark.shortened(2)
 def test_units_follow_the_objective_and_nothing_else_does(
     tmp_path, monkeypatch, name, unit, squared
 ):
@@ -656,15 +607,6 @@ def test_units_follow_the_objective_and_nothing_else_does(
                 assert content.attrs["units"] == table.data[variable].units, (path.name, variable)
     response = dataset.read(place / "responses" / "original.nc")
     assert response["eccentricity_x"].attrs["units"] == "m"
-
-
-def test_of_contact_forces_the_larger_is_the_objective():
-    for which in ("mean", "peak"):
-        scene = scene_of(f"study.objective={which}-contact-force")
-        records = np.zeros(2, [(f"{which}_contact_force", float, 2)])
-        records[f"{which}_contact_force"] = [[1.0, 3.0], [5.0, 2.0]]
-        assert scene.objective.unit == "N"
-        assert scene.objective.of(records).tolist() == [3.0, 5.0]
 
 
 # -- parts ------------------------------------------------------------------------------------------
@@ -761,17 +703,3 @@ def test_a_response_that_fails_is_told_and_the_study_ends(tmp_path, monkeypatch)
     texts = " ".join(found["figure"].to_numpy().astype(str))
     assert "first alpha against original: peak of contact force 1 unknown" in texts
     assert not re.search(r"\bnan\b.*against|against[^;]*\bnan\b", texts)
-
-
-def test_every_stage_needs_earlier_ones_alone_and_announces_parts_of_its_own():
-    known, parts = {"scene", "extent"}, list[str]()
-    for stage in STAGES:
-        assert set(stage.needs) <= known
-        known.add(stage.name)
-        parts += stage.words
-    assert len(parts) == len(set(parts))
-
-
-def test_the_files_of_a_finished_study_are_those_of_its_stages(results):
-    made = {path.name for path in results.glob("*.nc")}
-    assert made - {"timing.nc"} == set(files_of(scene_of()))

@@ -1,87 +1,32 @@
-"""Nothing finished is ever lost: kills, signals, time limits and program errors of the real commands."""
+"""Nothing finished is ever lost: signals, time limits and program errors of the real commands; kills are in `test_kills`."""
 
-import itertools
 import random
 import signal
 import sys
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 
 import commands
+import kills
 import losses
 import numpy as np
 import pytest
-from losses import Loss
+from kills import COMMANDS, OPTIONS, Undisturbed, files
 from patience import crowded
 
 from hpcclear.results import dataset
-from hpcclear.results.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
 
 sys.path.insert(0, str(commands.PROGRAM.parent))
 
-import formula
 
 pytestmark = [pytest.mark.mpi, pytest.mark.nightly]
-SAMPLES = 4000
-INTERVAL = 0.5  # s
-OPTIONS = ("--checkpoint-interval", str(INTERVAL), "--progress", "quiet")
-
-
-@dataclass(frozen=True)
-class Undisturbed:
-    """A command and what comes of it when nothing disturbs it."""
-
-    words: Callable[[Path], list[str]]
-    """Words that put the results into a folder."""
-    interval: float
-    work: float = 0.0
-    """Seconds from the opened checkpoint on."""
-    files: dict[str, bytes] = field(default_factory=dict)
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    """All that lies in a results folder, but for the times, which may differ."""
-    found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
-    return {
-        name: path.read_bytes() for name, path in found.items() if not name.endswith("timing.nc")
-    }
-
-
-def sample_words(folder: Path) -> list[str]:
-    return commands.sample(folder / "samples.nc", SAMPLES, *OPTIONS)
-
-
-def study_words(folder: Path) -> list[str]:
-    """A study in which every stage is small."""
-    scene = folder.parent / "study.toml"
-    scene.write_text(commands.SCENE.read_text().partition("[study]")[0] + formula.STUDY)
-    return [
-        "run",
-        str(scene),
-        "-o",
-        str(folder),
-        "--progress",
-        "quiet",
-        *commands.overrides(*commands.CHEAP),
-    ]
 
 
 @pytest.fixture(scope="module", params=["sample", "run"])
 def undisturbed(request, tmp_path_factory) -> Iterator[Undisturbed]:
-    """Each of the two commands that resume."""
-    words = {"sample": sample_words, "run": study_words}[request.param]
-    place = tmp_path_factory.mktemp("undisturbed")
-    for name in ("compiling", "results"):
-        (place / name).mkdir()
-        code, output = commands.run(words(place / name), TEST_LOG=str(place / f"{name}.log"))
-        assert code == 0, output
-    log = losses.read(place / "results.log")
-    work = log[-1].time - min(event.time for event in log if event.what == "opened")
-    interval = INTERVAL if request.param == "sample" else CHECKPOINT_INTERVAL
-    yield Undisturbed(words, interval, work, files(place / "results"))
+    """Each of the two commands that resume, and what comes of it when nothing disturbs it."""
+    yield kills.undisturbed(request.param, tmp_path_factory.mktemp("undisturbed"))
     commands.remove_orphans()
 
 
@@ -96,57 +41,6 @@ def place(tmp_path) -> Path:
 only_sample = pytest.mark.parametrize("undisturbed", ["sample"], indirect=True)
 
 
-# -- kills --------------------------------------------------------------------------------------
-
-
-# of each of the two commands
-@pytest.mark.parametrize("kills", [3, pytest.param(50, marks=pytest.mark.full)])
-@pytest.mark.timeout(3600)
-def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undisturbed, kills):
-    dice, done, states = random.Random(kills), 0, Counter()
-    if undisturbed.words is study_words:
-        kills = -(-kills // 2)  # a study takes longer than all samples
-    found: list[Loss] = []
-    for turn in itertools.count():
-        if done >= kills:
-            break
-        folder, logs = tmp_path / str(turn) / "results", []
-        folder.mkdir(parents=True)
-        words = undisturbed.words(folder)
-        for number in range(min(4, kills - done)):  # up to four kills of one run
-            logs.append(tmp_path / f"{turn}-{number}.log")
-            job = commands.start(words, TEST_LOG=str(logs[-1]))
-            early = dice.random() < 0.2
-            while not early and job.poll() is None and not logs[-1].exists():
-                time.sleep(0.02)  # the checkpoint is opened
-            moment = time.time() + dice.uniform(0.0, 1.0) * (1.0 if early else undisturbed.work)
-            commands.wait_until(job, moment, folder, writing=dice.random() < 0.3)
-            ranks = commands.ranks_of(job)
-            if job.poll() is not None or not ranks:
-                break
-            states["amid a write"] += any(folder.rglob(".hpcclear-*.tmp"))
-            commands.kill(ranks[dice.choice(sorted(ranks))])
-            code, output = commands.finish(job, 60.0)
-            states["too late"] += code == 0
-            commands.check_readable(folder)
-            done += 1
-        code, output = commands.finish(job)
-        logs.append(tmp_path / f"{turn}-last.log")
-        code, output = commands.run(words, TEST_LOG=str(logs[-1]))
-        assert code == 0, output
-        assert files(folder) == undisturbed.files
-        found += [
-            losses.loss_of(log, logs[k + 1 :], undisturbed.interval)
-            for k, log in enumerate(logs[:-1])
-        ]
-    lost, seconds = (max(getattr(loss, name) for loss in found) for name in ("samples", "seconds"))
-    print(
-        f"{done} kills, each cost {lost} samples and {seconds:.1f} s at most; {dict(states)}; "
-        f"samples were lost by {sum(loss.samples > 0 for loss in found)}; "
-        f"last begun: {dict(Counter(loss.stage for loss in found))}"
-    )
-
-
 # -- signals and the time limit -----------------------------------------------------------------
 
 
@@ -155,7 +49,7 @@ def test_kills_of_any_rank_at_any_moment_lose_at_most_an_interval(tmp_path, undi
 @pytest.mark.timeout(3600)
 def test_a_stop_at_any_moment_ends_soon_and_can_be_resumed(tmp_path, undisturbed, how, moments):
     dice, slowest, late = random.Random(how), 0.0, 0
-    if undisturbed.words is study_words:
+    if undisturbed.command is COMMANDS["run"]:
         if moments == 2 and how in ("SIGINT", "SIGUSR1"):
             pytest.skip("of a study in the long profile: signals of any name end in the same place")
         moments //= 2  # a study takes longer than all samples

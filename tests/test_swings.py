@@ -93,6 +93,7 @@ def coupled(stiffness, inertia, speed, torque=None, **numerics):
 
 
 @pytest.mark.parametrize("kind", ["minimal", "baumgarte", "torque"])
+@pytest.mark.shortened(1)
 def test_the_angle_between_shafts_that_go_round_is_a_torsional_oscillator_s(kind):
     """Over many revolutions, either way round, driven at a speed or by a torque."""
     rng = np.random.default_rng(5)

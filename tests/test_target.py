@@ -16,7 +16,7 @@ from hpcclear.cli import cli
 from hpcclear.cli.response import describe_response
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady import procedure
-from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales, separation
+from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
@@ -200,14 +200,6 @@ def test_the_terminal_says_so_and_the_exit_code(tmp_path: Path):
     assert errors.startswith("Target missed: the relative half-width of f is ")
     with xr.open_dataset(tmp_path / "r.nc") as made:
         assert int(made["flags"]) & Flag.TARGET_MISSED
-
-
-def test_kicks_are_of_their_size_and_number_nought_is_none():
-    start, scale = start_states(BASE, parameters(BASE)), scales(BASE)
-    copies = perturbed(start, scale, range(4), 1e-3)
-    np.testing.assert_array_equal(copies.rows[0], start.rows[0])
-    apart = separation(copies, type(copies)(np.repeat(start.rows, 4, axis=0)), scale)
-    np.testing.assert_allclose(apart, [0.0, 1e-3, 1e-3, 1e-3], rtol=1e-6)
 
 
 def test_wherever_the_budget_ends_limits_are_finite_or_there_are_none():

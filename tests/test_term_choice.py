@@ -5,15 +5,13 @@ import pytest
 from margins import at_least, at_most
 from sklearn.linear_model import LinearRegression
 
-from hpcclear.base.errors import InputError
 from hpcclear.scene.stages import Sensitivity
 from hpcclear.statistics.sensitivity import IntervalSettings, analyse_intervals, design_intervals
-from hpcclear.statistics.surrogate import term_choice
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.polynomial import monomials, n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, latin_hypercube
 from hpcclear.statistics.surrogate.surface_search import SearchSettings, fit_until_accepted, search
-from hpcclear.statistics.surrogate.term_choice import choose_terms, least_points
+from hpcclear.statistics.surrogate.term_choice import least_points
 
 DIMS = 20
 UNIT = np.tile([0.0, 1.0], (DIMS, 1))
@@ -118,58 +116,6 @@ def test_standard_errors_are_not_flattered_by_the_choice(shift: int) -> None:
         slopes, errors = surface.gradient(middle)
         off.append((slopes - (above - below) / (2 * step)) / errors)
     at_most(float(np.sqrt(np.mean(np.square(off)))), 1.5)
-
-
-def test_the_same_terms_every_time_and_in_their_order() -> None:
-    z = 2 * sample(90, 12) - 1
-    values = friedman(0.5 * (z + 1))
-    first, error = choose_terms(z, values, 3)
-    again, same = choose_terms(z, values, 3)
-    np.testing.assert_array_equal(first, again)
-    assert error == same > 0
-    assert first[0].sum() == 0
-    np.testing.assert_array_equal(first[1 : DIMS + 1], np.eye(DIMS))
-    assert len({tuple(row) for row in first.tolist()}) == len(first)
-
-
-def test_what_cannot_be_chosen_is_refused() -> None:
-    few = least_points(DIMS) - 1
-    points = sample(few, 13)
-    with pytest.raises(InputError, match="too few to choose") as caught:
-        fit_response_surface(points, friedman(points), UNIT, 3, chosen=True)
-    assert caught.value.key == "points"
-    points = sample(few + 1, 14)
-    assert fit_response_surface(points, friedman(points), UNIT, 3, chosen=True).n_points == few + 1
-    points[:, 7] = 0.5  # an input that never varies has no slope
-    with pytest.raises(InputError, match="do not determine"):
-        fit_response_surface(points, friedman(points), UNIT, 3, chosen=True)
-
-
-def test_a_constant_and_failed_values() -> None:
-    points = sample(60, 15)
-    surface = fit_response_surface(points, np.full(60, 0.3), UNIT, 3, chosen=True)
-    assert (surface.predict(points) == 0.3).all()
-    values = friedman(points)
-    values[:10] = np.nan
-    assert fit_response_surface(points, values, UNIT, 3, chosen=True).n_dropped == 10
-
-
-def test_lower_orders_have_all_their_terms() -> None:
-    points = sample(60, 16)
-    for order, terms in ((0, 1), (1, DIMS + 1)):
-        chosen, whole = (
-            fit_response_surface(points, friedman(points), UNIT, order, chosen=choice)
-            for choice in (True, False)
-        )
-        assert len(chosen.coefficients) == terms
-        np.testing.assert_array_equal(chosen.coefficients, whole.coefficients)
-
-
-def test_no_more_terms_than_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(term_choice, "MOST_TERMS", 30)
-    points = sample(200, 17)
-    values = np.exp(points @ np.linspace(-1.0, 1.0, DIMS))
-    assert len(fit_response_surface(points, values, UNIT, 3, chosen=True).exponents) <= 30
 
 
 def test_intervals_and_searches_choose_where_they_are_told_to() -> None:

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,10 +22,8 @@ from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.statistics.search import infill
 from hpcclear.statistics.search.certainty import Compared
-from hpcclear.study import extent, goals, lives, run_study, truth
-from hpcclear.study.optimisation import Choice
+from hpcclear.study import run_study
 
 PROGRAMS = Path(__file__).parent / "mpi_programs"
 sys.path.insert(0, str(PROGRAMS))
@@ -163,19 +160,6 @@ def test_each_solution_knows_all_three(study: Path) -> None:
         np.testing.assert_allclose(one, other, rtol=0.02)  # 256 points against a rule
 
 
-def test_the_search_counts_what_it_takes(study: Path) -> None:
-    """The expected counts know three ends: two swarm's designs, a runner-up, a believed one and a response each."""
-    two = 'study.cases={three={random=["C"]}}'
-    here, there = (extent.samples_of(scene) for scene in (scene_of(), scene_of(two)))
-    each = truth.expected(scene_of().required_study)
-    assert here["verification"] - there["verification"] == (2 + 2) * each
-    assert here["check"] - there["check"] == 2 * 64
-    assert here["pairs"] > there["pairs"]
-    assert extent.responses_of(scene_of()) - extent.responses_of(scene_of(two)) == 3
-    assert (study / "responses" / "three_gamma.nc").exists()
-    assert verified(study).sizes["design"] * 64 <= here["verification"]
-
-
 def test_a_study_that_is_stopped_goes_on_to_the_same_bytes(study: Path, tmp_path: Path) -> None:
     place = tmp_path / "pieces"
     assert formula.run_in_pieces(scene_of(), str(place), alone()) > 8
@@ -254,23 +238,6 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
     assert all(p["at"][2] is None for p in shown["points"] if p["case"] == "plain")
 
 
-def test_the_search_finds_constraints_behind_the_goals() -> None:
-    case = scene_of(*MIXED).required_study.case("five")
-    values = np.linspace(1.0, 2.0, 64)
-    assert goals.steered(case.kept, values, {"m2": 0.45}) == pytest.approx(0.5)
-    assert goals.steered(case.kept, values, {"m2": 0.15}) == pytest.approx(-0.5)
-
-
-def test_lives_are_followed_of_every_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lives, "_over_life", lambda *given: (1.0, 0.1, 2.0, 0.2))
-    run = SimpleNamespace(directory=tmp_path, study=scene_of().required_study)
-    names = ("three original", "three gamma", "three front 1", "three best gamma", "three beta")
-    designs = [Choice(name, "three", {}) for name in names]
-    found = lives.of_designs(run, scene_of(), designs)  # type: ignore[arg-type]
-    assert np.isfinite(found["mean"]).tolist() == [True, True, False, False, True]
-    assert np.isfinite(found["deviation_reach"]).tolist() == [True, True, False, False, True]
-
-
 # -- what is told -----------------------------------------------------------------------------------
 
 
@@ -323,6 +290,7 @@ return select.map((one) => [...one.options].map((option) => option.textContent))
 
 
 @needed
+@pytest.mark.nightly
 def test_a_reader_chooses_what_is_up(study: Path, tmp_path: Path) -> None:
     shutil.copytree(study, tmp_path / "page", ignore=shutil.ignore_patterns("responses"))
     page = write_report(tmp_path / "page")
@@ -366,51 +334,6 @@ def test_the_front_of_three_is_what_is_surely_traded() -> None:
     assert front[3] in (3, 4)
     assert found.one[3, 4]
     np.testing.assert_array_equal(found.beaten, [False] * 5 + [True])
-
-
-def test_of_designs_that_are_level_the_others_decide_in_their_order() -> None:
-    values = np.array([[0.0, 1.0, 0.0], [0.001, 0.501, 0.7], [0.002, 0.5, 0.9], [1.0, 0.0, 0.0]])
-    found = Compared(values, replicates(values, 0.05), 0.95)
-    assert (
-        found.best(0) == 1
-    )  # level with 0 and 2 in the first, with 2 in the second, less in the third
-    assert found.best(1) == 3
-    assert found.best(2) == 0  # level with 3 in the third, less in the first
-
-
-def test_an_end_that_is_not_surely_traded_is_none_of_the_front() -> None:
-    """What is level is not handed on: the middle one cannot be told from the others, which can in the first."""
-    values = np.array([[0.0, 1.0, 1.0], [0.08, 0.05, 0.55], [0.15, 0.0, 0.5]])
-    found = Compared(values, replicates(values, 1.0), 0.95)
-    found.less = np.zeros((3, 3, 3), bool)
-    found.less[0, 0, 2] = True
-    found.less[1:, 1:, 0] = True
-    assert (found.best(0), found.best(1)) == (1, 2)
-    assert found.front(3) == [1]
-
-
-def test_proposals_leave_room_between_the_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four swarms have twenty ends of five objectives, where these are rough."""
-    rng = np.random.default_rng(2)
-    designs, corners = rng.random((20, 4)), [*np.eye(4), np.full(4, 0.5)]
-    values = np.stack(
-        [
-            ((designs - corner) ** 2).sum(axis=1) + 0.3 * np.sin(9.0 * designs[:, k % 4] + 4.0 * k)
-            for k, corner in enumerate(corners)
-        ],
-        axis=1,
-    )
-    choose, seen = infill._chosen, []
-
-    def watched(ends: np.ndarray, *others: object) -> np.ndarray:
-        seen.append(ends)
-        return choose(ends, *others)
-
-    monkeypatch.setattr(infill, "_chosen", watched)
-    found = infill.proposals(designs, values, np.array([[0.0, 1.0]] * 4), 12, rng)
-    assert len(found) == 12
-    assert len(seen[0]) == 20
-    assert sum((one == seen[0]).all(axis=1).any() for one in found) == 6
 
 
 # -- what is refused --------------------------------------------------------------------------------

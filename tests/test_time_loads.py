@@ -7,10 +7,7 @@ from test_loads import INERTIA, PIN, START, angle_of, machine
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation import evaluator_of
-from hpcclear.dynamics.linkage.compiled import module_text
-from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.ensemble.api import as_points
 
 TURN = 2 * np.pi
@@ -170,14 +167,6 @@ def test_tables_against_the_time_come_from_files(tmp_path):
     np.testing.assert_allclose(
         scene.mechanism.drives[0].speed_by_time, [[0.0, TURN], [1.0, 2 * TURN]]
     )
-
-
-def test_scenes_without_such_loads_read_no_clock():
-    kick = {"kind": "torque", "body": "pendulum", "torque_by_time": [[0.0, 0.0], [1.0, 1.0]]}
-    for loads, there in (({}, False), ({"kick": kick}, True)):
-        problem = problem_of(machine(loads))
-        text = module_text(problem.linkage._text(problem.linkage._on), ())
-        assert (f"work[{at.BEGAN} * W + i]" in text) == there
 
 
 @pytest.mark.parametrize(

@@ -46,21 +46,6 @@ def _dynamics(monkeypatch):
 # -- like numbers -----------------------------------------------------------------------------------
 
 
-def test_exact_estimates_stand_by_themselves_and_unknown_ones_get_the_mean():
-    values = np.array([1.0, 2.0, 6.0])
-    found, doubt = together(values, np.zeros(3), 1.0)
-    np.testing.assert_allclose(found, values, rtol=1e-6)
-    assert (doubt < 1e-6).all()
-    found, doubt = together(np.append(values, np.nan), np.zeros(4), 1.0)
-    assert 0.5 < found[3] < 3.0  # between 0 and the mean of the three
-    assert 2.0 < doubt[3] < 6.0  # their standard deviation is 2.6
-    assert np.isnan(together(np.full(2, np.nan), np.zeros(2), 1.0)).all()
-    found, doubt = together(np.array([50.0]), np.array([0.5]), 1.0)
-    assert (found[0], doubt[0]) == pytest.approx((50.0, 0.5), rel=0.03)  # not typical, but known
-    found, doubt = together(np.array([5.0]), np.array([50.0]), 1.0)
-    assert (abs(found[0]), doubt[0]) < (0.5, 10.0)
-
-
 @pytest.mark.parametrize("scatter", [0.0, 0.5, 2.0])
 def test_what_is_known_of_like_numbers_together_is_as_exact_as_stated(scatter):
     rng = np.random.default_rng(52)
@@ -101,13 +86,6 @@ def test_what_chance_does_to_pairs_is_within_its_standard_error():
     bias, error = (np.array([one[part][:2] for one in found]) for part in (0, 1))
     np.testing.assert_allclose(error[:, 0].mean(), np.sqrt(2.0) * 0.1 / 32.0, rtol=0.1)
     np.testing.assert_allclose((bias / error).std(axis=0), 1.0, atol=0.35)
-
-
-def test_failed_simulations_are_left_out_in_pairs():
-    exact = drawn()
-    ours, theirs = 1.02 * exact, exact.copy()
-    ours[3, ::2], theirs[5, 1::3] = np.nan, np.nan
-    np.testing.assert_allclose(apart(ours, theirs)[0], 0.02, rtol=1e-9)
 
 
 @pytest.mark.parametrize("shift", [0.02, -0.02])

@@ -108,16 +108,6 @@ def test_no_angle_hides_in_another_quantity(target):
                 to_si(text, target)
 
 
-def test_those_units_are_there():
-    """The kinds that this file is about; a frequency is told from a rate by what the entry declares."""
-    assert {"rad/s", "Hz", "1/s", "rad", "N*m"} <= set(TARGETS)
-    assert quantities()["mechanism.drives.any.frequency"].unit == "Hz"
-    assert to_si("1200 rpm", "Hz") == 20.0
-    assert to_si("600 min^-1", "rad/s") == to_si("600 rpm", "rad/s")
-    with pytest.raises(UnitError, match="Hz is ambiguous"):
-        to_si("10 Hz", "rad/s")
-
-
 TORQUE = {
     "kind": "torque",
     "torque": 5.0,

@@ -2,10 +2,8 @@
 lanes, on ranks, and refused where they are at fault."""
 
 import math
-import re
 import shutil
 import sys
-from collections import Counter
 from pathlib import Path
 
 import commands
@@ -16,13 +14,8 @@ from oracle import SliderCrank
 from running import run
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.laws.constant import with_constants
-from hpcclear.dynamics.laws.formula import function_of
-from hpcclear.dynamics.laws.lanes import in_lanes, text_of
-from hpcclear.dynamics.laws.numbers import evaluate, force_of, sample_numbers
+from hpcclear.dynamics.laws.lanes import in_lanes
 from hpcclear.dynamics.physics import powers
-from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.laws import ENTRIES
 from hpcclear.scene.paths import quantities
@@ -30,7 +23,6 @@ from hpcclear.scene.paths import quantities
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "analysis"))
 
-from assembly import executed_arithmetic, force_evaluation  # noqa: E402
 
 LAWS = Path(__file__).parent / "data" / "mylaws.py"
 NO_FRICTION = {"law": "none"}
@@ -106,6 +98,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
+@pytest.mark.shortened(2)
 def test_a_user_s_law_gives_what_an_independent_solver_gives(case, tmp_path):
     """A revolution from rest in the clearance, to 1e-8 in f and 1e-12 m at its end; scipy's order 8 at its tightest."""
     contact, friction, force, ratio = CASES[case]
@@ -115,15 +108,6 @@ def test_a_user_s_law_gives_what_an_independent_solver_gives(case, tmp_path):
     assert result.out.status == 0
     assert float(result.out.objective) == pytest.approx(expected, rel=1e-8)
     np.testing.assert_allclose(result.q[-1], state[:4], rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_a_user_s_law_is_vectorised(case, tmp_path):
-    contact, friction, *_ = CASES[case]
-    problem = problem_of(load_scene(file_with(tmp_path, contact, friction)))
-    found = executed_arithmetic(force_evaluation(problem, 16))
-    assert found.packed.total() >= 100
-    assert found.packed_share >= 0.9
 
 
 # ---- refused where they are at fault ------------------------------------------------------------------------
@@ -402,76 +386,6 @@ def test_laws_are_listed_with_their_sources():
     assert code == 0
     for word in ("hunt-crossley", "flores", "lugre", "doi:10.1007/s11044-010-9237-4", "s/m"):
         assert word in said
-
-
-# ---- what is constant in a sample ---------------------------------------------------------------------------------
-WRITTEN_OUT = {
-    "lankarani-nikravesh": """
-def law(depth, rate, impact_speed, stiffness, restitution):
-    a = 0.75 * (1.0 - restitution**2)
-    return stiffness * depth**1.5 * (1.0 + a * rate / impact_speed)
-""",
-    "coulomb": """
-def law(speed, coefficient, ramp_speed):
-    return coefficient * max(min(speed / ramp_speed, 1.0), -1.0)
-""",
-}
-
-
-@pytest.mark.parametrize("name", WRITTEN_OUT)
-def test_a_law_written_as_in_a_book_costs_what_ours_costs(name):
-    """Quotients by what a sample keeps are worked out once: in the lanes the arithmetic is that of the law of ours."""
-    kind = "friction" if name == "coulomb" else "contact"
-    ours = laws(kind)[name]
-    function = function_of(WRITTEN_OUT[name].strip() + "\n", "law")
-    made = {"force": function} if kind == "contact" else {"ratio": function}
-    theirs = type(ours)(words="", parameters=ours.parameters, **made)
-
-    def arithmetic(law):
-        texts = {one: text for one, text in _functions(text_of(law)).items() if "own_" in one}
-        main = "own_force" if kind == "contact" else "own_ratio"
-        if main not in texts:  # ours: elastic part and damping
-            return Counter("".join(texts.values())) + Counter("*")
-        return Counter("".join(text for one, text in texts.items() if "kink" not in one))
-
-    signs = "*/+-"
-    assert {s: arithmetic(theirs)[s] for s in signs} == {s: arithmetic(ours)[s] for s in signs}
-    given = {"coefficient": 0.1, "ramp_speed": 0.01, "restitution": 0.8, "stiffness": 9e8}
-    found = sample_numbers(with_constants(theirs), given)
-    expected = sample_numbers(ours, given)
-    if kind == "contact":
-        at = {"depth": 1e-5, "rate": 0.3, "impact_speed": 0.7, "inverse_impact_speed": 1 / 0.7}
-        assert force_of(with_constants(theirs), {**found, **at}) == force_of(
-            ours, {**expected, **at}
-        )
-    else:
-        at = {"speed": 0.003}
-        assert evaluate(with_constants(theirs).ratio, {**found, **at}) == evaluate(
-            ours.ratio, {**expected, **at}
-        )
-
-
-def _functions(text):
-    """Bodies of a text's functions, by name."""
-    parts = re.split(r"^def (\w+)\(.*\):\n", text, flags=re.M)
-    return dict(zip(parts[1::2], parts[2::2], strict=True))
-
-
-def test_parts_of_helpers_and_of_other_modules_become_constant_too():
-    """IMPACT's force and elastic part divide by the same depth: one number of the sample serves both."""
-    law = laws("contact")["impact"]
-    made = with_constants(law)
-    assert made.read == (*(one for one in law.read if one != "depth_at"), "once_0", "depth_at")
-    given = {
-        "force_at": 1e3,
-        "depth_at": 2e-6,
-        "exponent": 1.7,
-        "greatest_damping": 50.0,
-        "full_depth": 1e-6,
-    }
-    at = {"depth": np.array([1e-6, 3e-6]), "rate": 0.2}
-    before, after = (force_of(one, {**sample_numbers(one, given), **at}) for one in (law, made))
-    np.testing.assert_allclose(after, before, rtol=1e-14)
 
 
 def test_a_parameter_of_a_fractional_unit_takes_text_in_others(tmp_path):

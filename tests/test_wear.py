@@ -49,6 +49,7 @@ def reference():
 
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau", "prince-dormand"])
+@pytest.mark.shortened(1)
 def test_sliding_work_is_that_of_an_independent_integration(method, reference):
     """O23 slides back and forth: where its slip turns within a step, the error is by chance, whatever the tolerance."""
     errors = []

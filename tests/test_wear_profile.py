@@ -22,7 +22,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.planar import energy
 from hpcclear.dynamics.setup.parameters import parameters
-from hpcclear.dynamics.setup.problem import effects_of, problem_of
+from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.wear.curves import curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
@@ -170,34 +170,6 @@ def test_waves_take_nothing_from_the_energy(entries):
     assert (
         float(energy.errors(scene, par, energy.of_starts(scene, par, start, n), out, n)[0]) < 1e-9
     )
-
-
-def test_waves_of_no_height_change_nothing():
-    """The same motion to rounding: what is on is a sum of noughts."""
-    plain = {"effects.contact": HUNT_CROSSLEY, **WORN}
-    off, on = (run(scene_with(plain | more, rtol=1e-10)).out for more in ({}, ANGULAR))
-    assert effects_of(scene_with(plain | ANGULAR)).bearing_waves == 3
-    assert float(on.objective) == pytest.approx(float(off.objective), rel=1e-11)
-    np.testing.assert_allclose(on.sliding_work, off.sliding_work, rtol=1e-7)
-
-
-def test_profiles_are_rates_of_worn_surfaces():
-    scene = scene_with({"effects.contact": HUNT_CROSSLEY, **WORN, **ANGULAR})
-    effects = effects_of(scene)
-    assert (effects.waves, effects.bearing_waves, effects.journal_waves, effects.profile) == (
-        1,
-        3,
-        None,
-        1,
-    )
-    assert problem_of(scene).settings().profiled == 2 * 6
-    plain = effects_of(scene_with({"effects.contact": HUNT_CROSSLEY, **WORN}))
-    assert (plain.waves, plain.profile) == (None, None)
-    ideal = {"joints.crank_rod": {"kind": "ideal"}, "effects.contact": HUNT_CROSSLEY}
-    one = run(scene_with({"joints.rod_slider.wear": WEAR, **ANGULAR, **ideal})).out.profile
-    assert (one[:6] == 0.0).all()
-    assert (one[6:12] != 0.0).all()
-    assert np.isnan(one[12:]).all()
 
 
 # ---- a turning journal under a constant load ---------------------------------------------------

@@ -1,60 +1,19 @@
 """Vectors of 128, 256 or 512 bits: by the processor, by the environment, and that no result depends on it."""
 
-import inspect
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import llvmlite.binding as llvm
-import numpy as np
 import pytest
-from numba import njit
 
 from hpcclear.base import width
-from hpcclear.base.cached import features_in_use
 from hpcclear.base.errors import InputError
-from hpcclear.base.jit import narrow_vectors
-from hpcclear.base.one_text import one_text
-from hpcclear.dynamics.stepping.explicit.steps import explicit_steps
 
 WIDE = llvm.get_host_cpu_features().get("avx512f", False)
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 wide = pytest.mark.skipif(not WIDE, reason="this processor has no vectors of 512 bits")
-
-
-@pytest.mark.parametrize("processor", [{"avx2": True}, {"avx512f": False}])
-def test_without_wide_vectors_there_is_nothing_to_choose(processor, monkeypatch):
-    known = llvm.FeatureMap(processor)
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
-    assert width.features() is None
-
-
-@pytest.mark.parametrize(("name", "sign"), [("znver5", "-"), ("skylake-avx512", "+")])
-def test_processors_that_slow_their_clock_have_narrow_vectors(name, sign, monkeypatch):
-    known = llvm.FeatureMap({"avx512f": True})
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
-    monkeypatch.setattr(llvm, "get_host_cpu_name", lambda: name)
-    monkeypatch.delenv("HPCCLEAR_VECTOR_BITS", raising=False)
-    assert width.features() == f"+avx512f,{sign}prefer-256-bit"
-
-
-@pytest.mark.parametrize(
-    ("asked", "preference"),
-    [("128", "+prefer-128-bit"), ("256", "+prefer-256-bit"), ("512", "-prefer-256-bit")],
-)
-def test_a_width_may_be_set(asked, preference, monkeypatch):
-    known = llvm.FeatureMap({"avx512f": True})
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
-    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", asked)
-    assert width.features() == f"+avx512f,{preference}"
-
-
-def test_narrow_vectors_may_be_set_on_any_processor(monkeypatch):
-    known = llvm.FeatureMap({"avx2": True})
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: known)
-    monkeypatch.setenv("HPCCLEAR_VECTOR_BITS", "128")
-    assert width.features() == "+avx2,+prefer-128-bit"
 
 
 @pytest.mark.parametrize(
@@ -97,29 +56,3 @@ def test_no_result_depends_on_it(tmp_path):
         files[bits] = [path.read_bytes() for path in written]
         assert len(files[bits]) == 3
     assert files["128"] == files["256"] == files["512"]
-
-
-@wide
-def test_loops_over_coordinates_take_no_vector_that_they_do_not_fill():
-    """With 512 bits preferred, four coordinates went one by one."""
-
-    def doubled(narrow):
-        def double(x):
-            if narrow:
-                narrow_vectors()
-            for k in range(len(x)):
-                x[k] *= 2.0
-
-        compiled = njit(double)
-        compiled(np.ones(4))
-        return compiled.inspect_asm(compiled.signatures[0])
-
-    assert "zmm" not in doubled(True)
-    if "-prefer-256-bit" in features_in_use():
-        assert "zmm" in doubled(False)
-
-
-@pytest.mark.parametrize("lanes", [1, 16])
-def test_single_responses_ask_for_such_vectors_and_ensembles_do_not(lanes):
-    text = inspect.getsource(one_text(explicit_steps, f"explicit_{lanes}", W=lanes, stages=7))
-    assert ("narrow_vectors()" in text) == (lanes == 1)

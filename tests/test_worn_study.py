@@ -10,11 +10,9 @@ from patience import crowded
 from scipy import stats
 
 import hpcclear
-from hpcclear.accuracy.plan import ladder
 from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import Samples
 from hpcclear.ensemble.samples import design
-from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
@@ -23,7 +21,6 @@ from hpcclear.statistics.random.inputs import RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 from hpcclear.study import lives
-from hpcclear.study.extent import samples_of
 
 SCENE = Path(__file__).parent.parent / "jobs" / "worn_study.toml"
 SMALL = (
@@ -51,16 +48,6 @@ def test_a_gauss_rule_of_samples_is_exact_for_polynomials(values):
     nodes, weights = rules.rule(values, 70)  # more than there are values
     assert (weights > 0.0).sum() == 60
     assert weights @ nodes**40 == pytest.approx((known**40).mean(), rel=1e-12)
-
-
-def test_pieces_hold_each_value_once(values):
-    cuts = np.array([-1.0, values.values[20], 0.9, values.values[-1]])
-    nodes, weights = rules.pieces(values, 8, cuts[:-1], cuts[1:])
-    assert weights.sum() == pytest.approx(1.0, abs=1e-14)
-    assert weights[0].sum() == pytest.approx(20 / 60)
-    known = np.array(values.values)
-    assert (weights * nodes**5).sum() == pytest.approx((known**5).mean(), rel=1e-12)
-    assert rules.pieces(values, 3, np.array([5.0]), np.array([6.0]))[1].sum() == 0.0
 
 
 def test_moments_over_samples_are_those_of_each_value(values):
@@ -146,16 +133,6 @@ def test_only_a_study_follows_lives():
         monte_carlo(scene, 4)
 
 
-def test_a_plan_is_of_the_settings_of_the_file():
-    assert ladder(load_scene(SCENE), None) == ()
-    with pytest.raises(InputError, match="Leave it out"):
-        ladder(load_scene(SCENE), 1e-3)
-    counted = samples_of(load_scene(SCENE))
-    assert counted["lives"] == 2 * counted["wear"] > 0
-    with pytest.raises(InputError):
-        ladder(load_scene(SCENE).with_({"wear.lives": 1}), None)
-
-
 # ---- the study -----------------------------------------------------------------------------------
 
 
@@ -222,14 +199,6 @@ def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
         str(name) for name in others.design.values if np.isfinite(others.life_mean.sel(design=name))
     ]
     assert sorted(told) == ["worn alpha", "worn beta", "worn original"]
-
-
-def test_the_page_tells_lives(study):
-    page = write_report(study).read_text()
-    assert "12 service lives of 1e+06 revolutions were simulated; no failures." in page
-    assert "Survival, with 95 % confidence interval" in page
-    assert "mean, own wear" in page
-    (study / "report.html").unlink()
 
 
 @pytest.mark.nightly

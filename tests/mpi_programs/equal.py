@@ -24,15 +24,14 @@ def program(ranks: Ranks) -> None:
     points = design(200)
     seen: list[np.ndarray] = []
 
-    def task(name: str, workers: int | None = None) -> Task:
-        return Task(name, make_sleeping, {"cost": 2e-3, "lanes": 4}, workers=workers)
+    def task(name: str) -> Task:
+        return Task(name, make_sleeping, {"cost": 2e-3, "lanes": 4})
 
     full = run_points(ranks, task("full"), points, on_records=seen.append)
     half = run_points(ranks, task("half"), points, completed=full[::2])
     few = run_points(ranks, task("sleep"), points[:1])
     none = run_points(ranks, task("sleep"), points[:0])
     streamed = run_points(ranks, task("sleep"), points[:9], on_records=seen.append, keep=False)
-    on_one = run_points(ranks, task("on one", 1), points)
     ranks.everywhere("everywhere", leave_a_mark, sys.argv[1])
     called = sorted(
         path.name for path in Path(sys.argv[1]).parent.glob(f"{Path(sys.argv[1]).name}-*")
@@ -46,7 +45,6 @@ def program(ranks: Ranks) -> None:
         few=few,
         none=none,
         streamed=streamed,
-        on_one=on_one,
         called=called,
         seen=np.concatenate(seen),
         size=ranks.size,

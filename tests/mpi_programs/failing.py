@@ -1,7 +1,4 @@
-"""Program errors at every stage: failing.py HOW MARK; MARK is touched when it happens.
-
-Records delivered to root are counted in MARK.records.
-"""
+"""Program errors at every stage: failing.py HOW MARK; MARK is touched when it happens."""
 
 import pathlib
 import sys
@@ -103,13 +100,11 @@ def call(payload: object, ranks: Ranks) -> None:
         refuse()
 
 
-def count(records: np.ndarray) -> None:
+def receive(records: np.ndarray) -> None:
     if HOW == "callback":
         fail()
     if HOW.startswith("deaf root"):
         time.sleep(60.0)
-    with open(f"{MARK}.records", "a", encoding="utf-8") as file:
-        file.writelines(f"{sample}\n" for sample in records["sample"])
 
 
 def program(ranks: Ranks) -> int | None:
@@ -121,7 +116,7 @@ def program(ranks: Ranks) -> int | None:
     payload = Unwelcome() if HOW == "payload" else None
     if "call" in HOW.split():
         ranks.everywhere("call", call, None)
-    run_points(ranks, Task("sampling", make, payload), design(20_000), on_records=count)
+    run_points(ranks, Task("sampling", make, payload), design(20_000), on_records=receive)
     return None
 
 

@@ -159,6 +159,7 @@ class RobustObjective:
         self.nodes = tuple(rule.counts for rule in self._rules)
 
     def __call__(self, designs: np.ndarray) -> np.ndarray:
+        """Return mean and standard deviation of each design (n, k), shape (n, 2)."""
         designs = self._checked(designs)
         if self._draws is not None:
             return self._averaged(designs, self._draws(designs))
