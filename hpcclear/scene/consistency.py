@@ -7,10 +7,10 @@ from pydantic import field_validator, model_validator
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
+from hpcclear.scene.bearings import length_path
 from hpcclear.scene.bending import check_scene
 from hpcclear.scene.fields import check_period, invalid, nearest
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
-from hpcclear.scene.mechanism import length_path
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
 from hpcclear.scene.tables import SceneTables

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.plugins.sources import digest
-from hpcclear.scene.mechanism import Mechanism, TorqueDrive, slender_inertia
+from hpcclear.scene.driving import TorqueDrive
+from hpcclear.scene.mechanism import Mechanism, slender_inertia
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.plausibility import implausible
@@ -79,8 +80,7 @@ def warnings(scene: SceneTables) -> Iterator[str]:
     for name in scene.pins():
         joint: Any = scene.clearance_joint(name)
         start = joint.start_eccentricity
-        parts = start if isinstance(start, tuple) else (start.x, start.y)
-        if sum(part**2 for part in parts) > joint.clearance**2 * (1 + 1e-12):
+        if start.x**2 + start.y**2 > joint.clearance**2 * (1 + 1e-12):
             yield (
                 f"{scene.joint_key(name)}.start_eccentricity lies outside the clearance, "
                 "so the run starts in contact"

@@ -1,6 +1,6 @@
 """What moves a planar linkage: drives of bodies, and loads on bodies and points."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -21,40 +21,9 @@ Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]
 
 
-def check_start(drive: Any) -> None:
-    """Refuse a drive that starts from rest without an expected speed.
-
-    Raises
-    ------
-    PydanticCustomError
-        Naming ``expected_speed``.
-    """
-    if drive.initial_speed == 0.0 and drive.expected_speed is None and not by_interval(drive):
-        raise invalid(
-            "is needed where initial_speed = 0: the tolerances and the first step go by it",
-            'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
-            key="expected_speed",
-        )
-
-
 def by_interval(drive: Any) -> bool:
     """Whether a time replaces the revolution of a drive."""
     return getattr(drive, "interval", None) is not None
-
-
-def check_torque(drive: Any) -> None:
-    """Refuse a drive without a torque, or with two; raises PydanticCustomError."""
-    check_one_of(
-        "torque",
-        drive.torque,
-        drive.torque_by_speed,
-        "Write torque, or torque_by_speed = [[speed, torque], ...]",
-    )
-    if drive.torque_by_speed is not None and drive.no_load_speed is not None:
-        raise invalid(
-            "torque_by_speed says already how the torque falls", "Remove it",
-            key="no_load_speed", value=drive.no_load_speed,
-        )  # fmt: skip
 
 
 def check_by(load: Any, entry: str) -> None:
@@ -82,21 +51,33 @@ def speed_entry(drive: Any) -> str:
     return "initial_speed" if drive.expected_speed is None else "expected_speed"
 
 
-class PlanarSpeed(Table):
+class ConstantSpeed(Table):
+    """The crank turns at a constant prescribed speed, independent of the torque that this requires."""
+
+    kind: Literal["constant-speed"]
+    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
+    """Angular speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions per minute."""
+    turns: Turns = 1
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    elsewhere: ClassVar = dict.fromkeys(
+        ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),
+        (
+            "contradicts a prescribed speed",
+            'Remove it, or set kind = "torque" and give initial_speed instead of speed',
+        ),
+    )
+
+
+class PlanarSpeed(ConstantSpeed):
     """A body turns at a constant speed."""
 
     name: str
-    kind: Literal["constant-speed"]
     body: str
     """Body that rotates."""
-    speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
-    """Angular speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions per minute."""
     period: bool = False
     """Whether one turn of this drive defines the revolution. Default: true for the first drive if no drive has this
     entry."""
-    turns: Turns = 1
-    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
-    `start_angle` of 360 degrees or more begins in the second turn."""
 
 
 class PlanarHarmonic(Table):
@@ -135,42 +116,70 @@ class PlanarTable(Table):
     entry."""
 
 
-class PlanarTorque(Table):
-    """A torque acts on a free body."""
+class TorqueDrive(Table):
+    """A torque acts on the free crank; its speed is a result of the simulation."""
 
-    name: str
     kind: Literal["torque"]
-    body: str
-    """Body on which the torque acts; the reaction acts on the ground."""
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
-    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
+    """Torque, N m; constant, or a table ``[[angle, torque], ...]`` over the turns of a revolution, against the angle of
+    the crank or of the body that defines the period."""
     torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
     """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
     between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque is 0, rad/s. The torque decreases linearly with the speed, as that of a motor. Without
     it the torque does not depend on the speed."""
+    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
+    """Moment of inertia of a flywheel that turns with it, kg m2."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
     """Angular speed at the start, rad/s; 0: from rest."""
     expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Approximate speed to expect, rad/s. Tolerances and the first step are scaled by it, or by `initial_speed` if it
     is missing. Required for a start from rest."""
-    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    """Moment of inertia of a flywheel on the body, kg m2."""
+    turns: Turns = 1
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    elsewhere: ClassVar = {
+        "speed": (
+            "a drive by a torque has no prescribed speed",
+            'Remove it and give initial_speed, or set kind = "constant-speed"',
+        )
+    }
+
+    @model_validator(mode="after")
+    def _started(self) -> Self:
+        """It has one torque, and a speed that tolerances go by."""
+        if self.initial_speed == 0.0 and self.expected_speed is None and not by_interval(self):
+            raise invalid(
+                "is needed where initial_speed = 0: the tolerances and the first step go by it",
+                'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
+                key="expected_speed",
+            )
+        remedy = "Write torque, or torque_by_speed = [[speed, torque], ...]"
+        check_one_of("torque", self.torque, self.torque_by_speed, remedy)
+        if self.torque_by_speed is not None and self.no_load_speed is not None:
+            raise invalid(
+                "torque_by_speed says already how the torque falls", "Remove it",
+                key="no_load_speed", value=self.no_load_speed,
+            )  # fmt: skip
+        return self
+
+
+class PlanarTorque(TorqueDrive):
+    """A torque acts on a free body."""
+
+    name: str
+    body: str
+    """Body on which the torque acts; the reaction acts on the ground."""
     period: bool = False
     """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
-    turns: Turns = 1
-    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
-    `start_angle` of 360 degrees or more begins in the second turn."""
     interval: Interval | None = None
     """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
 
     @model_validator(mode="after")
-    def _started(self) -> "PlanarTorque":
-        check_start(self)
+    def _by_turns_or_time(self) -> Self:
         if by_interval(self) and self.turns != 1:
             raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
-        check_torque(self)
         return self
 
 

@@ -1,6 +1,6 @@
 """A guide with clearance: a rectangular slider in a channel that is a little wider, in the tables of a scene."""
 
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
@@ -10,9 +10,7 @@ from hpcclear.scene.materials import Material
 from hpcclear.scene.places import Angle
 
 NEEDED = ("length", "height", "corner_radius")
-SHAPED = ("clearance", *NEEDED, "width")
-"""Entries that a guide with clearance has; the others of `STARTED` may be left out."""
-STARTED = ("start_offset", "start_tilt")
+"""Entries that a slide with clearance has to have."""
 
 NOT_OF_GUIDES = {
     "wear": (
@@ -42,24 +40,19 @@ class OfContacts:
     out_of_round: ClassVar[None] = None
 
 
-class SliderGuide(OfContacts, Table):
-    """The guide of a slider-crank, with clearance."""
+class Guide(OfContacts, Table):
+    """A guide that may have clearance: a rectangular slider in a channel that is a little higher."""
 
-    kind: Literal["slide"]
-    clearance: PositiveLength
-    """Gap on either side of a slider in the middle of its channel, m."""
-    length: PositiveLength
-    """Length of the slider along the guide, m. Its pin is in the middle."""
-    height: PositiveLength
-    """Height of the slider across the guide, m. The channel is higher by twice the clearance."""
-    corner_radius: PositiveLength
+    clearance: PositiveLength | None = None
+    """Gap on either side of a slider in the middle of its channel, m. Without it the guide is ideal."""
+    length: PositiveLength | None = None
+    """Length of a slider with clearance along the guide, m. Its point, of a slider-crank its pin, is in the middle."""
+    height: PositiveLength | None = None
+    """Height of a slider with clearance across the guide, m. The channel is higher by twice the clearance."""
+    corner_radius: PositiveLength | None = None
     """Radius of the slider's rounded corners, m. It determines the contact stiffness."""
     width: PositiveLength | None = None
     """Width of the slider at right angles to the plane, m. Line contact requires it."""
-    bearing: Material
-    """Material of the channel."""
-    journal: Material
-    """Material of the slider."""
     start_offset: Length | None = None
     """Distance of the slider's middle from the guide's line at the start, positive to the left, m; default 0."""
     start_tilt: Angle | None = None
@@ -68,26 +61,30 @@ class SliderGuide(OfContacts, Table):
     elsewhere: ClassVar = NOT_OF_GUIDES
 
     @model_validator(mode="after")
-    def _slider_fits(self) -> "SliderGuide":
-        check_slider(self)
+    def _slider_fits(self) -> Self:
+        check_slide(self)
         return self
 
 
-def check_slider(guide: Any) -> None:
-    """An error for validators where corners are rounder than the slider is long or high."""
-    for entry in ("length", "height"):
-        size = getattr(guide, entry)
-        if 2.0 * guide.corner_radius >= size:
-            raise invalid(
-                f"both corners of a side must fit into the slider's {entry} ({size:g} m)",
-                f"Write less than half of the {entry}, such as 1 mm",
-                key="corner_radius", value=guide.corner_radius,
-            )  # fmt: skip
+class SliderGuide(Guide):
+    """The guide of a slider-crank, with clearance."""
+
+    kind: Literal["slide"]
+    clearance: PositiveLength
+    """Gap on either side of a slider in the middle of its channel, m."""
+    bearing: Material
+    """Material of the channel."""
+    journal: Material
+    """Material of the slider."""
 
 
 def check_slide(guide: Any) -> None:
-    """An error for validators unless a slide of a linkage is one without clearance, or one with all that this needs."""
-    own = (*NEEDED, "width", "materials", *STARTED)
+    """An error for validators unless a slide is one without clearance, or one with all that this needs."""
+    own = [
+        name
+        for name in (*NEEDED, "width", "materials", "start_offset", "start_tilt")
+        if name in type(guide).model_fields
+    ]
     given = [name for name in own if getattr(guide, name) is not None]
     if guide.clearance is None:
         if given:
@@ -97,14 +94,21 @@ def check_slide(guide: Any) -> None:
             )  # fmt: skip
         return
     for name in (*NEEDED, "materials"):
-        if getattr(guide, name) is None:
+        if name in own and name not in given:
             raise invalid(
                 "is missing, and a slide with clearance needs it",
                 "Add it, or remove clearance for a guide without", key=name, value=None,
             )  # fmt: skip
-    if guide.friction is not None:
+    if getattr(guide, "friction", None) is not None:
         raise invalid(
             "a slide with clearance rubs at its corners, by the friction of all contacts",
             "Remove it, and write effects.friction", key="friction", value=None,
         )  # fmt: skip
-    check_slider(guide)
+    for entry in ("length", "height"):
+        size = getattr(guide, entry)
+        if 2.0 * guide.corner_radius >= size:
+            raise invalid(
+                f"both corners of a side must fit into the slider's {entry} ({size:g} m)",
+                f"Write less than half of the {entry}, such as 1 mm",
+                key="corner_radius", value=guide.corner_radius,
+            )  # fmt: skip

@@ -7,11 +7,19 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hpcclear.scene.driving import ForceLoad, PlanarDrive, PlanarSpeed, PlanarTorque
-from hpcclear.scene.guides import SHAPED, STARTED
+from hpcclear.scene.bearings import Bearing
+from hpcclear.scene.driving import (
+    ConstantSpeed,
+    ForceLoad,
+    PlanarDrive,
+    PlanarSpeed,
+    PlanarTorque,
+)
+from hpcclear.scene.fields import Table
+from hpcclear.scene.guides import Guide
 from hpcclear.scene.materials import Materials
-from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed
-from hpcclear.scene.places import NamedPlace, Place
+from hpcclear.scene.mechanism import ClearanceJoint
+from hpcclear.scene.places import NamedPlace
 from hpcclear.scene.planar import (
     Ground,
     Planar,
@@ -21,7 +29,6 @@ from hpcclear.scene.planar import (
     PlanarRevolute,
     PlanarSlide,
 )
-from hpcclear.scene.rubbing import Rubbing
 
 JOINTS = {"crank_rod": ("crank.b", "rod.a"), "rod_slider": ("slider.pin", "rod.b")}
 """Journal and bearing of the joints that may have clearance: O12, O23."""
@@ -87,16 +94,13 @@ def linkage_of(scene: Any) -> Planar:
     slider = PlanarBody.model_construct(
         name="slider", mass=mechanism.slider.mass, points=(pin,), **turning
     )
-    rubs = effects.guide_friction
-    friction = None
-    if rubs is not None:
-        friction = Rubbing.model_construct(coefficient=rubs.coefficient, ramp_speed=rubs.ramp_speed)
     ground, line = Ground(), "ground.o"
     if mechanism.offset is not None:
         beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
         ground, line = Ground(points=(*ground.points, beside)), "ground.guide"
     guide = PlanarSlide.model_construct(
-        name="guide", kind="slide", point="slider.pin", line=line, friction=friction,
+        name="guide", kind="slide", point="slider.pin", line=line,
+        friction=effects.guide_friction,
         **_loose(scene.joints.guide),
     )  # fmt: skip
     frame = PlanarRevolute.model_construct(
@@ -121,10 +125,16 @@ def linkage_of(scene: Any) -> Planar:
 
 def _loose(guide: Any) -> dict[str, Any]:
     """Entries of the slide that a guide with clearance stands for."""
-    if guide is None:
-        return {}
-    materials = Materials.model_construct(bearing=guide.bearing, journal=guide.journal)
-    return {name: getattr(guide, name) for name in (*SHAPED, *STARTED)} | {"materials": materials}
+    return {} if guide is None else _entries(guide, Guide) | {"materials": _materials(guide)}
+
+
+def _entries(table: Any, of: type[Table]) -> dict[str, Any]:
+    """Entries of a table that it has in common with the linkage's."""
+    return {name: getattr(table, name) for name in of.model_fields}
+
+
+def _materials(joint: Any) -> Materials:
+    return Materials.model_construct(bearing=joint.bearing, journal=joint.journal)
 
 
 def _joint(scene: Any, name: str) -> PlanarJoint:
@@ -132,16 +142,13 @@ def _joint(scene: Any, name: str) -> PlanarJoint:
     places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
-    x, y = joint.start_eccentricity
     return PlanarClearance.model_construct(
-        **places, kind="clearance", clearance=joint.clearance, bearing_radius=joint.bearing_radius,
-        length=joint.length, materials=Materials.model_construct(bearing=joint.bearing, journal=joint.journal),
-        start_eccentricity=Place.model_construct(x=x, y=y),
-        wear=joint.wear, film=joint.film, out_of_round=joint.out_of_round,
-    )  # fmt: skip
+        **places, **_entries(joint, Bearing), materials=_materials(joint)
+    )
 
 
 def _drive(drive: Any) -> PlanarDrive:
     model = PlanarSpeed if isinstance(drive, ConstantSpeed) else PlanarTorque
-    entries = {name: getattr(drive, name) for name in type(drive).model_fields}
-    return model.model_construct(name="drive", body="crank", period=True, **entries)
+    return model.model_construct(
+        name="drive", body="crank", period=True, **_entries(drive, type(drive))
+    )

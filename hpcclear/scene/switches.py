@@ -11,10 +11,9 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import mean_of
-from hpcclear.scene.driving import PlanarTorque, speed_entry
+from hpcclear.scene.driving import TorqueDrive, speed_entry
 from hpcclear.scene.fields import Curve
 from hpcclear.scene.guides import SliderGuide
-from hpcclear.scene.mechanism import TorqueDrive
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
 from hpcclear.scene.scene import Scene
@@ -189,14 +188,13 @@ def _mean(
 
 def _drives(scene: Scene) -> Iterator[Switch]:
     """A free crank, in whose place one turns at the speed that is expected of it, or that it starts with."""
+    tables: list[tuple[str, str, Any]] = [("", "drive", scene.drive)]
     if isinstance(scene.mechanism, Planar):
-        drives = [one for one in scene.mechanism.drives if isinstance(one, PlanarTorque)]
-        tables: list[tuple[str, str, PlanarTorque | TorqueDrive]] = [
-            (f" of {one.name}", f"mechanism.drives.{one.name}", one) for one in drives
-        ]
-    else:
-        tables = [("", "drive", scene.drive)] if isinstance(scene.drive, TorqueDrive) else []
+        drives = scene.mechanism.drives
+        tables = [(f" of {one.name}", f"mechanism.drives.{one.name}", one) for one in drives]
     for whose, key, drive in tables:
+        if not isinstance(drive, TorqueDrive):
+            continue
         kept = {name: plain(drive).get(name) for name in ("body", "period", "turns")}
         table = {name: value for name, value in kept.items() if value is not None}
         entry = speed_entry(drive)

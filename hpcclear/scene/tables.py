@@ -11,30 +11,25 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
+from hpcclear.scene.bearings import Bearing
 from hpcclear.scene.bending import Bending
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, nearest
 from hpcclear.scene.film import Film
-from hpcclear.scene.guides import SliderGuide
-from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.guides import Guide
+from hpcclear.scene.mechanism import Drive, Joints, Mechanism
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
+from hpcclear.scene.planar import Planar
 from hpcclear.scene.plugged import Plugins
 from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.study import Study
 from hpcclear.scene.wear import Lives
 
-Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide | PlanarSlot
+Loose = Bearing | Guide | PlanarSlot
 """Tables of joints that may have clearance."""
-
-
-def _is_loose(joint: Any) -> bool:
-    """Whether a joint of a linkage has clearance."""
-    slides = isinstance(joint, (PlanarSlide, PlanarSlot))
-    return joint.clearance is not None if slides else isinstance(joint, PlanarClearance)
 
 
 class SceneTables(Table):
@@ -211,7 +206,9 @@ class SceneTables(Table):
 
     def clearance_joints(self) -> tuple[str, ...]:
         """Names of the joints with clearance, O12 before O23; those of a linkage in file order."""
-        return tuple(joint.name for joint in self.linkage.joints if _is_loose(joint))
+        return tuple(
+            joint.name for joint in self.linkage.joints if getattr(joint, "clearance", None)
+        )
 
     def contact_labels(self) -> tuple[str, ...]:
         """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a
@@ -260,7 +257,7 @@ class SceneTables(Table):
         found = {}
         for one in self.linkage.joints:
             if (rubs := getattr(one, "friction", None)) is not None:
-                guide = isinstance(one, PlanarSlide)
+                guide = isinstance(one, Guide)
                 key, words = (
                     f"{self.joint_key(one.name)}.friction",
                     f"{'guide' if guide else 'pin'} friction in {one.name}",
@@ -270,10 +267,10 @@ class SceneTables(Table):
                 found[key] = words, rubs.coefficient
         return found
 
-    def pin(self, name: str) -> ClearanceJoint | PlanarClearance:
+    def pin(self, name: str) -> Bearing:
         """The table of a pin in a bearing."""
         found = self.clearance_joint(name)
-        assert isinstance(found, (ClearanceJoint, PlanarClearance))
+        assert isinstance(found, Bearing)
         return found
 
     def clearance_joint(self, label: str) -> Loose:

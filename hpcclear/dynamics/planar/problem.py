@@ -33,6 +33,9 @@ NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius
                 "coefficient", "radius", "ramp_speed")  # fmt: skip
 """Entries that no sample's start depends on."""
 
+NOT_OF_MOTION = (".out_of_round.", ".start_eccentricity.")
+"""Parts of paths of entries that may be zero and have no term of their own in a motion."""
+
 
 @lru_cache(maxsize=16)
 def linkage_of(scene: Scene) -> Linkage:
@@ -126,7 +129,7 @@ def _may_vary(scene: Scene) -> set[str]:
     if scene.template is None:
         return _varied(scene)
     found = {path for path in scene.numeric_paths() if _in_tables(scene, path)}
-    return {path for path in found if ".out_of_round." not in path}
+    return {path for path in found if not any(part in path for part in NOT_OF_MOTION)}
 
 
 def is_prescribed(scene: Scene) -> bool:
