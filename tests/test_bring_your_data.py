@@ -17,9 +17,9 @@ from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.fields import CurveOf, MotionTable
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.loads import Law
 from hpcclear.scene.measured import BY_TIME, CURVES
 from hpcclear.scene.paths import PHYSICAL, _named, _parts
+from hpcclear.scene.piecewise import Piecewise
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.points import Points
 from hpcclear.scene.table import read_points
@@ -58,7 +58,7 @@ def test_files_stand_wherever_a_table_stands():
                         found[path] = one.unit
                     if isinstance(one, MotionTable):
                         found[path] = "rad"
-                    if isinstance(one, Law) and one.x == "s":
+                    if isinstance(one, Piecewise) and one.x == "s":
                         found[path] = one.unit
                 walk(field.annotation, f"{path}.*" if _named(field) else path)
 

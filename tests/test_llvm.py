@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linkages import slider_crank
+from linkages import load, slider_crank
 from numba import njit, types
 from some_laws import CONTACT, FRICTION, STIFFNESS, effects_with, row
 
@@ -26,7 +26,6 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import (
     Bending,
     ConstantSpeed,
-    Force,
     GuideFriction,
     TorqueDrive,
 )
@@ -48,7 +47,8 @@ def linkage_with(on):
         table = "torque_table" in on
         drive = TorqueDrive("motor", "crank", 3.0, 40.0, table=table, no_load_speed=falls)
     if on & {"load", "load_table"}:
-        loads = (Force("load", "slider.pin", (-4.0, 0.0), "load_table" in on),)
+        size = [[0.0, 1.0], [3.0, 2.0]] if "load_table" in on else 4.0
+        loads = (load("force", "load", place="slider.pin", size=size, direction=math.pi),)
     opened = [pin for pin, flag in (("o12", "crank_rod"), ("o23", "rod_slider")) if flag in on]
     friction = GuideFriction(0.1, 0.2) if "guide" in on else None
     made = slider_crank(*opened, drive=drive, friction=friction, loads=loads)

@@ -1,4 +1,4 @@
-"""What moves a planar linkage: drives of bodies, and loads on bodies and points."""
+"""What moves a mechanism: drives of bodies."""
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -14,8 +14,8 @@ from hpcclear.scene.fields import (
     check_one_of,
     invalid,
 )
-from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad, by_time
-from hpcclear.scene.places import Angle, PairTable
+from hpcclear.scene.piecewise import Piecewise, by_time
+from hpcclear.scene.places import Angle
 
 Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]
@@ -24,24 +24,6 @@ Interval = Annotated[float, Quantity("s", above=0)]
 def by_interval(drive: Any) -> bool:
     """Whether a time replaces the revolution of a drive."""
     return getattr(drive, "interval", None) is not None
-
-
-def check_by(load: Any, entry: str) -> None:
-    """Refuse a load whose table goes by two things, or has no table to go by them; raises PydanticCustomError."""
-    timed = getattr(load, f"{entry}_by_time")
-    if timed is not None and getattr(load, entry) is not None:
-        raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
-    if load.angle_of is not None and not isinstance(getattr(load, entry), tuple):
-        reason = f"there is no table of {entry} against an angle"
-        raise invalid(reason, "Remove it", key="angle_of", value=load.angle_of)
-    if load.repeats and timed is None:
-        raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
-    if load.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
-        raise invalid(
-            "a table that repeats begins at 0 s, and ends at the value with which it begins",
-            "Make its first and last value equal",
-            key=f"{entry}_by_time",
-        )
 
 
 def speed_entry(drive: Any) -> str:
@@ -123,7 +105,7 @@ class TorqueDrive(Table):
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
     """Torque, N m; constant, or a table ``[[angle, torque], ...]`` over the turns of a revolution, against the angle of
     the crank or of the body that defines the period."""
-    torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
+    torque_by_speed: Annotated[Any, Piecewise("rad/s", "N*m")] | None = None
     """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
     between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
@@ -230,96 +212,5 @@ class PlanarRunUp(Table):
 
 PlanarDrive = Annotated[
     PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp | PlanarFree,
-    Field(discriminator="kind"),
-]
-
-
-class Components(PairTable):
-    """A force by its components along the ground's axes, N. ``[x, y]`` is a short form."""
-
-    x: Annotated[float, Quantity("N")]
-    """x component, N."""
-    y: Annotated[float, Quantity("N")]
-    """y component, N."""
-
-
-class ForceLoad(Table):
-    """A force at a point: by its components along the ground's axes, or by size and direction."""
-
-    name: str
-    kind: Literal["force"]
-    place: str
-    """``body.point`` on which the force acts."""
-    force: Components | None = None
-    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
-    """Force along `direction`, N; constant, or a table against the angle of the body that defines the period. The angle
-    is measured counter-clockwise from the x axis and includes `start_angle`, for both directions of rotation."""
-    size_by_time: Annotated[Any, by_time("N")] | None = None
-    """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
-    repeats: Annotated[bool, Field(strict=True)] = False
-    """Whether the table over time repeats after its last row."""
-    angle_of: str | None = None
-    """Another body against whose angle the table of `size` is read; it repeats with each turn of that body."""
-    direction: Angle = 0.0
-    """Angle of the force from the ground's x axis, rad."""
-    follows: Annotated[bool, Field(strict=True)] = False
-    """Whether the force rotates with the body. Components and direction then refer to the axes of the body."""
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> "ForceLoad":
-        force = None if self.force is None else [self.force.x, self.force.y]
-        size = self.size if self.size is not None else self.size_by_time
-        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
-        check_by(self, "size")
-        return self
-
-
-class TorqueLoad(Table):
-    """A torque on a body."""
-
-    name: str
-    kind: Literal["torque"]
-    body: str
-    """Body on which the torque acts; the reaction acts on the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
-    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
-    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
-    """Instead of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on; smooth between the rows, constant after the
-    last."""
-    repeats: Annotated[bool, Field(strict=True)] = False
-    """Whether the table over time repeats after its last row."""
-    angle_of: str | None = None
-    """Another body against whose angle the table of `torque` is read; it repeats with each turn of that body."""
-
-    @model_validator(mode="after")
-    def _by_one(self) -> "TorqueLoad":
-        check_by(self, "torque")
-        remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
-        check_one_of("torque", self.torque, self.torque_by_time, remedy)
-        return self
-
-
-class SpringLoad(Table):
-    """A spring and damper between two points."""
-
-    name: str
-    kind: Literal["spring"]
-    first: str
-    """``body.point``, or ``ground.point``."""
-    second: str
-    """``body.point``, or ``ground.point``."""
-    stiffness: Annotated[float, Quantity("N/m", least=0)]
-    """Stiffness, N/m."""
-    length: Annotated[float, Quantity("m", least=0)] = 0.0
-    """Length at which the spring exerts no force, m."""
-    damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
-    """Damping along the line between both points, N s/m."""
-    acts: Literal["both", "pushing", "pulling"] = "both"
-    """Range in which the spring acts: "both" sides of its length; "pushing": only when shorter, as a buffer or end
-    stop; "pulling": only when longer, as a rope."""
-
-
-PlanarLoad = Annotated[
-    ForceLoad | TorqueLoad | SpringLoad | TorsionSpringLoad | CylinderLoad | DragLoad,
     Field(discriminator="kind"),
 ]

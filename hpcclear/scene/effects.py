@@ -7,7 +7,7 @@ from pydantic import field_validator, model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
-from hpcclear.scene.loads import Law
+from hpcclear.scene.piecewise import Piecewise
 from hpcclear.scene.rubbing import Rubbing
 
 
@@ -21,7 +21,7 @@ class Contact(LawTable):
     geometry: str | None = None
     """Geometry of the contact: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or
     "table"."""
-    curve: Annotated[Any, Law("m", "N")] | None = None
+    curve: Annotated[Any, Piecewise("m", "N")] | None = None
     """For the geometry "table": ``[[depth, force], ...]``, m and N, both increasing from 0."""
     minimum_impact_speed: Speed = 1e-3
     """Lower bound of the impact velocity in the damping, m/s."""

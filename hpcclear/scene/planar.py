@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.scene.bearings import Bearing
 from hpcclear.scene.bending import Bending, check_bars
-from hpcclear.scene.driving import PlanarDrive, PlanarLoad
+from hpcclear.scene.driving import PlanarDrive
 from hpcclear.scene.fields import (
     Length,
     Mass,
@@ -21,6 +21,7 @@ from hpcclear.scene.fields import (
     nearest,
 )
 from hpcclear.scene.guides import Guide
+from hpcclear.scene.loads import AnyLoad
 from hpcclear.scene.materials import Materials
 from hpcclear.scene.mechanism import slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
@@ -177,7 +178,7 @@ class Planar(Table):
     """The joints. ``like = "NAME"`` copies the entries of another joint."""
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
     """Drives of the mechanism; one is sufficient."""
-    loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
+    loads: Annotated[tuple[AnyLoad, ...], Rows] = ()
     """Forces, torques and springs. Gravity is an entry of `effects`."""
     followed: str | None = None
     """``body.point`` whose acceleration and path responses contain."""
@@ -207,13 +208,10 @@ class Planar(Table):
         turns = turns_of(self) if self.drives else 1
         for table in ("drives", "loads"):
             for row in getattr(self, table):
-                for entry in ("torque", "size"):
-                    curve = getattr(row, entry, None)
-                    if isinstance(curve, tuple):
-                        by_another = getattr(row, "angle_of", None) is not None
-                        check_period(
-                            curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}"
-                        )
+                entry = getattr(row, "size_entry", "torque")
+                if isinstance(curve := getattr(row, entry, None), tuple):
+                    by_another = getattr(row, "angle_of", None) is not None
+                    check_period(curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}")
         return self
 
     @model_validator(mode="before")

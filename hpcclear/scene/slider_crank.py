@@ -10,13 +10,13 @@ from typing import Any
 from hpcclear.scene.bearings import Bearing
 from hpcclear.scene.driving import (
     ConstantSpeed,
-    ForceLoad,
     PlanarDrive,
     PlanarSpeed,
     PlanarTorque,
 )
 from hpcclear.scene.fields import Table
 from hpcclear.scene.guides import Guide
+from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.materials import Materials
 from hpcclear.scene.mechanism import ClearanceJoint
 from hpcclear.scene.places import NamedPlace

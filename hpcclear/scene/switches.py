@@ -14,6 +14,7 @@ from hpcclear.base.pieces import mean_of
 from hpcclear.scene.driving import TorqueDrive, speed_entry
 from hpcclear.scene.fields import Curve
 from hpcclear.scene.guides import SliderGuide
+from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
 from hpcclear.scene.scene import Scene
@@ -171,9 +172,9 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         for load in mechanism.loads:
             key = f"mechanism.loads.{load.name}"
             yield Switch(f"{load.kind} {load.name}", {key: None})
-            for entry in ("size", "torque"):
-                curve, other = getattr(load, entry, None), getattr(load, "angle_of", None)
-                yield from _mean(scene, load.name, f"{key}.{entry}", curve, 1 if other else None)
+            if isinstance(load, SizedLoad):
+                entry, turns = load.size_entry, 1 if load.angle_of else None
+                yield from _mean(scene, load.name, f"{key}.{entry}", getattr(load, entry), turns)
 
 
 def _mean(

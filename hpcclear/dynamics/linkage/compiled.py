@@ -4,6 +4,7 @@ The file stands beside Numba's cache, to be read; it is named by its content.
 """
 
 import hashlib
+import inspect
 from types import ModuleType
 
 from hpcclear.base.one_text import module_of
@@ -13,6 +14,7 @@ from hpcclear.dynamics.linkage.generator import Motion
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
+import numpy as np
 from numba import carray
 
 from hpcclear.base.bits import beyond
@@ -76,8 +78,10 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
         elements=", ".join(called or ["look_up"]),
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
+    own = [f"@lane_function\n{inspect.getsource(one)}\n\n" for one in motion.functions.values()]
     lane = f"@apart\n@lane_function\n{motion.source}"
-    return f"{head}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
+    text = f"{''.join(own)}{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
+    return f"{head}\n{held}\n\n\n{text}"
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:

@@ -4,7 +4,7 @@ Zeros disappear, signs move outwards, and nothing else is rearranged: the text a
 in which the generator did, which decides the last bits. Names are read where they are first needed.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
@@ -132,6 +132,7 @@ class Writer:
         self.derived: dict[str, str] = {}  # name: text in parameters
         self.inputs: dict[str, None] = {}  # parameters that a line or a derived one reads
         self.read: set[str] = set()  # those that have a row
+        self.functions: dict[str, Callable[..., object]] = {}  # of loads, which lines call
         self._derived_names: dict[str, str] = {}
         self._pending: dict[str, tuple[tuple[str, ...], str, tuple[Term, ...]]] = {}
         self._values: dict[str, Term] = {}
@@ -173,6 +174,11 @@ class Writer:
             candidate, count = f"{name}_{count}", count + 1
         self._taken.add(candidate)
         return candidate
+
+    def called(self, function: Callable[..., object]) -> str:
+        """The name by which lines call a function that is not one of `elements`."""
+        self.functions[function.__name__] = function
+        return function.__name__
 
     def line(self, text: str) -> None:
         """A statement as it stands; its names must have been written already (see `text`)."""

@@ -3,11 +3,9 @@
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.pieces import Pieces, level, periodic
+from hpcclear.base.pieces import Pieces, periodic
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.laws.hertz_contact import (
     contact_stiffness,
@@ -15,19 +13,16 @@ from hpcclear.dynamics.laws.hertz_contact import (
     sphere_stiffness,
 )
 from hpcclear.dynamics.linkage import parts
-from hpcclear.dynamics.linkage.loads import KINDS
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
 from hpcclear.dynamics.planar.curves import angle_pieces, speed_pieces
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
-    ForceLoad,
     PlanarFree,
     PlanarHarmonic,
     PlanarRunUp,
     PlanarSpeed,
     PlanarTable,
     PlanarTorque,
-    SpringLoad,
 )
 from hpcclear.scene.materials import Materials
 from hpcclear.scene.planar import (
@@ -79,7 +74,7 @@ def _tables(planar: Any) -> dict[str, Any]:
         "joints": joints,
         "drives": tuple(_drive(drive) for drive in planar.drives),
         "ground": {point.name: (point.x, point.y) for point in planar.ground.points},
-        "loads": tuple(_load(load) for load in planar.loads),
+        "loads": planar.loads,
     }
 
 
@@ -206,52 +201,11 @@ def _drive(drive: object) -> parts.Drive:
     )  # fmt: skip
 
 
-def _load(load: Any) -> parts.Load:
-    if isinstance(load, ForceLoad):
-        if load.force is not None:
-            pair = (load.force.x, load.force.y)
-            return parts.Force(load.name, load.place, pair, follows=load.follows)
-        table = isinstance(load.size, tuple) or load.size is None
-        size: Any = 1.0 if table else load.size
-        # a quarter turn is one, to the last bit
-        cosine, sine = (
-            np.where(np.abs(part) < 1e-15, 0.0, part)[()]
-            for part in (np.cos(load.direction), np.sin(load.direction))
-        )
-        pair = (size * cosine, size * sine)
-        return parts.Force(load.name, load.place, pair, table, load.follows, _by(load))
-    if isinstance(load, SpringLoad):
-        return parts.Spring(
-            load.name, load.first, load.second, load.stiffness, load.length, load.damping,
-            {"both": 0, "pushing": -1, "pulling": 1}[load.acts],
-        )  # fmt: skip
-    if load.kind in KINDS:
-        return KINDS[load.kind].of(load)
-    table = isinstance(load.torque, tuple) or load.torque is None
-    return parts.Torque(load.name, load.body, 1.0 if table else load.torque, table, _by(load))
-
-
-def _by(load: Any) -> parts.By | None:
-    rows = load.size_by_time if isinstance(load, ForceLoad) else load.torque_by_time
-    if rows is not None:
-        return parts.By(seconds=rows[-1][0], repeats=load.repeats)
-    return None if load.angle_of is None else parts.By(load.angle_of)
-
-
 def curves_of(planar: Planar, interpolation: str = "smooth") -> dict[str, Pieces]:
     """Tables of drives and loads by name, over the angle (rad) or time (s) that each goes by."""
-    found, turns = {}, turns_of(planar)
-    for row in (*planar.drives, *planar.loads):
-        for entry in ("torque", "size"):
-            if isinstance(curve := getattr(row, entry, None), tuple):
-                by_another = getattr(row, "angle_of", None) is not None
-                length = at.TURN * (1 if by_another else turns)
-                found[row.name] = periodic(curve, length, interpolation)
-            if (curve := getattr(row, f"{entry}_by_time", None)) is not None:
-                again = row.repeats  # type: ignore[union-attr]
-                found[row.name] = (
-                    periodic(curve, curve[-1][0], interpolation)
-                    if again
-                    else level(curve, interpolation)
-                )
+    turns = turns_of(planar)
+    found = {load.name: load.curve(turns, interpolation) for load in planar.loads if load.table}
+    for drive in planar.drives:
+        if isinstance(curve := getattr(drive, "torque", None), tuple):
+            found[drive.name] = periodic(curve, at.TURN * turns, interpolation)
     return found
