@@ -154,7 +154,8 @@ BROKEN = {
         with_more("loads", load("force", "gas", place="piston.pin", force=[1.0, 0.0])), "loads.gas.place", "no body",
     ),
     "a spring nowhere": (
-        with_more("loads", load("spring", "band", first="crank.a", second="crank.z", stiffness=1.0)), "loads.band.second", "no point",
+        with_more("loads", load("spring", "band", first="crank.a", second="crank.z", stiffness=1.0)),
+        "loads.band.second", "no point",
     ),
     "too many joints with clearance": (
         lambda: Mechanism(

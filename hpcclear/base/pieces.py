@@ -91,7 +91,7 @@ def mean_of(rows: Rows, length: float, interpolation: str = "smooth") -> float:
 
 
 def hinges(name: str, rows: Rows) -> dict[str, float]:
-    """Parameters of a table that runs straight from row to row and stays level beyond: first value, places and sizes of bends."""
+    """Parameters of a table that runs straight from row to row and stays level beyond: first value, places and bends."""
     x, y = np.array(rows).T
     slopes = np.diff(y) / np.diff(x)
     bends = np.diff(np.concatenate([[0.0], slopes, [0.0]]))

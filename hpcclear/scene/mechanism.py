@@ -57,13 +57,6 @@ class Mechanism(Table):
 
     @model_validator(mode="after")
     def _assembles(self) -> "Mechanism":
-        if self.crank.bending is not None:
-            raise invalid(
-                "the drive clamps the crank, but the modes are those of pinned ends",
-                "Leave it out, or let the rod bend",
-                key="crank.bending",
-                value=None,
-            )
         offset = abs(self.offset or 0.0)
         if self.rod.length <= self.crank.length + offset:
             beside = f" and the offset ({offset:g} m)" if offset else ""

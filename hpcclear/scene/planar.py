@@ -199,12 +199,13 @@ class Planar(Table):
         return self
 
     @model_validator(mode="after")
-    def _bars_may_bend(self) -> "Planar":
-        check_bars(self)
+    def _tables_fit(self) -> "Planar":
+        self.check()
         return self
 
-    @model_validator(mode="after")
-    def _curves_repeat(self) -> "Planar":
+    def check(self) -> None:
+        """An error for validators unless bars that bend are held by pins, and curves repeat with the revolution."""
+        check_bars(self)
         turns = turns_of(self) if self.drives else 1
         for table in ("drives", "loads"):
             for row in getattr(self, table):
@@ -212,7 +213,6 @@ class Planar(Table):
                 if isinstance(curve := getattr(row, entry, None), tuple):
                     by_another = getattr(row, "angle_of", None) is not None
                     check_period(curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}")
-        return self
 
     @model_validator(mode="before")
     @classmethod

@@ -77,6 +77,14 @@ def path_in_linkage(path: str) -> str:
     return path
 
 
+def path_in_scene(path: str) -> str:
+    """The entry of a slider-crank's scene that stands for one of the linkage's tables, itself if none does."""
+    for own, table in _TABLES.items():
+        if path == table or path.startswith(f"{table}."):
+            return own + path.removeprefix(table).replace(".materials", "")
+    return path
+
+
 def linkage_of(scene: Any) -> Planar:
     """The tables of the linkage that a scene's slider-crank is; they are valid since the scene's are."""
     mechanism, effects = scene.mechanism, scene.effects

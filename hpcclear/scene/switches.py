@@ -13,13 +13,10 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import mean_of
 from hpcclear.scene.driving import TorqueDrive, speed_entry
 from hpcclear.scene.fields import Curve
-from hpcclear.scene.guides import SliderGuide
 from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
+from hpcclear.scene.planar import Planar, PlanarClearance, turns_of
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.slots import PlanarSlot
-from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import scene_of
 
 GENTLE_RAMP = 50.0
@@ -81,14 +78,12 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
         if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        ideal: dict[str, Any] | None = {"kind": "ideal"}
-        if isinstance(joint, SliderGuide):
-            ideal = None
-        elif isinstance(joint, PlanarClearance):
+        pin, kept = isinstance(joint, PlanarClearance), ("kind", "point", "line", "angle")
+        ideal: dict[str, Any] | None = {name: getattr(joint, name, None) for name in kept}
+        if scene.template is not None:
+            ideal = {"kind": "ideal"} if pin else None
+        elif pin:
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
-        elif isinstance(joint, (PlanarSlide, PlanarSlot)):
-            kept = ("kind", "point", "line", "angle")
-            ideal = {name: getattr(joint, name) for name in kept}
         yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
 
 
@@ -189,16 +184,14 @@ def _mean(
 
 def _drives(scene: Scene) -> Iterator[Switch]:
     """A free crank, in whose place one turns at the speed that is expected of it, or that it starts with."""
-    tables: list[tuple[str, str, Any]] = [("", "drive", scene.drive)]
-    if isinstance(scene.mechanism, Planar):
-        drives = scene.mechanism.drives
-        tables = [(f" of {one.name}", f"mechanism.drives.{one.name}", one) for one in drives]
-    for whose, key, drive in tables:
+    for drive in scene.linkage.drives:
         if not isinstance(drive, TorqueDrive):
             continue
-        kept = {name: plain(drive).get(name) for name in ("body", "period", "turns")}
-        table = {name: value for name, value in kept.items() if value is not None}
+        key = scene.path_in_scene(f"mechanism.drives.{drive.name}")
+        whose = "" if key == "drive" else f" of {drive.name}"
+        names = ("turns",) if key == "drive" else ("body", "period", "turns")
         entry = speed_entry(drive)
+        table = {name: getattr(drive, name) for name in names}
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)

@@ -58,31 +58,31 @@ class SizedLoad(Load):
         return 1.0 if self.table else getattr(self, self.size_entry)
 
     @property
-    def by_time(self) -> Any:
+    def timed(self) -> Any:
         """Rows of its curve over the time; None where there is none."""
         return getattr(self, f"{self.size_entry}_by_time")
 
     @property
     def seconds(self) -> float:
         """Length of its curve over the time, s; 0 where there is none."""
-        return 0.0 if self.by_time is None else float(self.by_time[-1][0])
+        return 0.0 if self.timed is None else float(self.timed[-1][0])
 
     @property
     def table(self) -> bool:  # type: ignore[override]
         """Whether its size follows a curve."""
-        return self.by_time is not None or isinstance(getattr(self, self.size_entry), tuple)
+        return self.timed is not None or isinstance(getattr(self, self.size_entry), tuple)
 
     def curve(self, turns: int, interpolation: str) -> Pieces:
         """The curve that its size follows; `turns`: of the body that defines the period, until tables repeat."""
-        if self.by_time is not None:
-            repeated = periodic(self.by_time, self.seconds, interpolation) if self.repeats else None
-            return repeated or level(self.by_time, interpolation)
+        if self.timed is not None:
+            repeated = periodic(self.timed, self.seconds, interpolation) if self.repeats else None
+            return repeated or level(self.timed, interpolation)
         turns = turns if self.angle_of is None else 1
         return periodic(getattr(self, self.size_entry), 2.0 * math.pi * turns, interpolation)
 
     @model_validator(mode="after")
     def _by_one_thing(self) -> Self:
-        entry, size, timed = self.size_entry, getattr(self, self.size_entry), self.by_time
+        entry, size, timed = self.size_entry, getattr(self, self.size_entry), self.timed
         if timed is not None and size is not None:
             raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
         if self.angle_of is not None and not isinstance(size, tuple):
