@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dense_linkage import Dense
-from linkages import LINKAGES, four_bar, six_bar, slider_crank
+from doc_pages import ROOT, blocks
+from linkages import LINKAGES, four_bar, load, six_bar, slider_crank
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from plain_lane import joints_of as joints_of_lane
 from scipy.integrate import solve_ivp
@@ -88,6 +89,29 @@ def test_accelerations_and_rates_equal_the_dense_model(name, cartesian, hoist):
         check_frame(dense, work, expected)
         touched += any(dense.seen[joint.name]["normal"] > 0 for joint in mechanism.contacts)
     assert touched or len(mechanism.clearances) < 2
+
+
+def test_the_load_of_the_page_acts_as_it_says():
+    """Like a force that is given at each state, in accelerations and power."""
+    (block,) = (one for one in blocks(ROOT / "docs" / "adding-an-effect.md") if one.title)
+    names = {"__name__": "sail"}
+    exec(block.text, names)
+    place, bare = "coupler.tip", four_bar("o2")
+    sail = names["SailLoad"](kind="sail", name="own", place=place, coefficient=0.7)
+    braked = Lane(four_bar("o2", loads=(sail,)))
+    dense = Dense(bare, [CONTACT], GRAVITY)
+    for q, v, t in random_states(dense, np.random.default_rng(3), 3):
+        velocity = dense.motion_of(q, v, place)[1]
+        force = -0.7 * np.hypot(*velocity) * velocity
+        pushed = Lane(
+            four_bar("o2", loads=(load("force", "own", place=place, force=force.tolist()),))
+        )
+        states = coordinates(braked, dense, q, v, v)
+        (a, work), (b, given) = (lane(states[0], states[1], t) for lane in (braked, pushed))
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12 * np.abs(b).max())
+        row = at.RATE_NOW + 1000 + at.LOAD_POWER
+        assert work[row] == pytest.approx(given[row], rel=1e-12)
+        assert work[row] < 0.0
 
 
 def test_what_is_off_is_not_in_the_text():

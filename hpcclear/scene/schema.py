@@ -54,7 +54,7 @@ def _attribute_docs(table: type[Table]) -> dict[str, str]:
 
 
 def _describe(definitions: dict[str, Any]) -> None:
-    """Describe entries by the words below them in the source.
+    """Describe entries by the words below them in the source, and put them in the order in which they are read.
 
     Pydantic can do so itself, but as soon as a table is defined: a fifth of a second of every command, rank and test.
     """
@@ -63,9 +63,13 @@ def _describe(definitions: dict[str, Any]) -> None:
         docs = {
             key: words for kind in reversed(kinds) for key, words in _attribute_docs(kind).items()
         }
-        for key, entry in definitions.get(table.__name__, {}).get("properties", {}).items():
+        entries = definitions.get(table.__name__, {}).get("properties", {})
+        for key, entry in entries.items():
             if key in docs:
                 entry["description"] = docs[key]
+        # the kind first, and what a table shares with others behind its own entries
+        own = {key: entries.pop(key) for key in ("kind", *table.__annotations__) if key in entries}
+        entries |= own | {key: entries.pop(key) for key in tuple(entries)}
 
 
 def _as_written(definitions: dict[str, Any]) -> None:

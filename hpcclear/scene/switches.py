@@ -78,12 +78,13 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
         if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        pin, kept = isinstance(joint, PlanarClearance), ("kind", "point", "line", "angle")
-        ideal: dict[str, Any] | None = {name: getattr(joint, name, None) for name in kept}
+        ideal: dict[str, Any] | None
         if scene.template is not None:
-            ideal = {"kind": "ideal"} if pin else None
-        elif pin:
+            ideal = {"kind": "ideal"} if isinstance(joint, PlanarClearance) else None
+        elif isinstance(joint, PlanarClearance):
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
+        else:
+            ideal = {name: getattr(joint, name) for name in ("kind", "point", "line", "angle")}
         yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
 
 

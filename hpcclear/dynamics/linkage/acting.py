@@ -52,6 +52,10 @@ class Acting:
         one, two = kin.point(first), kin.point(second)
         return kin.position(one) - kin.position(two), kin.velocity(one) - kin.velocity(two)
 
+    def velocity(self, place: str) -> Vector:
+        """Velocity of a place, m/s."""
+        return self._kinematics.velocity(self._kinematics.point(place))
+
     def along_ground(self, body: str, vector: Vector) -> Vector:
         """Components along the ground's axes of a vector along the axes of a body."""
         kin = self._kinematics
@@ -98,7 +102,7 @@ class Acting:
 
     def power(self, place: str, force: Vector) -> Term:
         """What a force at a place gives, W."""
-        velocity = self._kinematics.velocity(self._kinematics.point(place))
+        velocity = self.velocity(place)
         return force.x * velocity.x + force.y * velocity.y
 
     def twist(self, body: str, torque: Term) -> None:

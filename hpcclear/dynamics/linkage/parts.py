@@ -417,9 +417,9 @@ class Load(Protocol):
         """Add its forces and torques to a motion; return the power that it gives, W, as a term."""
 
 
-def seconds_of(load: Load) -> float:
+def seconds_of(load: object) -> float:
     """Length of a load's curve over the time, s; 0 where it has none."""
-    return getattr(load, "seconds", 0.0)
+    return float(getattr(load, "seconds", 0.0))
 
 
 def curves_of(part: Drive | Load) -> list[str]:

@@ -269,7 +269,7 @@ def _reactions(
     rows = Rows(0, n, 2 * n, rates, 3 * n, holds, curves=curves)
     on = On(gravity=gravity != 0.0, energies=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
-    names: dict[str, Any] = WORDS | words_of(mechanism) | text.functions
+    names: dict[str, Any] = {**WORDS, **words_of(mechanism), **text.functions}
     exec(text.source, names)
     work = np.zeros((rates + at.RATES + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times

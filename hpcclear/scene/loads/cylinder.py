@@ -10,7 +10,7 @@ from hpcclear.scene.loads.declared import Load
 from hpcclear.scene.piecewise import Piecewise
 
 
-def along(ex, ey, vx, vy):
+def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
     """Direction, length and rate of the length of an offset."""
     square = (
         ex * ex + ey * ey + 1e-300

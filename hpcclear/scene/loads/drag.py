@@ -6,7 +6,7 @@ from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load
 
 
-def drag(linear, quadratic, spin):
+def drag(linear: float, quadratic: float, spin: float) -> float:
     """Torque against the rotation at a speed, N m."""
     return -(linear + quadratic * abs(spin)) * spin
 

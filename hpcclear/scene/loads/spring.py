@@ -8,7 +8,9 @@ from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load
 
 
-def spring_force(stiffness, damping, length, ex, ey, vx, vy):
+def spring_force(
+    stiffness: float, damping: float, length: float, ex: float, ey: float, vx: float, vy: float
+) -> tuple[float, float, float]:
     """Force of a spring and damper on its first place, whose offset and velocity from the second are given.
 
     Returns both components in N, and the power that both ends are given in W (what it stores and loses, negative).
@@ -24,7 +26,16 @@ def spring_force(stiffness, damping, length, ex, ey, vx, vy):
     return -tension * nx, -tension * ny, -tension * rate
 
 
-def one_sided(side, stiffness, damping, length, ex, ey, vx, vy):
+def one_sided(
+    side: float,
+    stiffness: float,
+    damping: float,
+    length: float,
+    ex: float,
+    ey: float,
+    vx: float,
+    vy: float,
+) -> tuple[float, float, float]:
     """The same of a spring that acts on one side of its length: beyond it (`side` 1) or within it (-1); it never pulls back."""
     square = ex * ex + ey * ey + 1e-300
     inverse = 1.0 / np.sqrt(square)
@@ -61,9 +72,11 @@ class SpringLoad(Load):
         apart, moving = on.apart(self.first, self.second)
         entries = ("stiffness", "damping", "length")
         terms = (*map(on.parameter, entries), *apart, *moving)
-        law, side = spring_force, ()
-        if self.acts != "both":
-            law, side = one_sided, (-on.one if self.acts == "pushing" else on.one,)
-        fx, fy, power = on.call(law, *side, *terms, results=("fx", "fy", "power"))
+        made = ("fx", "fy", "power")
+        if self.acts == "both":
+            fx, fy, power = on.call(spring_force, *terms, results=made)
+        else:
+            side = -on.one if self.acts == "pushing" else on.one
+            fx, fy, power = on.call(one_sided, side, *terms, results=made)
         on.push_apart(self.first, self.second, fx, fy)
         return power
