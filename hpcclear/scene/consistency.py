@@ -13,7 +13,7 @@ from hpcclear.scene.bearings import length_path
 from hpcclear.scene.bending import check_scene
 from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
-from hpcclear.scene.guides import Guide, check_slide
+from hpcclear.scene.guides import Guide
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
 from hpcclear.scene.tables import SceneTables
@@ -101,7 +101,7 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
         (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
         with self._named_as_written("joints.guide"):
-            check_slide(guide)
+            guide.check()
 
     @contextmanager
     def _named_as_written(self, below: str = "") -> Iterator[None]:

@@ -33,6 +33,18 @@ def speed_entry(drive: Any) -> str:
     return "initial_speed" if drive.expected_speed is None else "expected_speed"
 
 
+class Driving(Table):
+    """What all drives of a linkage have."""
+
+    name: str
+    body: str
+    """Body that is driven; a torque on it has its reaction on the ground. Of a mechanism that is let go: the body whose
+    angle is reported."""
+    period: bool = False
+    """Whether a turn of this body defines the revolution, or what replaces it: one oscillation, the table, the interval.
+    Default: true for the first drive if no drive has this entry."""
+
+
 class ConstantSpeed(Table):
     """The crank turns at a constant prescribed speed, independent of the torque that this requires."""
 
@@ -51,24 +63,14 @@ class ConstantSpeed(Table):
     )
 
 
-class PlanarSpeed(ConstantSpeed):
+class PlanarSpeed(Driving, ConstantSpeed):
     """A body turns at a constant speed."""
 
-    name: str
-    body: str
-    """Body that rotates."""
-    period: bool = False
-    """Whether one turn of this drive defines the revolution. Default: true for the first drive if no drive has this
-    entry."""
 
-
-class PlanarHarmonic(Table):
+class PlanarHarmonic(Driving):
     """A body oscillates: mean + amplitude sin(2 pi frequency t + phase)."""
 
-    name: str
     kind: Literal["harmonic"]
-    body: str
-    """Body that oscillates."""
     amplitude: Angle
     """Amplitude, rad."""
     frequency: Annotated[float, Quantity("Hz", above=0)]
@@ -77,25 +79,16 @@ class PlanarHarmonic(Table):
     """Mean angle, rad."""
     phase: Angle = 0.0
     """Phase at time 0, rad."""
-    period: bool = False
-    """Whether one oscillation of this drive defines the revolution. Default: true for the first drive if no drive has
-    this entry."""
 
 
-class PlanarTable(Table):
+class PlanarTable(Driving):
     """A body follows a table of angles."""
 
-    name: str
     kind: Literal["table"]
-    body: str
-    """Body that is moved."""
     angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
     """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats from the last time on. The last angle equals
     the first one, or differs from it by one turn (plus: counter-clockwise, minus: clockwise). Values in between follow
     a periodic cubic spline."""
-    period: bool = False
-    """Whether the period of this table defines the revolution. Default: true for the first drive if no drive has this
-    entry."""
 
 
 class TorqueDrive(Table):
@@ -147,14 +140,9 @@ class TorqueDrive(Table):
         return self
 
 
-class PlanarTorque(TorqueDrive):
+class PlanarTorque(Driving, TorqueDrive):
     """A torque acts on a free body."""
 
-    name: str
-    body: str
-    """Body on which the torque acts; the reaction acts on the ground."""
-    period: bool = False
-    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
     interval: Interval | None = None
     """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
 
@@ -165,36 +153,26 @@ class PlanarTorque(TorqueDrive):
         return self
 
 
-class PlanarFree(Table):
+class PlanarFree(Driving):
     """No drive: the mechanism is let go, and moves by its loads and its weight. A time replaces the revolution."""
 
-    name: str
     kind: Literal["free"]
-    body: str
-    """Body whose angle is reported as that of the drive."""
     interval: Interval
     """Time that replaces the revolution, s: `transient_revolutions` and `averaged_revolutions` count such intervals."""
     initial_speed: Annotated[float, Quantity("rad/s")] = 0.0
     """Angular speed of the body at the start, rad/s, counter-clockwise; negative: clockwise."""
-    period: bool = False
-    """Whether its interval replaces the revolution. Default: true for the first drive if no drive has this entry."""
 
 
-class PlanarRunUp(Table):
+class PlanarRunUp(Driving):
     """A body turns at a prescribed speed that depends on time, such as a run-up, independent of the torque that this
     requires."""
 
-    name: str
     kind: Literal["run-up"]
-    body: str
-    """Body that rotates."""
     speed_by_time: Annotated[Any, by_time("rad/s")]
     """``[[time, speed], ...]``, s and rad/s, from 0 s on. Speeds are not negative, and the last one is positive. Values
     in between follow a monotone cubic with zero slope at both ends; after the last row the speed is constant."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """Moment of inertia of a flywheel on the body, kg m2."""
-    period: bool = False
-    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
     turns: Turns = 1
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 

@@ -11,6 +11,7 @@ from hpcclear.base.objectives import ENDS
 from hpcclear.scene.distributions import OURS
 from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Table
 from hpcclear.scene.file_curves import FileCurve
+from hpcclear.scene.guides import Guide
 from hpcclear.scene.scene import Scene
 
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}
@@ -143,6 +144,7 @@ def scene_schema() -> dict[str, Any]:
     for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
         row = definitions[name]
         row["required"] = [k for k in row["required"] if k not in ("clearance", "bearing_radius")]
+    definitions["SliderGuide"]["required"] += Guide.needed  # it always has clearance
     effects = definitions["Effects"]["properties"]
     for key in ("friction", "guide_friction"):  # one word switches them off
         entry = effects[key]

@@ -18,7 +18,7 @@ from hpcclear.scene.fields import Table
 from hpcclear.scene.guides import Guide
 from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.materials import Materials
-from hpcclear.scene.mechanism import ClearanceJoint
+from hpcclear.scene.mechanism import ClearanceJoint, Link
 from hpcclear.scene.places import NamedPlace
 from hpcclear.scene.planar import (
     Ground,
@@ -88,15 +88,10 @@ def path_in_scene(path: str) -> str:
 def linkage_of(scene: Any) -> Planar:
     """The tables of the linkage that a scene's slider-crank is; they are valid since the scene's are."""
     mechanism, effects = scene.mechanism, scene.effects
-    bodies = [
-        PlanarBody.model_construct(
-            name=name, length=bar.length, mass=bar.mass, inertia=bar.inertia,
-            mass_center=bar.mass_center, start_angle=start, bending=bar.bending,
-        )
-        for name, bar, start in (
-            ("crank", mechanism.crank, 0.0), ("rod", mechanism.rod, 0.0)
-        )
-    ]  # fmt: skip
+    bars = [
+        PlanarBody.model_construct(name=name, **_entries(bar, Link))
+        for name, bar in (("crank", mechanism.crank), ("rod", mechanism.rod))
+    ]
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
     turning = {} if mechanism.slider.inertia is None else {"inertia": mechanism.slider.inertia}
     slider = PlanarBody.model_construct(
@@ -115,19 +110,15 @@ def linkage_of(scene: Any) -> Planar:
         name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o",
         friction=getattr(scene.joints.crank_frame, "friction", None),
     )  # fmt: skip
-    loads: tuple[ForceLoad, ...] = ()
-    if effects.slider_load is not None:
-        loads = (
-            ForceLoad.model_construct(
-                name="load", kind="force", place="slider.pin", size=effects.slider_load
-            ),
-        )
+    load = ForceLoad.model_construct(
+        name="load", kind="force", place="slider.pin", size=effects.slider_load
+    )
     return Planar.model_construct(
-        bodies=(*bodies, slider),
+        bodies=(*bars, slider),
         ground=ground,
         joints=(frame, guide, *(_joint(scene, name) for name in JOINTS)),
         drives=(_drive(scene.drive),),
-        loads=loads,
+        loads=() if load.size is None else (load,),
     )
 
 
