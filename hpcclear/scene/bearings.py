@@ -17,6 +17,10 @@ class Bearing(Table):
 
     geometry: ClassVar[str] = "pin_in_bearing"
     corners: ClassVar[tuple[str, ...]] = ()
+    ordered: ClassVar = (
+        ("clearance", "bearing_radius", 1.0, "the clearance as large as the bearing"),
+    )
+    """Entries of which the first, so many times, is less than the second; in samples, what is wrong where it is not."""
 
     kind: Literal["clearance"]
     clearance: PositiveLength

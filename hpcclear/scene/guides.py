@@ -34,6 +34,8 @@ class OfContacts(Table):
     """Words of a joint's contacts; none where it has one, which has the joint's name."""
     needed: ClassVar[tuple[str, ...]]
     """Entries that it has to have with clearance."""
+    ordered: ClassVar[tuple[tuple[str, str, float, str], ...]] = ()
+    """As of `bearings.Bearing`."""
     wear: ClassVar[None] = None
     film: ClassVar[None] = None
     out_of_round: ClassVar[None] = None
@@ -71,6 +73,10 @@ class Guide(OfContacts):
     geometry: ClassVar[str] = "guide"
     corners: ClassVar[tuple[str, ...]] = tuple(CORNERS)
     needed: ClassVar[tuple[str, ...]] = ("length", "height", "corner_radius")
+    ordered: ClassVar[tuple[tuple[str, str, float, str], ...]] = tuple(
+        ("corner_radius", size, 2.0, "corners rounder than half of the slider")
+        for size in ("length", "height")
+    )
 
     length: PositiveLength | None = None
     """Length of a slider with clearance along the guide, m. Its point, of a slider-crank its pin, is in the middle."""
