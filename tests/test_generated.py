@@ -114,6 +114,26 @@ def test_the_load_of_the_page_acts_as_it_says():
         assert work[row] < 0.0
 
 
+@pytest.mark.parametrize("name", ["par", "if", "drag", "hinge", "joint_force", "work"])
+def test_a_load_may_be_called_like_anything_in_the_text(name):
+    """Its values hide nothing: the motion is that of the same loads by other names."""
+
+    def motion(name, fan):
+        curve = {"torque": [[0.0, 1.0], [3.0, 2.0]]}
+        loads = (
+            load("torque", name, body="rocker", **curve),
+            load("drag", fan, body="rocker", linear=0.3),
+        )
+        return Lane(four_bar("o2", loads=loads))
+
+    own, other = motion(name, "fan"), motion("one", "other")
+    dense = Dense(four_bar("o2"), [CONTACT], GRAVITY)
+    for q, v, t in random_states(dense, np.random.default_rng(5), 2):
+        states = coordinates(own, dense, q, v, v)
+        (a, _), (b, _) = (lane(states[0], states[1], t) for lane in (own, other))
+        np.testing.assert_array_equal(a, b)
+
+
 def test_what_is_off_is_not_in_the_text():
     mechanism = slider_crank("o12", "o23")
     bare = generate(mechanism, On(), Rows()).source

@@ -5,6 +5,7 @@ The file stands beside Numba's cache, to be read; it is named by its content.
 
 import hashlib
 import inspect
+from collections.abc import Callable
 from types import ModuleType
 
 from hpcclear.base.one_text import module_of
@@ -78,10 +79,16 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
         elements=", ".join(called or ["look_up"]),
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
-    own = [f"@lane_function\n{inspect.getsource(one)}\n\n" for one in motion.functions.values()]
+    own = [f"@lane_function\n{_source(one, name)}\n\n" for name, one in motion.functions.items()]
     lane = f"@apart\n@lane_function\n{motion.source}"
     text = f"{''.join(own)}{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
     return f"{head}\n{held}\n\n\n{text}"
+
+
+def _source(function: Callable[..., object], name: str) -> str:
+    """The source of a function under another name."""
+    source = inspect.getsource(function)
+    return source.replace(f"def {function.__name__}(", f"def {name}(", 1)
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:

@@ -5,15 +5,18 @@ accelerations, gaps, forces and powers; an effect that is off is not in it. It i
 contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
+import keyword
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.acting import Acting
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
+from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
@@ -40,6 +43,12 @@ from hpcclear.dynamics.linkage.rubbing import (
     ties_of,
 )
 from hpcclear.dynamics.linkage.trees import Forest, forest
+
+RESERVED = (
+    *keyword.kwlist, "effects", "joints", "work", "par", "i", "W", "at", "abs", "np", "sincos", "saturated", *functions(),
+    *(one.function for one in GEOMETRIES.values()),
+)  # fmt: skip
+"""Names that a text has already, and that a value of a load or drive must not hide."""
 
 
 class On(NamedTuple):
@@ -101,7 +110,7 @@ class _Generator:
     def __init__(self, mechanism: Mechanism, on: On, rows: Rows, cartesian: bool, hoist: bool):
         self.mechanism, self.on, self.rows = mechanism, on, rows
         self.forest = forest(mechanism, cartesian)
-        self.writer = Writer(rows.parameters, rows.free, hoist)
+        self.writer = Writer(rows.parameters, rows.free, hoist, RESERVED)
         self.kinematics = Kinematics(
             self.forest, self.writer, rows.coordinates, rows.velocities, rows.time, rows.curves
         )
