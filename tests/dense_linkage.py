@@ -16,9 +16,6 @@ from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage import parts as m
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.loads.cylinder import Cylinder
-from hpcclear.dynamics.linkage.loads.drag import Drag
-from hpcclear.dynamics.linkage.loads.torsion_spring import TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 
 
@@ -225,19 +222,19 @@ class Dense:
         """What the table of a load says."""
         if load.name not in self.curves:
             return self.curve
-        by = load.by or m.By(self.mechanism.period.body)
-        return self.curves[load.name](t if by.seconds else q[self.first[by.body] + 2])
+        body = load.angle_of or self.mechanism.period.body
+        return self.curves[load.name](t if load.seconds else q[self.first[body] + 2])
 
     def loads(self, q, v, t=0.0):
         Q, power = np.zeros(self.n), 0.0
         for load in self.mechanism.loads:
             own = np.zeros(self.n)
-            if isinstance(load, m.Force):
-                force = np.array(load.force)
+            if load.kind == "force":
+                force = np.array(load.components())
                 if load.follows:
                     force = np.array(turned(force, self.angle(q, load.place)))
                 own = self.motion_of(q, v, load.place)[2].T @ force
-            elif isinstance(load, TorsionSpring):
+            elif load.kind == "torsion-spring":
                 signs = np.zeros(self.n)
                 signs[self.first[load.body] + 2] = 1.0
                 if load.other is not None:
@@ -249,11 +246,11 @@ class Dense:
                 if load.lower is not None and angle < load.lower:
                     moment += load.stop_stiffness * (load.lower - angle)
                 own = signs * moment
-            elif isinstance(load, Drag):
+            elif load.kind == "drag":
                 k = self.first[load.body] + 2
                 own[k] = -load.linear * v[k] - load.quadratic * v[k] * abs(v[k])
-            elif isinstance(load, m.Torque):
-                own[self.first[load.body] + 2] = load.torque
+            elif load.kind == "torque":
+                own[self.first[load.body] + 2] = load.constant
             else:
                 (a, va, Ja), (b, vb, Jb) = (
                     self.motion_of(q, v, place) for place in (load.first, load.second)
@@ -261,17 +258,16 @@ class Dense:
                 length = np.linalg.norm(a - b)
                 n = (a - b) / length
                 rate = (va - vb) @ n
-                if isinstance(load, Cylinder):
+                if load.kind == "cylinder":
                     rows = load.force if isinstance(load.force, tuple) else ((0.0, load.force),)
                     pull = load.damping * rate - np.interp(length, *np.transpose(rows))
                 else:
                     pull = load.stiffness * (length - load.length) + load.damping * rate
-                    if load.side and (
-                        load.side * (length - load.length) <= 0 or load.side * pull <= 0
-                    ):
+                    side = {"both": 0, "pushing": -1, "pulling": 1}[load.acts]
+                    if side and (side * (length - load.length) <= 0 or side * pull <= 0):
                         pull = 0.0
                 own = (Jb - Ja).T @ (n * pull)
-            if getattr(load, "table", False):
+            if load.table:
                 own = own * self.looked_up(load, q, t)
             Q, power = Q + own, power + own @ v
         self.seen["load_power"] = power

@@ -3,16 +3,12 @@
 import math
 from dataclasses import replace
 
-from hpcclear.dynamics.linkage.loads.cylinder import Cylinder
-from hpcclear.dynamics.linkage.loads.drag import Drag
-from hpcclear.dynamics.linkage.loads.torsion_spring import TorsionSpring
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Body,
     Clearance,
     ConstantSpeed,
     Fixed,
-    Force,
     GuideFriction,
     Harmonic,
     LooseSlide,
@@ -21,11 +17,16 @@ from hpcclear.dynamics.linkage.parts import (
     Revolute,
     Slide,
     Slot,
-    Spring,
-    Torque,
     TorqueDrive,
     split,
 )
+from hpcclear.scene.loads import KINDS
+
+
+def load(kind, name, **entries):
+    """A load of a kind by its entries in a scene."""
+    return KINDS[kind](kind=kind, name=name, **entries)
+
 
 MOTOR = ConstantSpeed("motor", "crank", 40.0)
 ENGINE = TorqueDrive("engine", "crank", torque=3.0, initial_speed=40.0, inertia=2e-3)
@@ -106,8 +107,8 @@ def v_twin(*open_pins, drive=MOTOR, friction=None):
             pin(f"big_{side}", "crank.b", f"rod_{side}.a", open_pins=open_pins),
             pin(f"small_{side}", f"piston_{side}.pin", f"rod_{side}.b", open_pins=open_pins),
         ]
-        gas = (-90 * math.cos(tilt), -90 * math.sin(tilt))
-        loads.append(Force(f"gas_{side}", f"piston_{side}.pin", gas, table=True))
+        gas = {"size": [[0.0, 1.0], [3.0, 2.0]], "direction": tilt + math.pi}
+        loads.append(load("force", f"gas_{side}", place=f"piston_{side}.pin", **gas))
     return Mechanism(tuple(bodies), tuple(joints), (drive,), loads=tuple(loads))
 
 
@@ -124,7 +125,7 @@ def six_bar(*open_pins, friction=None):
         Slide("bed", "ram.pin", "ground.bed", math.pi / 2, friction),
         *pins(open_pins, ("o5", "rocker.b", "link.a"), ("o6", "ram.pin", "link.b")),
     )
-    loads = (Force("work", "ram.pin", (0.0, -200.0)),)
+    loads = (load("force", "work", place="ram.pin", force=[0.0, -200.0]),)
     return Mechanism(bodies, joints, base.drives, {**base.ground, "bed": (0.13, 0.0)}, loads)
 
 
@@ -144,7 +145,17 @@ def quick_return(*open_pins, friction=None):
         ),
         Slide("slot", "block.pin", "lever.a", 0.0, friction),
     )
-    loads = (Spring("return_spring", "lever.top", "ground.o", 300.0, 0.1, 2.0),)
+    loads = (
+        load(
+            "spring",
+            "return_spring",
+            first="lever.top",
+            second="ground.o",
+            stiffness=300.0,
+            length=0.1,
+            damping=2.0,
+        ),
+    )
     return Mechanism(bodies, joints, (MOTOR,), {"o": (0.0, 0.0), "p": (0.0, -0.1)}, loads)
 
 
@@ -195,7 +206,18 @@ def pendulum_chain():
     joints = pins(
         (), ("o1", "crank.a", "ground.o"), ("o2", "two.a", "crank.b"), ("o3", "three.a", "two.b")
     )
-    loads = (Spring("band", "three.b", "ground.q", 50.0, 0.05, 0.3), Torque("brake", "two", -0.4))
+    loads = (
+        load(
+            "spring",
+            "band",
+            first="three.b",
+            second="ground.q",
+            stiffness=50.0,
+            length=0.05,
+            damping=0.3,
+        ),
+        load("torque", "brake", body="two", torque=-0.4),
+    )
     return Mechanism(bodies, joints, (ENGINE,), {"o": (0.0, 0.0), "q": (0.2, 0.2)}, loads)
 
 
@@ -284,18 +306,64 @@ def rubbing(mechanism, *names, coefficient=0.2, radius=0.008):
 RUB = GuideFriction(0.15, 0.1)
 BLOWER = replace(ENGINE, by_speed=((0.0, 3.0), (12.0, 5.0), (25.0, 1.0), (40.0, -0.5)))
 HELD = (
-    TorsionSpring("coil", "rocker", None, 4.0, 0.3, 0.2, 1.0, 1.4, 30.0),
-    TorsionSpring("between", "rocker", "coupler", 1.5, -0.2, 0.1),
-    Spring("buffer", "coupler.tip", "ground.o", 400.0, 0.09, 3.0, -1),
-    Spring("rope", "coupler.tip", "ground.p", 250.0, 0.05, 1.0, 1),
+    load(
+        "torsion-spring",
+        "coil",
+        body="rocker",
+        stiffness=4.0,
+        angle=0.3,
+        damping=0.2,
+        lower=1.0,
+        upper=1.4,
+        stop_stiffness=30.0,
+    ),
+    load(
+        "torsion-spring",
+        "between",
+        body="rocker",
+        other="coupler",
+        stiffness=1.5,
+        angle=-0.2,
+        damping=0.1,
+    ),
+    load(
+        "spring",
+        "buffer",
+        first="coupler.tip",
+        second="ground.o",
+        stiffness=400.0,
+        length=0.09,
+        damping=3.0,
+        acts="pushing",
+    ),
+    load(
+        "spring",
+        "rope",
+        first="coupler.tip",
+        second="ground.p",
+        stiffness=250.0,
+        length=0.05,
+        damping=1.0,
+        acts="pulling",
+    ),
 )
 MOVED = (
-    Cylinder("ram", "coupler.tip", "ground.p", ((0.03, 20.0), (0.08, 5.0), (0.12, -9.0)), 2.0),
-    Cylinder("jack", "coupler.tip", "ground.o", 12.0),
-    Drag("fan", "rocker", 0.02, 0.003),
-    Force("jet", "coupler.tip", (3.0, -8.0), follows=True),
+    load(
+        "cylinder",
+        "ram",
+        first="coupler.tip",
+        second="ground.p",
+        force=[[0.03, 20.0], [0.08, 5.0], [0.12, -9.0]],
+        damping=2.0,
+    ),
+    load("cylinder", "jack", first="coupler.tip", second="ground.o", force=12.0),
+    load("drag", "fan", body="rocker", linear=0.02, quadratic=0.003),
+    load("force", "jet", place="coupler.tip", force=[3.0, -8.0], follows=True),
 )
-PUSH = (Force("push", "slider.top", (-30.0, 7.0)), Torque("twist", "rod", 0.3))
+PUSH = (
+    load("force", "push", place="slider.top", force=[-30.0, 7.0]),
+    load("torque", "twist", body="rod", torque=0.3),
+)
 
 LINKAGES = {
     "slider-crank, two": slider_crank("o12", "o23", loads=PUSH),
@@ -304,7 +372,7 @@ LINKAGES = {
     "slider-crank, offset, far": slider_crank("o23", offset=0.02, drive=ENGINE, friction=RUB, loads=PUSH),
     "slider-crank, ideal": slider_crank(friction=RUB),
     "slider-crank, ideal, torque": slider_crank(drive=ENGINE, friction=RUB, off=0.002, loads=PUSH),
-    "four-bar, none": four_bar(loads=(Force("tip", "coupler.tip", (4.0, -9.0)),)),
+    "four-bar, none": four_bar(loads=(load("force", "tip", place="coupler.tip", force=[4.0, -9.0]),)),
     "four-bar, springs": four_bar("o3", loads=HELD),
     "four-bar, cylinders": four_bar("o2", "o3", drive=BLOWER, loads=MOVED),
     "four-bar, one": four_bar("o3", off=0.006),

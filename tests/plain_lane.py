@@ -84,6 +84,7 @@ class Lane:
             "saturated": plain(friction.saturated),
         }
         names |= {name: plain(getattr(elements, name)) for name in elements.functions()}
+        names |= self.text.functions
         exec(self.text.source, names)
         self.run = names["lane"]
         base = values(

@@ -176,7 +176,11 @@ CONTRADICTIONS = [
     ({"drive": {**FREE, "torque": 1.0, "speed": 500.0}}, "drive.speed", "no prescribed speed"),
     ({"drive.torque": 1.0}, "drive.torque", "contradicts a prescribed"),
     ({"effects.contact": None}, "effects.contact", "needs a contact law"),
-    ({"mechanism.crank.bending": BENDING}, "mechanism.crank.bending", "clamps the crank"),
+    (
+        {"mechanism.crank.bending": BENDING},
+        "mechanism.crank.bending",
+        "drives the bar and clamps it",
+    ),
     (
         {
             "mechanism.rod.bending": BENDING,

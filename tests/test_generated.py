@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dense_linkage import Dense
-from linkages import LINKAGES, four_bar
+from doc_pages import ROOT, blocks
+from linkages import LINKAGES, four_bar, load
 from plain_lane import ALPHA, BETA, CONTACT, FREE, GRAVITY, Lane, coordinates, random_states
 from scipy.integrate import solve_ivp
 
@@ -85,7 +86,49 @@ def test_accelerations_and_rates_equal_the_dense_model(name, cartesian, hoist):
     assert touched or len(mechanism.clearances) < 2
 
 
-# ---- whole motions, and the machine code -----------------------------------------------------------
+def test_the_load_of_the_page_acts_as_it_says():
+    """Like a force that is given at each state, in accelerations and power."""
+    (block,) = (one for one in blocks(ROOT / "docs" / "adding-an-effect.md") if one.title)
+    names = {"__name__": "sail"}
+    exec(block.text, names)
+    place, bare = "coupler.tip", four_bar("o2")
+    sail = names["SailLoad"](kind="sail", name="own", place=place, coefficient=0.7)
+    braked = Lane(four_bar("o2", loads=(sail,)))
+    dense = Dense(bare, [CONTACT], GRAVITY)
+    for q, v, t in random_states(dense, np.random.default_rng(3), 3):
+        velocity = dense.motion_of(q, v, place)[1]
+        force = -0.7 * np.hypot(*velocity) * velocity
+        pushed = Lane(
+            four_bar("o2", loads=(load("force", "own", place=place, force=force.tolist()),))
+        )
+        states = coordinates(braked, dense, q, v, v)
+        (a, work), (b, given) = (lane(states[0], states[1], t) for lane in (braked, pushed))
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12 * np.abs(b).max())
+        row = at.RATE_NOW + 1000 + at.LOAD_POWER
+        assert work[row] == pytest.approx(given[row], rel=1e-12)
+        assert work[row] < 0.0
+
+
+@pytest.mark.parametrize("name", ["par", "if", "drag", "hinge", "joint_force", "work"])
+def test_a_load_may_be_called_like_anything_in_the_text(name):
+    """Its values hide nothing: the motion is that of the same loads by other names."""
+
+    def motion(name, fan):
+        curve = {"torque": [[0.0, 1.0], [3.0, 2.0]]}
+        loads = (
+            load("torque", name, body="rocker", **curve),
+            load("drag", fan, body="rocker", linear=0.3),
+        )
+        return Lane(four_bar("o2", loads=loads))
+
+    own, other = motion(name, "fan"), motion("one", "other")
+    dense = Dense(four_bar("o2"), [CONTACT], GRAVITY)
+    for q, v, t in random_states(dense, np.random.default_rng(5), 2):
+        states = coordinates(own, dense, q, v, v)
+        (a, _), (b, _) = (lane(states[0], states[1], t) for lane in (own, other))
+        np.testing.assert_array_equal(a, b)
+
+
 def energy(dense, q, v):
     """Kinetic, potential and elastic energy of a state."""
     total = 0.5 * dense.masses() @ v**2 + GRAVITY * dense.masses()[1::3] @ q[1::3]

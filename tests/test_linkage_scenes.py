@@ -318,7 +318,7 @@ BROKEN = {
     "drives.motor.body=shaft": "no such moving body",
     "drives.motor.speed=0": "there would be no motion",
     "drives.motor.turns=0": "from 1",
-    "drives.motor.torque=3": "not a known key",
+    "drives.motor.torque=3": "contradicts a prescribed speed",
     "loads.pull.kind=magnet": "known values",
     "ground.points.p=[0.1]": "pair",
 }

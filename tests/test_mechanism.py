@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from linkages import LINKAGES, MOTOR, bar, four_bar, pins, slider_crank
+from linkages import LINKAGES, MOTOR, bar, four_bar, load, pins, slider_crank
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
@@ -12,11 +12,9 @@ from hpcclear.dynamics.linkage.parts import (
     Clearance,
     ConstantSpeed,
     Fixed,
-    Force,
     Harmonic,
     Revolute,
     Slide,
-    Spring,
     TorqueDrive,
 )
 from hpcclear.dynamics.linkage.trees import forest
@@ -153,10 +151,11 @@ BROKEN = {
         with_more("joints", Slide("rail", "ground.o", "rocker.a")), "joints.rail.point", "Swap",
     ),
     "a load nowhere": (
-        with_more("loads", Force("gas", "piston.pin", (1.0, 0.0))), "loads.gas.place", "no body",
+        with_more("loads", load("force", "gas", place="piston.pin", force=[1.0, 0.0])), "loads.gas.place", "no body",
     ),
     "a spring nowhere": (
-        with_more("loads", Spring("band", "crank.a", "crank.z", 1.0)), "loads.band.second", "no point",
+        with_more("loads", load("spring", "band", first="crank.a", second="crank.z", stiffness=1.0)),
+        "loads.band.second", "no point",
     ),
     "too many joints with clearance": (
         lambda: Mechanism(

@@ -130,6 +130,20 @@ def test_a_slip_of_units_is_warned_of_in_a_line_with_a_remedy(change, fragments)
         assert fragment in first
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        "mechanism.bodies.coupler.mass=400",
+        "mechanism.bodies.coupler.length=140",
+        "mechanism.joints.o2.materials.bearing.youngs_modulus=0.5",
+        "mechanism.bodies.rocker.mass_center=3",
+    ],
+)
+def test_a_slip_in_a_linkage_is_named_as_it_is_written(change):
+    scene = load_scene(JOBS / "linkages" / "crank_rocker.toml", [change])
+    assert any(text.startswith(f"{change.partition('=')[0]} = ") for text in scene.warnings)
+
+
 @pytest.mark.parametrize("job", sorted(path.name for path in JOBS.glob("*.toml")))
 def test_what_is_meant_is_not_warned_of(job):
     assert not list(implausible(load_scene(JOBS / job)))

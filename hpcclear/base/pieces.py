@@ -90,6 +90,17 @@ def mean_of(rows: Rows, length: float, interpolation: str = "smooth") -> float:
     return periodic(rows, length, interpolation).mean()
 
 
+def hinges(name: str, rows: Rows) -> dict[str, float]:
+    """Parameters of a table that runs straight from row to row and stays level beyond: first value, places and bends."""
+    x, y = np.array(rows).T
+    slopes = np.diff(y) / np.diff(x)
+    bends = np.diff(np.concatenate([[0.0], slopes, [0.0]]))
+    found = {f"{name}_first": float(y[0])}
+    for k, (start, bend) in enumerate(zip(x, bends, strict=True)):
+        found |= {f"{name}_start_{k}": float(start), f"{name}_bend_{k}": float(bend)}
+    return found
+
+
 def _cubics(x: Array, y: Array, interpolation: str) -> Array:
     """Coefficients (n - 1, 4) of the pieces between pairs (n,), by rising powers of the distance from the left one."""
     width = np.diff(x)

@@ -12,8 +12,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
 from hpcclear.results.content import Results
+from hpcclear.scene.bearings import length_path
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.mechanism import length_path
 
 MISSED = 0.01
 """Of a peak force: what the largest stored force may lack of it and still be the same peak."""

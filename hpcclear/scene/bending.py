@@ -61,7 +61,10 @@ def _check_bar(planar: Any, body: Any) -> None:
                 "Leave bending out", key=key, value=None,
             )  # fmt: skip
         if ends and getattr(joint, "out_of_round", None) is not None:
-            raise out_of_round(joint.name, key)
+            raise invalid(
+                f"surfaces of {joint.name} are out of round, which needs rigid bodies",
+                "Leave out bending, or out_of_round", key=key, value=None,
+            )  # fmt: skip
     for end in ("a", "b"):
         if end not in held:
             raise invalid(
@@ -72,23 +75,9 @@ def _check_bar(planar: Any, body: Any) -> None:
 
 def check_scene(scene: Any, bending: Mapping[str, Bending]) -> None:
     """An error for validators where a scene has what does not go with bending; `bending`: tables by their bodies' paths."""
-    if not bending:
-        return
-    key = f"{next(iter(bending))}.bending"
-    for name in scene.clearance_joints() if scene.template is not None else ():
-        if scene.clearance_joint(name).out_of_round is not None:
-            raise out_of_round(name, key)
-    if scene.wear is not None and scene.wear.waves and scene.worn_joints():
+    if bending and scene.wear is not None and scene.wear.waves and scene.worn_joints():
         raise invalid(
             "an angular wear profile needs rigid bodies, but a body bends",
             'Set it to "uniform", or leave bending out',
             key="wear.profile", value=scene.wear.profile,
         )  # fmt: skip
-
-
-def out_of_round(joint: str, key: str) -> Exception:
-    """An error for validators: what of a joint at a bar that bends is refused."""
-    return invalid(
-        f"surfaces of {joint} are out of round, which needs rigid bodies",
-        "Leave out bending, or out_of_round", key=key, value=None,
-    )  # fmt: skip

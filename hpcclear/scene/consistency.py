@@ -1,16 +1,19 @@
 """Whether the tables of a scene fit one another, and what a file may leave out because another table says it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Self
 
 from pydantic import field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
+from hpcclear.scene.bearings import length_path
 from hpcclear.scene.bending import check_scene
-from hpcclear.scene.fields import check_period, invalid, nearest
+from hpcclear.scene.fields import invalid, nearest
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
-from hpcclear.scene.mechanism import length_path
+from hpcclear.scene.guides import Guide
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
 from hpcclear.scene.tables import SceneTables
@@ -79,35 +82,38 @@ class ConsistentTables(SceneTables):
                     "Write a load in [mechanism.loads.NAME], friction as an entry of a slide in [mechanism.joints.NAME]",
                     key=f"effects.{entry}",
                 )
-        if self.template is not None and self.joints.guide is not None:
-            self._check_guide()
+        if self.template is not None:
+            self._check_template()
         return self
 
-    def _check_guide(self) -> None:
-        """A slider with clearance tilts, and rubs at its corners."""
+    def _check_template(self) -> None:
+        """What is checked of every linkage, by the entries of its template; a slider with clearance tilts, and rubs at its
+        corners."""
+        with self._named_as_written():
+            self.linkage.check()
+        if self.joints.guide is None:
+            return
         if self.slider_crank.slider.inertia is None:
             raise invalid(
                 "a slider in a guide with clearance can turn, so it needs an inertia",
                 "Write its moment of inertia about its pin in kg m2",
                 key="mechanism.slider.inertia", value=None,
             )  # fmt: skip
-        if self.effects.guide_friction is not None:
-            raise invalid(
-                "a guide with clearance rubs at the slider's corners, by the friction of all contacts",
-                "Remove it, and write effects.friction", key="effects.guide_friction", value=None,
-            )  # fmt: skip
+        (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
+        with self._named_as_written("joints.guide"):
+            guide.check()
 
-    @model_validator(mode="after")
-    def _curves_repeat(self) -> Self:
-        if self.template is not None:  # a linkage has looked at its own
-            curves = {
-                "drive.torque": getattr(self.drive, "torque", None),
-                "effects.slider_load": self.effects.slider_load,
-            }
-            for key, curve in curves.items():
-                if isinstance(curve, tuple):
-                    check_period(curve, self.drive.turns, key)
-        return self
+    @contextmanager
+    def _named_as_written(self, below: str = "") -> Iterator[None]:
+        """Errors of the linkage's tables, with the keys of the entries that stand for them in the scene."""
+        try:
+            yield
+        except PydanticCustomError as error:
+            said: Any = error.context
+            path = ".".join(filter(None, ("mechanism", below, said["key"])))
+            raise invalid(
+                said["reason"], said["remedy"], self.path_in_scene(path), said["value"]
+            ) from None
 
     @model_validator(mode="after")
     def _effects_fit_joints(self) -> Self:

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.plugins.sources import digest
-from hpcclear.scene.mechanism import Mechanism, TorqueDrive, slender_inertia
+from hpcclear.scene.driving import TorqueDrive
+from hpcclear.scene.mechanism import slender_inertia
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.plausibility import implausible
@@ -63,24 +64,27 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
 def warnings(scene: SceneTables) -> Iterator[str]:
     """What is allowed and still deserves a look."""
     yield from implausible(scene)
-    for name in ("crank", "rod") if isinstance(scene.mechanism, Mechanism) else ():
-        link = getattr(scene.mechanism, name)
-        least = slender_inertia(link.mass, link.length)
-        if link.inertia < least * (1 - 1e-12):
+    for bar in scene.linkage.bodies:
+        if bar.length is None:
+            continue
+        key, least = (
+            scene.path_in_scene(f"mechanism.bodies.{bar.name}"),
+            slender_inertia(bar.mass, bar.length),
+        )
+        if 0.0 < bar.own_inertia < least * (1 - 1e-12):
             yield (
-                f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is less than a thin uniform "
+                f"{key}.inertia = {bar.own_inertia:g} kg m2 is less than a thin uniform "
                 f"rod of that mass and length has ({least:g} kg m2)"
             )
-        if not 0 <= link.mass_center <= link.length:
+        if not 0 <= (0.0 if bar.mass_center is None else bar.mass_center) <= bar.length:
             yield (
-                f"mechanism.{name}.mass_center = {link.mass_center:g} m lies beyond the pins, "
-                f"which are at 0 and {link.length:g} m"
+                f"{key}.mass_center = {bar.mass_center:g} m lies beyond the pins, "
+                f"which are at 0 and {bar.length:g} m"
             )
     for name in scene.pins():
         joint: Any = scene.clearance_joint(name)
         start = joint.start_eccentricity
-        parts = start if isinstance(start, tuple) else (start.x, start.y)
-        if sum(part**2 for part in parts) > joint.clearance**2 * (1 + 1e-12):
+        if start.x**2 + start.y**2 > joint.clearance**2 * (1 + 1e-12):
             yield (
                 f"{scene.joint_key(name)}.start_eccentricity lies outside the clearance, "
                 "so the run starts in contact"

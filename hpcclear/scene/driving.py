@@ -1,6 +1,6 @@
-"""What moves a planar linkage: drives of bodies, and loads on bodies and points."""
+"""What moves a mechanism: drives of bodies."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,65 +14,16 @@ from hpcclear.scene.fields import (
     check_one_of,
     invalid,
 )
-from hpcclear.scene.loads import CylinderLoad, DragLoad, Law, TorsionSpringLoad, by_time
-from hpcclear.scene.places import Angle, PairTable
+from hpcclear.scene.piecewise import Piecewise, by_time
+from hpcclear.scene.places import Angle
 
 Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]
 
 
-def check_start(drive: Any) -> None:
-    """Refuse a drive that starts from rest without an expected speed.
-
-    Raises
-    ------
-    PydanticCustomError
-        Naming ``expected_speed``.
-    """
-    if drive.initial_speed == 0.0 and drive.expected_speed is None and not by_interval(drive):
-        raise invalid(
-            "is needed where initial_speed = 0: the tolerances and the first step go by it",
-            'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
-            key="expected_speed",
-        )
-
-
 def by_interval(drive: Any) -> bool:
     """Whether a time replaces the revolution of a drive."""
     return getattr(drive, "interval", None) is not None
-
-
-def check_torque(drive: Any) -> None:
-    """Refuse a drive without a torque, or with two; raises PydanticCustomError."""
-    check_one_of(
-        "torque",
-        drive.torque,
-        drive.torque_by_speed,
-        "Write torque, or torque_by_speed = [[speed, torque], ...]",
-    )
-    if drive.torque_by_speed is not None and drive.no_load_speed is not None:
-        raise invalid(
-            "torque_by_speed says already how the torque falls", "Remove it",
-            key="no_load_speed", value=drive.no_load_speed,
-        )  # fmt: skip
-
-
-def check_by(load: Any, entry: str) -> None:
-    """Refuse a load whose table goes by two things, or has no table to go by them; raises PydanticCustomError."""
-    timed = getattr(load, f"{entry}_by_time")
-    if timed is not None and getattr(load, entry) is not None:
-        raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
-    if load.angle_of is not None and not isinstance(getattr(load, entry), tuple):
-        reason = f"there is no table of {entry} against an angle"
-        raise invalid(reason, "Remove it", key="angle_of", value=load.angle_of)
-    if load.repeats and timed is None:
-        raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
-    if load.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
-        raise invalid(
-            "a table that repeats begins at 0 s, and ends at the value with which it begins",
-            "Make its first and last value equal",
-            key=f"{entry}_by_time",
-        )
 
 
 def speed_entry(drive: Any) -> str:
@@ -82,30 +33,44 @@ def speed_entry(drive: Any) -> str:
     return "initial_speed" if drive.expected_speed is None else "expected_speed"
 
 
-class PlanarSpeed(Table):
-    """A body turns at a constant speed."""
+class Driving(Table):
+    """What all drives of a linkage have."""
 
     name: str
-    kind: Literal["constant-speed"]
     body: str
-    """Body that rotates."""
+    """Body that is driven; a torque on it has its reaction on the ground. Of a mechanism that is let go: the body whose
+    angle is reported."""
+    period: bool = False
+    """Whether a turn of this body defines the revolution, or what replaces it: one oscillation, the table, the interval.
+    Default: true for the first drive if no drive has this entry."""
+
+
+class ConstantSpeed(Table):
+    """The crank turns at a constant prescribed speed, independent of the torque that this requires."""
+
+    kind: Literal["constant-speed"]
     speed: Annotated[float, Quantity("rad/s", nonzero=True, why="there would be no motion")]
     """Angular speed, rad/s, counter-clockwise; negative: clockwise. "600 min^-1" means 600 revolutions per minute."""
-    period: bool = False
-    """Whether one turn of this drive defines the revolution. Default: true for the first drive if no drive has this
-    entry."""
     turns: Turns = 1
-    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
-    `start_angle` of 360 degrees or more begins in the second turn."""
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    elsewhere: ClassVar = dict.fromkeys(
+        ("torque", "flywheel_inertia", "initial_speed", "expected_speed", "no_load_speed"),
+        (
+            "contradicts a prescribed speed",
+            'Remove it, or set kind = "torque" and give initial_speed instead of speed',
+        ),
+    )
 
 
-class PlanarHarmonic(Table):
+class PlanarSpeed(Driving, ConstantSpeed):
+    """A body turns at a constant speed."""
+
+
+class PlanarHarmonic(Driving):
     """A body oscillates: mean + amplitude sin(2 pi frequency t + phase)."""
 
-    name: str
     kind: Literal["harmonic"]
-    body: str
-    """Body that oscillates."""
     amplitude: Angle
     """Amplitude, rad."""
     frequency: Annotated[float, Quantity("Hz", above=0)]
@@ -114,96 +79,100 @@ class PlanarHarmonic(Table):
     """Mean angle, rad."""
     phase: Angle = 0.0
     """Phase at time 0, rad."""
-    period: bool = False
-    """Whether one oscillation of this drive defines the revolution. Default: true for the first drive if no drive has
-    this entry."""
 
 
-class PlanarTable(Table):
+class PlanarTable(Driving):
     """A body follows a table of angles."""
 
-    name: str
     kind: Literal["table"]
-    body: str
-    """Body that is moved."""
     angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
     """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats from the last time on. The last angle equals
     the first one, or differs from it by one turn (plus: counter-clockwise, minus: clockwise). Values in between follow
     a periodic cubic spline."""
-    period: bool = False
-    """Whether the period of this table defines the revolution. Default: true for the first drive if no drive has this
-    entry."""
 
 
-class PlanarTorque(Table):
-    """A torque acts on a free body."""
+class TorqueDrive(Table):
+    """A torque acts on the free crank; its speed is a result of the simulation."""
 
-    name: str
     kind: Literal["torque"]
-    body: str
-    """Body on which the torque acts; the reaction acts on the ground."""
     torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
-    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
-    torque_by_speed: Annotated[Any, Law("rad/s", "N*m")] | None = None
+    """Torque, N m; constant, or a table ``[[angle, torque], ...]`` over the turns of a revolution, against the angle of
+    the crank or of the body that defines the period."""
+    torque_by_speed: Annotated[Any, Piecewise("rad/s", "N*m")] | None = None
     """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
     between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Speed at which the torque is 0, rad/s. The torque decreases linearly with the speed, as that of a motor. Without
     it the torque does not depend on the speed."""
+    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
+    """Moment of inertia of a flywheel that turns with it, kg m2."""
     initial_speed: Annotated[float, Quantity("rad/s", least=0)]
     """Angular speed at the start, rad/s; 0: from rest."""
     expected_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
     """Approximate speed to expect, rad/s. Tolerances and the first step are scaled by it, or by `initial_speed` if it
     is missing. Required for a start from rest."""
-    flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
-    """Moment of inertia of a flywheel on the body, kg m2."""
-    period: bool = False
-    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
     turns: Turns = 1
-    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns. A
-    `start_angle` of 360 degrees or more begins in the second turn."""
+    """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
+
+    elsewhere: ClassVar = {
+        "speed": (
+            "a drive by a torque has no prescribed speed",
+            'Remove it and give initial_speed, or set kind = "constant-speed"',
+        )
+    }
+
+    @model_validator(mode="after")
+    def _started(self) -> Self:
+        """It has one torque, and a speed that tolerances go by."""
+        if self.initial_speed == 0.0 and self.expected_speed is None and not by_interval(self):
+            raise invalid(
+                "is needed where initial_speed = 0: the tolerances and the first step go by it",
+                'Write about how fast it will turn, such as expected_speed = "1500 rpm"',
+                key="expected_speed",
+            )
+        remedy = "Write torque, or torque_by_speed = [[speed, torque], ...]"
+        check_one_of("torque", self.torque, self.torque_by_speed, remedy)
+        if self.torque_by_speed is not None and self.no_load_speed is not None:
+            raise invalid(
+                "torque_by_speed says already how the torque falls", "Remove it",
+                key="no_load_speed", value=self.no_load_speed,
+            )  # fmt: skip
+        return self
+
+
+class PlanarTorque(Driving, TorqueDrive):
+    """A torque acts on a free body."""
+
     interval: Interval | None = None
     """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
 
     @model_validator(mode="after")
-    def _started(self) -> "PlanarTorque":
-        check_start(self)
+    def _by_turns_or_time(self) -> Self:
         if by_interval(self) and self.turns != 1:
             raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
-        check_torque(self)
         return self
 
 
-class PlanarFree(Table):
+class PlanarFree(Driving):
     """No drive: the mechanism is let go, and moves by its loads and its weight. A time replaces the revolution."""
 
-    name: str
     kind: Literal["free"]
-    body: str
-    """Body whose angle is reported as that of the drive."""
     interval: Interval
     """Time that replaces the revolution, s: `transient_revolutions` and `averaged_revolutions` count such intervals."""
     initial_speed: Annotated[float, Quantity("rad/s")] = 0.0
     """Angular speed of the body at the start, rad/s, counter-clockwise; negative: clockwise."""
-    period: bool = False
-    """Whether its interval replaces the revolution. Default: true for the first drive if no drive has this entry."""
 
 
-class PlanarRunUp(Table):
+class PlanarRunUp(Driving):
     """A body turns at a prescribed speed that depends on time, such as a run-up, independent of the torque that this
     requires."""
 
-    name: str
     kind: Literal["run-up"]
-    body: str
-    """Body that rotates."""
     speed_by_time: Annotated[Any, by_time("rad/s")]
     """``[[time, speed], ...]``, s and rad/s, from 0 s on. Speeds are not negative, and the last one is positive. Values
     in between follow a monotone cubic with zero slope at both ends; after the last row the speed is constant."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0
     """Moment of inertia of a flywheel on the body, kg m2."""
-    period: bool = False
-    """Whether one turn of the body defines the revolution. Default: true for the first drive if no drive has this entry."""
     turns: Turns = 1
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 
@@ -221,96 +190,5 @@ class PlanarRunUp(Table):
 
 PlanarDrive = Annotated[
     PlanarSpeed | PlanarHarmonic | PlanarTable | PlanarTorque | PlanarRunUp | PlanarFree,
-    Field(discriminator="kind"),
-]
-
-
-class Components(PairTable):
-    """A force by its components along the ground's axes, N. ``[x, y]`` is a short form."""
-
-    x: Annotated[float, Quantity("N")]
-    """x component, N."""
-    y: Annotated[float, Quantity("N")]
-    """y component, N."""
-
-
-class ForceLoad(Table):
-    """A force at a point: by its components along the ground's axes, or by size and direction."""
-
-    name: str
-    kind: Literal["force"]
-    place: str
-    """``body.point`` on which the force acts."""
-    force: Components | None = None
-    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
-    """Force along `direction`, N; constant, or a table against the angle of the body that defines the period. The angle
-    is measured counter-clockwise from the x axis and includes `start_angle`, for both directions of rotation."""
-    size_by_time: Annotated[Any, by_time("N")] | None = None
-    """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
-    repeats: Annotated[bool, Field(strict=True)] = False
-    """Whether the table over time repeats after its last row."""
-    angle_of: str | None = None
-    """Another body against whose angle the table of `size` is read; it repeats with each turn of that body."""
-    direction: Angle = 0.0
-    """Angle of the force from the ground's x axis, rad."""
-    follows: Annotated[bool, Field(strict=True)] = False
-    """Whether the force rotates with the body. Components and direction then refer to the axes of the body."""
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> "ForceLoad":
-        force = None if self.force is None else [self.force.x, self.force.y]
-        size = self.size if self.size is not None else self.size_by_time
-        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
-        check_by(self, "size")
-        return self
-
-
-class TorqueLoad(Table):
-    """A torque on a body."""
-
-    name: str
-    kind: Literal["torque"]
-    body: str
-    """Body on which the torque acts; the reaction acts on the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
-    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
-    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
-    """Instead of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on; smooth between the rows, constant after the
-    last."""
-    repeats: Annotated[bool, Field(strict=True)] = False
-    """Whether the table over time repeats after its last row."""
-    angle_of: str | None = None
-    """Another body against whose angle the table of `torque` is read; it repeats with each turn of that body."""
-
-    @model_validator(mode="after")
-    def _by_one(self) -> "TorqueLoad":
-        check_by(self, "torque")
-        remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
-        check_one_of("torque", self.torque, self.torque_by_time, remedy)
-        return self
-
-
-class SpringLoad(Table):
-    """A spring and damper between two points."""
-
-    name: str
-    kind: Literal["spring"]
-    first: str
-    """``body.point``, or ``ground.point``."""
-    second: str
-    """``body.point``, or ``ground.point``."""
-    stiffness: Annotated[float, Quantity("N/m", least=0)]
-    """Stiffness, N/m."""
-    length: Annotated[float, Quantity("m", least=0)] = 0.0
-    """Length at which the spring exerts no force, m."""
-    damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
-    """Damping along the line between both points, N s/m."""
-    acts: Literal["both", "pushing", "pulling"] = "both"
-    """Range in which the spring acts: "both" sides of its length; "pushing": only when shorter, as a buffer or end
-    stop; "pulling": only when longer, as a rope."""
-
-
-PlanarLoad = Annotated[
-    ForceLoad | TorqueLoad | SpringLoad | TorsionSpringLoad | CylinderLoad | DragLoad,
     Field(discriminator="kind"),
 ]

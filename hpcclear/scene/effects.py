@@ -7,7 +7,8 @@ from pydantic import field_validator, model_validator
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
-from hpcclear.scene.loads import Law
+from hpcclear.scene.piecewise import Piecewise
+from hpcclear.scene.rubbing import Rubbing
 
 
 class Contact(LawTable):
@@ -20,7 +21,7 @@ class Contact(LawTable):
     geometry: str | None = None
     """Geometry of the contact: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or
     "table"."""
-    curve: Annotated[Any, Law("m", "N")] | None = None
+    curve: Annotated[Any, Piecewise("m", "N")] | None = None
     """For the geometry "table": ``[[depth, force], ...]``, m and N, both increasing from 0."""
     minimum_impact_speed: Speed = 1e-3
     """Lower bound of the impact velocity in the damping, m/s."""
@@ -71,15 +72,6 @@ class Friction(LawTable):
         return bool(self.declared.bristled)
 
 
-class GuideFriction(Table):
-    """Coulomb friction between slider and guide."""
-
-    coefficient: Annotated[float, Quantity("", least=0)]
-    """Coefficient of friction."""
-    ramp_speed: Speed = 0.01
-    """Sliding speed below which the force falls linearly to 0, m/s."""
-
-
 class Effects(Table):
     """Effects that act on the mechanism. Disabled effects are not computed."""
 
@@ -92,7 +84,7 @@ class Effects(Table):
     slider_load: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
     """Force on the slider, positive along +x, N; constant or ``[[crank angle, force], ...]`` over the turns of a
     revolution; default "none"."""
-    guide_friction: GuideFriction | None = None
+    guide_friction: Rubbing | None = None
     """Friction of the slider in its guide; default "none"."""
 
     def law_unit(self, path: str) -> str | None:

@@ -16,7 +16,7 @@ from pydantic_core import CoreSchema
 
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
-from hpcclear.scene.loads import Law
+from hpcclear.scene.piecewise import Piecewise
 from hpcclear.scene.plugged import as_invalid
 from hpcclear.scene.wanted import hint
 
@@ -323,7 +323,7 @@ def _curve(data: Mapping[str, object]) -> Any:
     if data.get("curve") is None:
         return None
     try:
-        rows = Law("m", "N").convert(data["curve"])
+        rows = Piecewise("m", "N").convert(data["curve"])
     except PydanticCustomError as error:
         context = error.context or {}
         raise invalid(context["reason"], context["remedy"], "curve", data["curve"]) from None

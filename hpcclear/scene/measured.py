@@ -8,6 +8,7 @@ from typing import Any
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
 from hpcclear.scene.file_curves import FileCurve, against_time, pairs_of
+from hpcclear.scene.loads import SIZED
 from hpcclear.scene.paths import replace
 from hpcclear.scene.sheets import place_of, read
 from hpcclear.scene.validation import validated
@@ -16,15 +17,13 @@ CURVES = {
     "effects.slider_load": "N",
     "drive.torque": "N*m",
     "mechanism.drives.*.torque": "N*m",
-    "mechanism.loads.*.size": "N",
-    "mechanism.loads.*.torque": "N*m",
+    **{f"mechanism.loads.*.{one.size_entry}": one.unit for one in SIZED},
 }
 """Entries that may be a curve against the crank angle, and their units."""
 BY_TIME = {
     "mechanism.drives.*.angle": "rad",
     "mechanism.drives.*.speed_by_time": "rad/s",
-    "mechanism.loads.*.size_by_time": "N",
-    "mechanism.loads.*.torque_by_time": "N*m",
+    **{f"mechanism.loads.*.{one.size_entry}_by_time": one.unit for one in SIZED},
 }
 """Entries that are tables against the time."""
 

@@ -2,34 +2,31 @@
 mechanism of them."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.bearings import Bearing
 from hpcclear.scene.bending import Bending, check_bars
-from hpcclear.scene.driving import PlanarDrive, PlanarLoad
+from hpcclear.scene.driving import PlanarDrive
 from hpcclear.scene.fields import (
     Length,
     Mass,
     NamedRows,
-    PositiveLength,
     Quantity,
     Table,
     check_period,
     invalid,
     nearest,
 )
-from hpcclear.scene.film import Film
-from hpcclear.scene.fits import with_clearance
-from hpcclear.scene.guides import NOT_OF_GUIDES, OfContacts, check_slide
+from hpcclear.scene.guides import Guide
+from hpcclear.scene.loads import AnyLoad
 from hpcclear.scene.materials import Materials
-from hpcclear.scene.mechanism import check_journal, slender_inertia
+from hpcclear.scene.mechanism import slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
-from hpcclear.scene.roundness import OutOfRound
 from hpcclear.scene.rubbing import Rubbing, RubbingPin
 from hpcclear.scene.slots import PlanarSlot
-from hpcclear.scene.wear import Wear
 
 Rows = NamedRows()
 
@@ -55,7 +52,8 @@ class PlanarBody(Table):
     """Points at which joints and loads act, in the body's own axes, m."""
     start_angle: Angle = 0.0
     """Approximate angle at the start, rad, from which the assembly is computed. For a driven body it is the exact angle
-    at the start, unless the drive prescribes the angle (harmonic, table)."""
+    at the start, unless the drive prescribes the angle (harmonic, table); with `turns` = 2 of its drive, 360 degrees or
+    more begins in the second turn."""
     bending: Bending | None = None
     """Bending of a bar between two pins. Without it the bar is rigid."""
 
@@ -122,48 +120,18 @@ class PlanarRevolute(Table):
     """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
 
-class PlanarClearance(Table):
+class PlanarClearance(Bearing):
     """A pin with clearance: a journal within a larger bearing."""
 
-    geometry: ClassVar[str] = "pin_in_bearing"
-    corners: ClassVar[tuple[str, ...]] = ()
-
     name: str
-    kind: Literal["clearance"]
     journal: str
     """``body.point`` at the centre of the journal."""
     bearing: str
     """``body.point`` or ``ground.point`` at the centre of the bearing."""
-    clearance: PositiveLength
-    """Radial clearance, bearing radius minus journal radius, m."""
-    bearing_radius: PositiveLength
-    """Radius of the bearing, m."""
-    length: PositiveLength | None = None
-    """Length of the bearing along its axis, m. Line contact and pressures require it."""
-    fit: str | None = None
-    """Instead of `clearance` and `bearing_radius`: an ISO 286 fit such as "20 H7/f7". Both are then at the middle of
-    their tolerances."""
-    diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
-    """Instead of `clearance`: difference of the diameters of bearing and journal, m. It is twice the radial clearance."""
     materials: Materials
-    start_eccentricity: Place = NOWHERE
-    """Vector from the bearing centre to the journal centre at the start, m."""
-    wear: Wear | None = None
-    """Wear of its surfaces. Without it they do not wear."""
-    film: Film | None = None
-    """Oil film between its surfaces. Without it the joint is dry."""
-    out_of_round: OutOfRound | None = None
-    """Waviness of its surfaces. Without it they are round."""
-
-    _in_radii = model_validator(mode="before")(with_clearance)
-
-    @model_validator(mode="after")
-    def _journal_fits(self) -> "PlanarClearance":
-        check_journal(self)
-        return self
 
 
-class PlanarSlide(OfContacts, Table):
+class PlanarSlide(Guide):
     """A guide on the ground or on a body; with clearance, a rectangular slider in a channel that is a little higher."""
 
     name: str
@@ -176,29 +144,8 @@ class PlanarSlide(OfContacts, Table):
     """Direction of the line in the axes of the body that carries it, rad."""
     friction: Rubbing | None = None
     """Friction of a guide without clearance. Without it the guide is frictionless."""
-    clearance: PositiveLength | None = None
-    """Gap on either side of a slider in the middle of its channel, m. Without it the guide is ideal."""
-    length: PositiveLength | None = None
-    """Length of a slider with clearance along the line, m."""
-    height: PositiveLength | None = None
-    """Height of a slider with clearance across the line, m. The channel is higher by twice the clearance."""
-    corner_radius: PositiveLength | None = None
-    """Radius of the slider's rounded corners, m. It determines the contact stiffness."""
-    width: PositiveLength | None = None
-    """Width of the slider at right angles to the plane, m. Line contact requires it."""
     materials: Materials | None = None
     """Materials of channel (bearing) and slider (journal) of a guide with clearance."""
-    start_offset: Length | None = None
-    """Distance of the slider's middle from the guide's line at the start, positive to the left, m; default 0."""
-    start_tilt: Angle | None = None
-    """Angle between the slider and the line at the start, rad; default 0."""
-
-    elsewhere: ClassVar = NOT_OF_GUIDES
-
-    @model_validator(mode="after")
-    def _slider_fits(self) -> "PlanarSlide":
-        check_slide(self)
-        return self
 
 
 class PlanarFixed(Table):
@@ -231,7 +178,7 @@ class Planar(Table):
     """The joints. ``like = "NAME"`` copies the entries of another joint."""
     drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
     """Drives of the mechanism; one is sufficient."""
-    loads: Annotated[tuple[PlanarLoad, ...], Rows] = ()
+    loads: Annotated[tuple[AnyLoad, ...], Rows] = ()
     """Forces, torques and springs. Gravity is an entry of `effects`."""
     followed: str | None = None
     """``body.point`` whose acceleration and path responses contain."""
@@ -252,23 +199,20 @@ class Planar(Table):
         return self
 
     @model_validator(mode="after")
-    def _bars_may_bend(self) -> "Planar":
-        check_bars(self)
+    def _tables_fit(self) -> "Planar":
+        self.check()
         return self
 
-    @model_validator(mode="after")
-    def _curves_repeat(self) -> "Planar":
+    def check(self) -> None:
+        """An error for validators unless bars that bend are held by pins, and curves repeat with the revolution."""
+        check_bars(self)
         turns = turns_of(self) if self.drives else 1
         for table in ("drives", "loads"):
             for row in getattr(self, table):
-                for entry in ("torque", "size"):
-                    curve = getattr(row, entry, None)
-                    if isinstance(curve, tuple):
-                        by_another = getattr(row, "angle_of", None) is not None
-                        check_period(
-                            curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}"
-                        )
-        return self
+                entry = getattr(row, "size_entry", "torque")
+                if isinstance(curve := getattr(row, entry, None), tuple):
+                    by_another = getattr(row, "angle_of", None) is not None
+                    check_period(curve, 1 if by_another else turns, f"{table}.{row.name}.{entry}")
 
     @model_validator(mode="before")
     @classmethod

@@ -30,8 +30,8 @@ def implausible(scene: SceneTables) -> Iterator[str]:
     """A sentence for each number that is likely a slip of units."""
     if isinstance(scene.mechanism, Mechanism):
         yield from _drive(scene)
-        yield from _bodies(scene)
         yield from _rod(scene)
+    yield from _bodies(scene)
     yield from _joints(scene)
     yield from _films(scene)
     if scene.numerics.beta == 0.0 and (
@@ -63,23 +63,26 @@ def _drive(scene: SceneTables) -> Iterator[str]:
 
 
 def _bodies(scene: SceneTables) -> Iterator[str]:
-    mechanism = scene.slider_crank
-    heaviest = 5.0 * STEEL * mechanism.rod.length**3
-    for name in ("crank", "rod"):
-        link = getattr(mechanism, name)
-        if link.length > LONGEST:
-            yield f'mechanism.{name}.length = {link.length:g} m; if mm are meant, write "{link.length:g} mm"'
-        if link.inertia > 100.0 * link.mass * link.length**2:
+    bodies = [
+        (scene.path_in_scene(f"mechanism.bodies.{one.name}"), one) for one in scene.linkage.bodies
+    ]
+    bars = [(key, bar, bar.length) for key, bar in bodies if bar.length is not None]
+    for key, bar, length in bars:
+        if length > LONGEST:
+            yield f'{key}.length = {length:g} m; if mm are meant, write "{length:g} mm"'
+        if (own := bar.own_inertia) > 100.0 * bar.mass * length**2:
             yield (
-                f"mechanism.{name}.inertia = {link.inertia:g} kg m2 is {link.inertia / (link.mass * link.length**2):.2g} "
-                "times mass times length squared; check the unit, or give a flywheel as drive.flywheel_inertia"
+                f"{key}.inertia = {own:g} kg m2 is {own / (bar.mass * length**2):.2g} times mass times length squared; "
+                "check the unit, or give a flywheel as flywheel_inertia of a drive"
             )
-    for name in ("crank", "rod", "slider"):
-        mass = getattr(mechanism, name).mass
-        if mass > heaviest:
+    places = [one for body in (scene.linkage.ground, *scene.linkage.bodies) for one in body.points]
+    sizes = [*(length for _, _, length in bars), *(math.hypot(one.x, one.y) for one in places)]
+    heaviest = 5.0 * STEEL * (max(sizes) or math.inf) ** 3
+    for key, body in bodies:
+        if body.mass > heaviest:
             yield (
-                f"mechanism.{name}.mass = {mass:g} kg is more than five steel cubes as long as the rod "
-                f'({heaviest:.3g} kg); if grams are meant, write "{mass:g} g"'
+                f"{key}.mass = {body.mass:g} kg is more than five steel cubes as long as the mechanism "
+                f'({heaviest:.3g} kg); if grams are meant, write "{body.mass:g} g"'
             )
 
 
@@ -101,10 +104,9 @@ def _rod(scene: SceneTables) -> Iterator[str]:
 
 def _joints(scene: SceneTables) -> Iterator[str]:
     for name in scene.clearance_joints():
-        joint, key = scene.clearance_joint(name), scene.joint_key(name)
-        materials = getattr(joint, "materials", joint)
+        joint, key = scene.clearance_joint(name), scene.materials_key(name)
         for part in ("bearing", "journal"):
-            modulus = getattr(materials, part).youngs_modulus
+            modulus = getattr(joint.materials, part).youngs_modulus
             if not SOFTEST <= modulus <= STIFFEST:
                 what = "softer than rubber" if modulus < SOFTEST else "stiffer than diamond"
                 yield (

@@ -68,23 +68,16 @@ def check_points(
     pairs = []
     if isinstance(scene.mechanism, Mechanism):
         reason = "the rod no longer than the crank"
-        pairs.append(("mechanism.crank.length", "mechanism.rod.length", reason))
-    for joint in scene.pins():
-        key, reason = scene.joint_key(joint), "the clearance as large as the bearing"
-        pairs.append((f"{key}.clearance", f"{key}.bearing_radius", reason))
-    sliders = [
-        one for one in scene.guides() if hasattr(scene.clearance_joint(one), "corner_radius")
-    ]
-    for joint in sliders:
-        key, reason = scene.joint_key(joint), "corners rounder than half of the slider"
-        pairs += [
-            (f"{key}.corner_radius", f"{key}.{size}", reason) for size in ("length", "height")
-        ]
-    for small, large, reason in pairs:
+        pairs.append(("mechanism.crank.length", "mechanism.rod.length", 1.0, reason))
+    for joint in scene.clearance_joints():
+        for small, large, times, reason in scene.clearance_joint(joint).ordered:
+            key = scene.joint_key(joint)
+            pairs.append((f"{key}.{small}", f"{key}.{large}", times, reason))
+    for small, large, times, reason in pairs:
         lower, upper = (
             entries(scene, points.paths, points.values, path) for path in (small, large)
         )
-        times, word = (2.0, "2 ") if small.endswith("corner_radius") else (1.0, "")
+        word = "" if times == 1.0 else f"{times:g} "
         gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
         _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
     _check_laws(scene, points, label)

@@ -11,6 +11,7 @@ from hpcclear.base.objectives import ENDS
 from hpcclear.scene.distributions import OURS
 from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Table
 from hpcclear.scene.file_curves import FileCurve
+from hpcclear.scene.guides import Guide
 from hpcclear.scene.scene import Scene
 
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}
@@ -54,7 +55,7 @@ def _attribute_docs(table: type[Table]) -> dict[str, str]:
 
 
 def _describe(definitions: dict[str, Any]) -> None:
-    """Describe entries by the words below them in the source.
+    """Describe entries by the words below them in the source, and put them in the order in which they are read.
 
     Pydantic can do so itself, but as soon as a table is defined: a fifth of a second of every command, rank and test.
     """
@@ -63,9 +64,13 @@ def _describe(definitions: dict[str, Any]) -> None:
         docs = {
             key: words for kind in reversed(kinds) for key, words in _attribute_docs(kind).items()
         }
-        for key, entry in definitions.get(table.__name__, {}).get("properties", {}).items():
+        entries = definitions.get(table.__name__, {}).get("properties", {})
+        for key, entry in entries.items():
             if key in docs:
                 entry["description"] = docs[key]
+        # the kind first, and what a table shares with others behind its own entries
+        own = {key: entries.pop(key) for key in ("kind", *table.__annotations__) if key in entries}
+        entries |= own | {key: entries.pop(key) for key in tuple(entries)}
 
 
 def _as_written(definitions: dict[str, Any]) -> None:
@@ -139,6 +144,7 @@ def scene_schema() -> dict[str, Any]:
     for name in ("ClearanceJoint", "PlanarClearance"):  # a fit stands in place of both
         row = definitions[name]
         row["required"] = [k for k in row["required"] if k not in ("clearance", "bearing_radius")]
+    definitions["SliderGuide"]["required"] += Guide.needed  # it always has clearance
     effects = definitions["Effects"]["properties"]
     for key in ("friction", "guide_friction"):  # one word switches them off
         entry = effects[key]

@@ -7,11 +7,19 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hpcclear.scene.driving import ForceLoad, PlanarDrive, PlanarSpeed, PlanarTorque
-from hpcclear.scene.guides import SHAPED, STARTED
+from hpcclear.scene.bearings import Bearing
+from hpcclear.scene.driving import (
+    ConstantSpeed,
+    PlanarDrive,
+    PlanarSpeed,
+    PlanarTorque,
+)
+from hpcclear.scene.fields import Table
+from hpcclear.scene.guides import Guide
+from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.materials import Materials
-from hpcclear.scene.mechanism import ClearanceJoint, ConstantSpeed
-from hpcclear.scene.places import NamedPlace, Place
+from hpcclear.scene.mechanism import ClearanceJoint, Link
+from hpcclear.scene.places import NamedPlace
 from hpcclear.scene.planar import (
     Ground,
     Planar,
@@ -21,7 +29,6 @@ from hpcclear.scene.planar import (
     PlanarRevolute,
     PlanarSlide,
 )
-from hpcclear.scene.rubbing import Rubbing
 
 JOINTS = {"crank_rod": ("crank.b", "rod.a"), "rod_slider": ("slider.pin", "rod.b")}
 """Journal and bearing of the joints that may have clearance: O12, O23."""
@@ -70,61 +77,63 @@ def path_in_linkage(path: str) -> str:
     return path
 
 
+def path_in_scene(path: str) -> str:
+    """The entry of a slider-crank's scene that stands for one of the linkage's tables, itself if none does."""
+    for own, table in _TABLES.items():
+        if path == table or path.startswith(f"{table}."):
+            return own + path.removeprefix(table).replace(".materials", "")
+    return path
+
+
 def linkage_of(scene: Any) -> Planar:
     """The tables of the linkage that a scene's slider-crank is; they are valid since the scene's are."""
     mechanism, effects = scene.mechanism, scene.effects
-    bodies = [
-        PlanarBody.model_construct(
-            name=name, length=bar.length, mass=bar.mass, inertia=bar.inertia,
-            mass_center=bar.mass_center, start_angle=start, bending=bar.bending,
-        )
-        for name, bar, start in (
-            ("crank", mechanism.crank, 0.0), ("rod", mechanism.rod, 0.0)
-        )
-    ]  # fmt: skip
+    bars = [
+        PlanarBody.model_construct(name=name, **_entries(bar, Link))
+        for name, bar in (("crank", mechanism.crank), ("rod", mechanism.rod))
+    ]
     pin = NamedPlace.model_construct(name="pin", x=0.0, y=0.0)
     turning = {} if mechanism.slider.inertia is None else {"inertia": mechanism.slider.inertia}
     slider = PlanarBody.model_construct(
         name="slider", mass=mechanism.slider.mass, points=(pin,), **turning
     )
-    rubs = effects.guide_friction
-    friction = None
-    if rubs is not None:
-        friction = Rubbing.model_construct(coefficient=rubs.coefficient, ramp_speed=rubs.ramp_speed)
     ground, line = Ground(), "ground.o"
     if mechanism.offset is not None:
         beside = NamedPlace.model_construct(name="guide", x=0.0, y=mechanism.offset)
         ground, line = Ground(points=(*ground.points, beside)), "ground.guide"
     guide = PlanarSlide.model_construct(
-        name="guide", kind="slide", point="slider.pin", line=line, friction=friction,
+        name="guide", kind="slide", point="slider.pin", line=line,
+        friction=effects.guide_friction,
         **_loose(scene.joints.guide),
     )  # fmt: skip
     frame = PlanarRevolute.model_construct(
         name="crank_frame", kind="revolute", journal="crank.a", bearing="ground.o",
         friction=getattr(scene.joints.crank_frame, "friction", None),
     )  # fmt: skip
-    loads: tuple[ForceLoad, ...] = ()
-    if effects.slider_load is not None:
-        loads = (
-            ForceLoad.model_construct(
-                name="load", kind="force", place="slider.pin", size=effects.slider_load
-            ),
-        )
+    load = ForceLoad.model_construct(
+        name="load", kind="force", place="slider.pin", size=effects.slider_load
+    )
     return Planar.model_construct(
-        bodies=(*bodies, slider),
+        bodies=(*bars, slider),
         ground=ground,
         joints=(frame, guide, *(_joint(scene, name) for name in JOINTS)),
         drives=(_drive(scene.drive),),
-        loads=loads,
+        loads=() if load.size is None else (load,),
     )
 
 
 def _loose(guide: Any) -> dict[str, Any]:
     """Entries of the slide that a guide with clearance stands for."""
-    if guide is None:
-        return {}
-    materials = Materials.model_construct(bearing=guide.bearing, journal=guide.journal)
-    return {name: getattr(guide, name) for name in (*SHAPED, *STARTED)} | {"materials": materials}
+    return {} if guide is None else _entries(guide, Guide) | {"materials": _materials(guide)}
+
+
+def _entries(table: Any, of: type[Table]) -> dict[str, Any]:
+    """Entries of a table that it has in common with the linkage's."""
+    return {name: getattr(table, name) for name in of.model_fields}
+
+
+def _materials(joint: Any) -> Materials:
+    return Materials.model_construct(bearing=joint.bearing, journal=joint.journal)
 
 
 def _joint(scene: Any, name: str) -> PlanarJoint:
@@ -132,16 +141,13 @@ def _joint(scene: Any, name: str) -> PlanarJoint:
     places: dict[str, Any] = {"name": name, "journal": journal, "bearing": bearing}
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
-    x, y = joint.start_eccentricity
     return PlanarClearance.model_construct(
-        **places, kind="clearance", clearance=joint.clearance, bearing_radius=joint.bearing_radius,
-        length=joint.length, materials=Materials.model_construct(bearing=joint.bearing, journal=joint.journal),
-        start_eccentricity=Place.model_construct(x=x, y=y),
-        wear=joint.wear, film=joint.film, out_of_round=joint.out_of_round,
-    )  # fmt: skip
+        **places, **_entries(joint, Bearing), materials=_materials(joint)
+    )
 
 
 def _drive(drive: Any) -> PlanarDrive:
     model = PlanarSpeed if isinstance(drive, ConstantSpeed) else PlanarTorque
-    entries = {name: getattr(drive, name) for name in type(drive).model_fields}
-    return model.model_construct(name="drive", body="crank", period=True, **entries)
+    return model.model_construct(
+        name="drive", body="crank", period=True, **_entries(drive, type(drive))
+    )

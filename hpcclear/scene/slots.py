@@ -2,22 +2,19 @@
 
 from typing import ClassVar, Literal
 
-from pydantic import model_validator
-
 from hpcclear.base.outcome import WALLS
-from hpcclear.scene.fields import Length, PositiveLength, Table, invalid
+from hpcclear.scene.fields import PositiveLength
 from hpcclear.scene.guides import OfContacts
 from hpcclear.scene.materials import Materials
 from hpcclear.scene.places import Angle
 
-NEEDED = ("pin_radius", "materials")
 
-
-class PlanarSlot(OfContacts, Table):
+class PlanarSlot(OfContacts):
     """A pin in a straight slot of a body or of the ground; with clearance, it touches either wall."""
 
     geometry: ClassVar[str] = "pin_in_slot"
     corners: ClassVar[tuple[str, ...]] = tuple(WALLS)
+    needed: ClassVar[tuple[str, ...]] = ("pin_radius",)
 
     name: str
     kind: Literal["slot"]
@@ -27,24 +24,7 @@ class PlanarSlot(OfContacts, Table):
     """``body.point``, or ``ground.point``, on the line midway between the walls."""
     angle: Angle = 0.0
     """Direction of the line in the axes of the body that carries it, rad."""
-    clearance: PositiveLength | None = None
-    """Gap on either side of a pin in the middle of the slot, m. Without it the joint is ideal."""
     pin_radius: PositiveLength | None = None
     """Radius of the pin, m. It determines the contact stiffness."""
-    width: PositiveLength | None = None
-    """Width of the slot's walls at right angles to the plane, m. Line contact requires it."""
     materials: Materials | None = None
     """Materials of slot (bearing) and pin (journal), with clearance."""
-    start_offset: Length | None = None
-    """Distance of the pin's centre from the line at the start, positive to the left, m; default 0."""
-
-    @model_validator(mode="after")
-    def _with_all(self) -> "PlanarSlot":
-        if self.clearance is not None:
-            for name in NEEDED:
-                if getattr(self, name) is None:
-                    raise invalid(
-                        "is missing, and a slot with clearance needs it",
-                        "Add it, or remove clearance", key=name, value=None,
-                    )  # fmt: skip
-        return self

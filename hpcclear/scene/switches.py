@@ -11,15 +11,12 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import mean_of
-from hpcclear.scene.driving import PlanarTorque, speed_entry
+from hpcclear.scene.driving import TorqueDrive, speed_entry
 from hpcclear.scene.fields import Curve
-from hpcclear.scene.guides import SliderGuide
-from hpcclear.scene.mechanism import TorqueDrive
+from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide, turns_of
+from hpcclear.scene.planar import Planar, PlanarClearance, turns_of
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.slots import PlanarSlot
-from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import scene_of
 
 GENTLE_RAMP = 50.0
@@ -81,14 +78,13 @@ def _clearances(scene: Scene) -> Iterator[Switch]:
         if any(label == one.partition(".")[0] for one in scene.numerics.objective_joints):
             continue
         joint = scene.clearance_joint(label)
-        ideal: dict[str, Any] | None = {"kind": "ideal"}
-        if isinstance(joint, SliderGuide):
-            ideal = None
+        ideal: dict[str, Any] | None
+        if scene.template is not None:
+            ideal = {"kind": "ideal"} if isinstance(joint, PlanarClearance) else None
         elif isinstance(joint, PlanarClearance):
             ideal = {"kind": "revolute", "journal": joint.journal, "bearing": joint.bearing}
-        elif isinstance(joint, (PlanarSlide, PlanarSlot)):
-            kept = ("kind", "point", "line", "angle")
-            ideal = {name: getattr(joint, name) for name in kept}
+        else:
+            ideal = {name: getattr(joint, name) for name in ("kind", "point", "line", "angle")}
         yield Switch(f"clearance in {label}", {scene.joint_key(label): ideal}, joint=label)
 
 
@@ -172,9 +168,9 @@ def _outside(scene: Scene) -> Iterator[Switch]:
         for load in mechanism.loads:
             key = f"mechanism.loads.{load.name}"
             yield Switch(f"{load.kind} {load.name}", {key: None})
-            for entry in ("size", "torque"):
-                curve, other = getattr(load, entry, None), getattr(load, "angle_of", None)
-                yield from _mean(scene, load.name, f"{key}.{entry}", curve, 1 if other else None)
+            if isinstance(load, SizedLoad):
+                entry, turns = load.size_entry, 1 if load.angle_of else None
+                yield from _mean(scene, load.name, f"{key}.{entry}", getattr(load, entry), turns)
 
 
 def _mean(
@@ -189,17 +185,14 @@ def _mean(
 
 def _drives(scene: Scene) -> Iterator[Switch]:
     """A free crank, in whose place one turns at the speed that is expected of it, or that it starts with."""
-    if isinstance(scene.mechanism, Planar):
-        drives = [one for one in scene.mechanism.drives if isinstance(one, PlanarTorque)]
-        tables: list[tuple[str, str, PlanarTorque | TorqueDrive]] = [
-            (f" of {one.name}", f"mechanism.drives.{one.name}", one) for one in drives
-        ]
-    else:
-        tables = [("", "drive", scene.drive)] if isinstance(scene.drive, TorqueDrive) else []
-    for whose, key, drive in tables:
-        kept = {name: plain(drive).get(name) for name in ("body", "period", "turns")}
-        table = {name: value for name, value in kept.items() if value is not None}
+    for drive in scene.linkage.drives:
+        if not isinstance(drive, TorqueDrive):
+            continue
+        key = scene.path_in_scene(f"mechanism.drives.{drive.name}")
+        whose = "" if key == "drive" else f" of {drive.name}"
+        names = ("turns",) if key == "drive" else ("body", "period", "turns")
         entry = speed_entry(drive)
+        table = {name: getattr(drive, name) for name in names}
         table |= {"kind": "constant-speed", "speed": getattr(drive, entry)}
         moved = {f"{key}.{entry}": f"{key}.speed"}
         yield Switch(f"speed fluctuation{whose}", {key: table}, moved)

@@ -16,8 +16,8 @@ from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, nearest
 from hpcclear.scene.film import Film
-from hpcclear.scene.guides import SliderGuide
-from hpcclear.scene.mechanism import ClearanceJoint, Drive, Joints, Mechanism
+from hpcclear.scene.guides import Guide
+from hpcclear.scene.mechanism import Drive, Joints, Mechanism
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
@@ -27,14 +27,11 @@ from hpcclear.scene.slots import PlanarSlot
 from hpcclear.scene.study import Study
 from hpcclear.scene.wear import Lives
 
-Loose = ClearanceJoint | PlanarClearance | SliderGuide | PlanarSlide | PlanarSlot
+GUIDE_FRICTION = "effects.guide_friction"
+"""Entry of the friction in a slider-crank's guide."""
+
+Loose = PlanarClearance | PlanarSlide | PlanarSlot
 """Tables of joints that may have clearance."""
-
-
-def _is_loose(joint: Any) -> bool:
-    """Whether a joint of a linkage has clearance."""
-    slides = isinstance(joint, (PlanarSlide, PlanarSlot))
-    return joint.clearance is not None if slides else isinstance(joint, PlanarClearance)
 
 
 class SceneTables(Table):
@@ -149,13 +146,11 @@ class SceneTables(Table):
 
     def bending(self) -> dict[str, Bending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
-        if isinstance(self.mechanism, Planar):
-            tables = {
-                f"mechanism.bodies.{body.name}": body.bending for body in self.mechanism.bodies
-            }
-        else:
-            tables = {"mechanism.rod": self.mechanism.rod.bending}
-        return {key: table for key, table in tables.items() if table is not None}
+        return {
+            self.path_in_scene(f"mechanism.bodies.{body.name}"): body.bending
+            for body in self.linkage.bodies
+            if body.bending is not None
+        }
 
     @property
     def modes(self) -> int:
@@ -209,9 +204,15 @@ class SceneTables(Table):
         """The entry of `linkage`, below ``mechanism``, that an entry of the scene stands for; itself if it stands for none."""
         return path if self.template is None else str(self.template.path_in_linkage(path))
 
+    def path_in_scene(self, path: str) -> str:
+        """The entry of the scene that stands for an entry of `linkage`, below ``mechanism``."""
+        return path if self.template is None else str(self.template.path_in_scene(path))
+
     def clearance_joints(self) -> tuple[str, ...]:
         """Names of the joints with clearance, O12 before O23; those of a linkage in file order."""
-        return tuple(joint.name for joint in self.linkage.joints if _is_loose(joint))
+        return tuple(
+            joint.name for joint in self.linkage.joints if getattr(joint, "clearance", None)
+        )
 
     def contact_labels(self) -> tuple[str, ...]:
         """Labels of the contacts in them: the name of a pin, "NAME.front_left" and so on of a guide's corners or a
@@ -248,40 +249,33 @@ class SceneTables(Table):
 
     def joint_key(self, label: str) -> str:
         """Dotted path of the table of a joint, or of a contact's joint."""
-        name = label.partition(".")[0]
-        return f"mechanism.joints.{name}" if self.template is None else f"joints.{name}"
+        return self.path_in_scene(f"mechanism.joints.{label.partition('.')[0]}")
 
     def materials_key(self, label: str) -> str:
         """Dotted path of the table that has the materials of a joint with clearance."""
-        return self.joint_key(label) + (".materials" if self.template is None else "")
+        return self.path_in_scene(f"mechanism.joints.{label.partition('.')[0]}.materials")
 
     def joint_frictions(self) -> dict[str, tuple[str, float]]:
         """Words and coefficient of friction in joints without clearance, by the dotted paths of its tables."""
         found = {}
         for one in self.linkage.joints:
             if (rubs := getattr(one, "friction", None)) is not None:
-                guide = isinstance(one, PlanarSlide)
-                key, words = (
-                    f"{self.joint_key(one.name)}.friction",
-                    f"{'guide' if guide else 'pin'} friction in {one.name}",
-                )
-                if self.template is not None and guide:
-                    key, words = "effects.guide_friction", "guide friction"
-                found[key] = words, rubs.coefficient
+                kind = "guide" if isinstance(one, Guide) else "pin"
+                key = self.path_in_scene(f"mechanism.joints.{one.name}.friction")
+                where = "" if key == GUIDE_FRICTION else f" in {one.name}"
+                found[key] = f"{kind} friction{where}", rubs.coefficient
         return found
 
-    def pin(self, name: str) -> ClearanceJoint | PlanarClearance:
+    def pin(self, name: str) -> PlanarClearance:
         """The table of a pin in a bearing."""
         found = self.clearance_joint(name)
-        assert isinstance(found, (ClearanceJoint, PlanarClearance))
+        assert isinstance(found, PlanarClearance)
         return found
 
     def clearance_joint(self, label: str) -> Loose:
         """The table of a joint with clearance, or of a contact's joint."""
         name = label.partition(".")[0]
-        rows = self.linkage.joints if self.template is None else ()
-        found = next((joint for joint in rows if joint.name == name), None)
-        found = getattr(self.joints, name) if found is None else found
+        found = next(joint for joint in self.linkage.joints if joint.name == name)
         assert isinstance(found, Loose)
         return found
 

@@ -11,6 +11,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import Table, invalid, nearest
+from hpcclear.scene.loads import KINDS as LOADS
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
@@ -32,7 +33,7 @@ _KINDS = {
     "joints.rod_slider": '"clearance" or "ideal"',
     "joints": '"revolute", "clearance", "slide", "slot" or "fixed"',
     "drives": '"constant-speed", "harmonic" or "torque"',
-    "loads": '"force", "torque" or "spring"',
+    "loads": " or ".join(f'"{kind}"' for kind in LOADS),
 }
 _KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 

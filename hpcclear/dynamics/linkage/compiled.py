@@ -4,6 +4,8 @@ The file stands beside Numba's cache, to be read; it is named by its content.
 """
 
 import hashlib
+import inspect
+from collections.abc import Callable
 from types import ModuleType
 
 from hpcclear.base.one_text import module_of
@@ -13,6 +15,7 @@ from hpcclear.dynamics.linkage.generator import Motion
 
 _HEAD = '''"""Written by hpcclear.dynamics.linkage.generator."""
 
+import numpy as np
 from numba import carray
 
 from hpcclear.base.bits import beyond
@@ -76,8 +79,16 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
         elements=", ".join(called or ["look_up"]),
     )
     held = f"JOINTS = ({rows}{',' if joints else ''})"
+    own = [f"@lane_function\n{_source(one, name)}\n\n" for name, one in motion.functions.items()]
     lane = f"@apart\n@lane_function\n{motion.source}"
-    return f"{head}\n{held}\n\n\n{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
+    text = f"{''.join(own)}{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
+    return f"{head}\n{held}\n\n\n{text}"
+
+
+def _source(function: Callable[..., object], name: str) -> str:
+    """The source of a function under another name."""
+    source = inspect.getsource(function)
+    return source.replace(f"def {function.__name__}(", f"def {name}(", 1)
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:

@@ -1,4 +1,4 @@
-"""Functions of generated motions besides the contact law: springs, drives, tables, near-singular loops. Plain, of arrays."""
+"""Functions of generated motions besides the contact law and those of loads: drives, tables, near-singular loops."""
 
 import math
 from collections.abc import Callable
@@ -19,48 +19,8 @@ from hpcclear.dynamics.layout.curves import (
     STARTS,
 )
 
-_TINY = 1e-300  # keeps the direction of a spring without length defined (and zero)
+_TINY = 1e-300  # keeps the direction of a vector without length defined (and zero)
 _FLAT = 1e-8  # pivots of loops over those of an open one, from which on inertia alone goes on: 1e-4 rad from flat
-
-
-@lane_function
-def spring_force(stiffness, damping, length, ex, ey, vx, vy):
-    """Force of a spring and damper on its first place, whose offset and velocity from the second are given.
-
-    Returns both components in N, and the power that both ends are given in W (what it stores and loses, negative).
-    """
-    square = ex * ex + ey * ey + _TINY
-    inverse = 1.0 / np.sqrt(square)
-    nx = ex * inverse
-    ny = ey * inverse
-    rate = vx * nx + vy * ny
-    tension = stiffness * (square * inverse - length) + damping * rate
-    return -tension * nx, -tension * ny, -tension * rate
-
-
-@lane_function
-def one_sided(side, stiffness, damping, length, ex, ey, vx, vy):
-    """The same of a spring that acts on one side of its length: beyond it (`side` 1) or within it (-1); it never pulls back."""
-    square = ex * ex + ey * ey + _TINY
-    inverse = 1.0 / np.sqrt(square)
-    nx = ex * inverse
-    ny = ey * inverse
-    rate = vx * nx + vy * ny
-    beyond = side * (square * inverse - length)
-    size = stiffness * beyond + damping * side * rate
-    size = 0.5 * (size + abs(size))
-    tension = side * size * (0.5 + 0.5 * np.sign(beyond))
-    return -tension * nx, -tension * ny, -tension * rate
-
-
-@lane_function
-def along(ex, ey, vx, vy):
-    """Direction, length and rate of the length of an offset."""
-    square = ex * ex + ey * ey + _TINY
-    inverse = 1.0 / np.sqrt(square)
-    nx = ex * inverse
-    ny = ey * inverse
-    return nx, ny, square * inverse, vx * nx + vy * ny
 
 
 @lane_function
@@ -75,12 +35,6 @@ def hinge(at, start, bend):
     """A line of slope `bend` beyond `start`, 0 before."""
     beyond = at - start
     return bend * (0.5 * (beyond + abs(beyond)))
-
-
-@lane_function
-def drag(linear, quadratic, spin):
-    """Torque against the turning at a speed, N m."""
-    return -(linear + quadratic * abs(spin)) * spin
 
 
 @lane_function

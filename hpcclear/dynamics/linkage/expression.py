@@ -4,7 +4,7 @@ Zeros disappear, signs move outwards, and nothing else is rearranged: the text a
 in which the generator did, which decides the last bits. Names are read where they are first needed.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
@@ -122,9 +122,13 @@ class Writer:
         First row of `par` that nobody has.
     hoist : bool
         Whether what holds parameters alone is worked out once a sample, as a derived parameter.
+    taken : iterable of str
+        Names that no value gets, whatever a load or drive is called.
     """
 
-    def __init__(self, rows: Mapping[str, int], free: int, hoist: bool) -> None:
+    def __init__(
+        self, rows: Mapping[str, int], free: int, hoist: bool, taken: Iterable[str] = ()
+    ) -> None:
         self.lines: list[str] = []
         self.rows = dict(rows)
         self.free = free
@@ -132,10 +136,11 @@ class Writer:
         self.derived: dict[str, str] = {}  # name: text in parameters
         self.inputs: dict[str, None] = {}  # parameters that a line or a derived one reads
         self.read: set[str] = set()  # those that have a row
+        self.functions: dict[str, Callable[..., object]] = {}  # of loads, which lines call
         self._derived_names: dict[str, str] = {}
         self._pending: dict[str, tuple[tuple[str, ...], str, tuple[Term, ...]]] = {}
         self._values: dict[str, Term] = {}
-        self._taken: set[str] = set()
+        self._taken: set[str] = set(taken)
 
     def parameter(self, name: str) -> Term:
         """A parameter of the sample."""
@@ -173,6 +178,13 @@ class Writer:
             candidate, count = f"{name}_{count}", count + 1
         self._taken.add(candidate)
         return candidate
+
+    def called(self, function: Callable[..., object]) -> str:
+        """The name by which lines call a function that is not one of `elements`."""
+        known = (name for name, one in self.functions.items() if one is function)
+        if (name := next(known, None)) is None:
+            self.functions[name := self.fresh(function.__name__)] = function
+        return name
 
     def line(self, text: str) -> None:
         """A statement as it stands; its names must have been written already (see `text`)."""

@@ -5,33 +5,32 @@ accelerations, gaps, forces and powers; an effect that is off is not in it. It i
 contact, kinematics, contact, sums, which keeps few numbers alive at a time.
 """
 
+import keyword
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.contacts.registry import GEOMETRIES
+from hpcclear.dynamics.linkage import piecewise
+from hpcclear.dynamics.linkage.acting import Acting
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.closing import Closing, dot
+from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
-from hpcclear.dynamics.linkage.loads import piecewise
-from hpcclear.dynamics.linkage.loads.writing import Writing
 from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
-    Acting,
     Aligned,
     Contact,
     Drive,
-    Force,
     Release,
     Revolute,
     RunUp,
     Slide,
-    Spring,
-    Torque,
     TorqueDrive,
     split,
 )
@@ -44,6 +43,12 @@ from hpcclear.dynamics.linkage.rubbing import (
     ties_of,
 )
 from hpcclear.dynamics.linkage.trees import Forest, forest
+
+RESERVED = (
+    *keyword.kwlist, "effects", "joints", "work", "par", "i", "W", "at", "abs", "np", "sincos", "saturated", *functions(),
+    *(one.function for one in GEOMETRIES.values()),
+)  # fmt: skip
+"""Names that a text has already, and that a value of a load or drive must not hide."""
 
 
 class On(NamedTuple):
@@ -80,6 +85,8 @@ class Motion:
     """Rows of tabulated values, by drive or load."""
     look_ups: Mapping[str, LookUp] = field(default_factory=dict)
     """Where each of them is looked up; those that move bodies first, since the angle of loads may be theirs."""
+    functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
+    """Functions of loads by name, ordinary Python, that the text calls besides those of `elements`."""
 
 
 def generate(
@@ -103,7 +110,7 @@ class _Generator:
     def __init__(self, mechanism: Mechanism, on: On, rows: Rows, cartesian: bool, hoist: bool):
         self.mechanism, self.on, self.rows = mechanism, on, rows
         self.forest = forest(mechanism, cartesian)
-        self.writer = Writer(rows.parameters, rows.free, hoist)
+        self.writer = Writer(rows.parameters, rows.free, hoist, RESERVED)
         self.kinematics = Kinematics(
             self.forest, self.writer, rows.coordinates, rows.velocities, rows.time, rows.curves
         )
@@ -118,7 +125,8 @@ class _Generator:
         for k, contact in enumerate(self.mechanism.contacts):
             self._contact(k, contact)
         for load in self.mechanism.loads:
-            self._load(load)
+            acting = Acting(load.name, self.kinematics, self.writer, self.balance, self._turned)
+            self.load_power = self.load_power + load.act(acting)
         free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
         torques = [self._torque(d) for d in free if not isinstance(d, (RunUp, Release))]
         self.constraints = [row for one in self.forest.closures for row in self.closing.rows(one)]
@@ -141,6 +149,7 @@ class _Generator:
             tuple(row.name for row in self.constraints),
             self.rows.curves,
             look_ups.found,
+            self.writer.functions,
         )
 
     def _described(self) -> str:
@@ -200,66 +209,11 @@ class _Generator:
             found += [*kin.rotated(self.forest.frames[body], own)]
         return f"({', '.join(self.writer.text(term) for term in found)})"
 
-    def _load(self, load: Force | Torque | Spring | Acting) -> None:
-        kin, write, power = self.kinematics, self.writer, ZERO
-        if isinstance(load, Acting):
-            power = load.act(Writing(kin, write, self.balance))
-            self.load_power = self.load_power + power
-            return
-        if isinstance(load, Spring):
-            self._spring(load)
-            return
-        turned = self._turned(load.name) if load.table else ONE
-        if isinstance(load, Torque):
-            moment = write.let(load.name, write.parameter(f"{load.name}_torque") * turned)
-            self.balance.twists.append(Twist(load.body, moment))
-            power = moment * kin.spin(self.forest.frames[load.body])
-        else:
-            parts = (
-                write.let(f"{load.name}_{axis}", self._force(load, axis, value) * turned)
-                for axis, value in zip("xy", load.force, strict=True)
-            )
-            force = Vector(*parts)
-            if load.follows:
-                body = split(load.place)[0]
-                cosine, sine = kin.offset(body)
-                own = Vector(cosine * force.x - sine * force.y, sine * force.x + cosine * force.y)
-                turned_force = kin.rotated(self.forest.frames[body], own)
-                force = Vector(
-                    *(
-                        write.let(f"{load.name}_{axis}", one)
-                        for axis, one in zip("xy", turned_force, strict=True)
-                    )
-                )
-            self.balance.pulls.append(Pull(load.place, force))
-            for part, speed in zip(force, kin.velocity(kin.point(load.place)), strict=True):
-                power = power + part * speed
-        self.load_power = self.load_power + power
-
     def _turned(self, name: str) -> Term:
         """What the curve of a drive or load says at the stage."""
         turned = f"turned_{name.replace('.', '_')}"
         self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
-
-    def _force(self, load: Force, axis: str, value: float) -> Term:
-        return self.writer.parameter(f"{load.name}_force_{axis}") if value else ZERO
-
-    def _spring(self, load: Spring) -> None:
-        """Call of the spring's law, which gives the force on the first place and what both ends do."""
-        kin, write = self.kinematics, self.writer
-        first, second = kin.point(load.first), kin.point(load.second)
-        apart = kin.position(first) - kin.position(second)
-        moving = kin.velocity(first) - kin.velocity(second)
-        numbers = [write.parameter(f"{load.name}_{n}") for n in ("stiffness", "damping", "length")]
-        texts = [write.text(t) for t in (*numbers, *apart, *moving)]
-        made = [write.fresh(f"{name}_{load.name}") for name in ("fx", "fy", "power")]
-        call = "spring_force(" if load.side == 0 else f"one_sided({float(load.side)}, "
-        write.line(f"{', '.join(made)} = {call}{', '.join(texts)})")
-        fx, fy, power = map(named, made)
-        force = Vector(fx, fy)
-        self.balance.pulls += [Pull(load.first, force), Pull(load.second, -force)]
-        self.load_power = self.load_power + power
 
     def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:
         write = self.writer

@@ -5,7 +5,15 @@ from typing import NamedTuple
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.expression import Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics
-from hpcclear.dynamics.linkage.parts import Drive, Load, RunUp, TableDrive, curves_of
+from hpcclear.dynamics.linkage.parts import (
+    Drive,
+    Load,
+    RunUp,
+    TableDrive,
+    TorqueDrive,
+    curves_of,
+    seconds_of,
+)
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -49,12 +57,11 @@ class LookUps:
             return LookUp((), f"{rate} * work[{at.STAGE_TIME} * W + i]", rate)
         if isinstance(part, RunUp):
             return _by_time(part.length)
-        by = getattr(part, "by", None)
-        if by is None:
-            return self._by_angle(main.body, main.turns)
-        if not by.seconds:
-            return self._by_angle(by.body, 1)
-        return _by_time(by.seconds)
+        if not isinstance(part, TorqueDrive) and (seconds := seconds_of(part)):
+            return _by_time(seconds)
+        if (body := getattr(part, "angle_of", None)) is not None:
+            return self._by_angle(body, 1)
+        return self._by_angle(main.body, main.turns)
 
     def _by_angle(self, body: str, turns: int) -> LookUp:
         """The angle of a body from the x axis, divided by the turns after which the table repeats."""

@@ -11,7 +11,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
-    Acting,
     Body,
     Clearance,
     Contact,
@@ -31,6 +30,7 @@ from hpcclear.dynamics.linkage.parts import (
     Slot,
     TableDrive,
     TorqueDrive,
+    seconds_of,
     split,
 )
 
@@ -94,9 +94,9 @@ class Mechanism:
     @property
     def clocked(self) -> bool:
         """Whether a load or drive goes by the time since the start."""
-        by = [getattr(load, "by", None) for load in self.loads]
-        timed = any(one is not None and one.seconds for one in by)
-        return timed or any(isinstance(drive, RunUp) for drive in self.drives)
+        return any(map(seconds_of, self.loads)) or any(
+            isinstance(drive, RunUp) for drive in self.drives
+        )
 
     def drive_of(self, body: str) -> Drive | None:
         """What drives a body."""
@@ -218,7 +218,7 @@ def coupled(m: Mechanism) -> list[set[str]]:
     """Bodies whose angles the joints or loads compare with one another, the ground's first: sets of names."""
     groups = joined(m, (Slide, Fixed))
     for load in m.loads:
-        if isinstance(load, Acting) and load.by_angle and (other := getattr(load, "other", None)):
+        if load.by_angle and (other := getattr(load, "other", None)):
             touched = [names for names in groups if names & {load.body, other}]  # type: ignore[attr-defined]
             rest = [names for names in groups if not names & {load.body, other}]  # type: ignore[attr-defined]
             groups = [set().union(*touched), *rest]
@@ -242,8 +242,6 @@ def _turned(m: Mechanism) -> None:
         driven = [d for d in m.drives if d.body in names and (d.prescribed or d is m.period)]
         gains |= {name: {gain_of(m, drive) for drive in driven} for name in names}
     for load in m.loads:
-        if not isinstance(load, Acting):
-            continue
         body, other = (getattr(load, entry, None) for entry in ("body", "other"))
         for entry, name in (("body", body), ("other", other)):
             if name in still:
@@ -271,10 +269,10 @@ def _looked_up(m: Mechanism) -> None:
     still = next(names for names in joined(m, (Slide, Fixed)) if GROUND in names)
     known = {body.name for body in m.bodies} - still
     for load in m.loads:
-        by = getattr(load, "by", None)
-        if by is not None and not by.seconds and by.body not in known:
+        body = getattr(load, "angle_of", None)
+        if body is not None and body not in known:
             raise InputError(
-                f"loads.{load.name}.angle_of", by.body, "there is no such body that can rotate",
+                f"loads.{load.name}.angle_of", body, "there is no such body that can rotate",
                 f"Known are: {', '.join(sorted(known))}",
             )  # fmt: skip
 

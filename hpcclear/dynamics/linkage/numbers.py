@@ -5,20 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from hpcclear.base.pieces import hinges
 from hpcclear.dynamics.linkage import bending
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
-from hpcclear.dynamics.linkage.loads import piecewise
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
-    Acting,
     Aligned,
     ConstantSpeed,
-    Force,
     Harmonic,
-    Spring,
     TableDrive,
-    Torque,
     TorqueDrive,
     split,
 )
@@ -106,22 +102,12 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
             case TorqueDrive():
                 found[f"{drive.name}_torque"] = drive.torque
                 if drive.by_speed is not None:
-                    found |= piecewise.numbers(f"{drive.name}_by_speed", drive.by_speed)
+                    found |= hinges(f"{drive.name}_by_speed", drive.by_speed)
                 if drive.no_load_speed is not None:
                     found[f"{drive.name}_fall"] = 1.0 / drive.no_load_speed
                 found[f"{drive.name}_speed"] = drive.initial_speed
     for load in trees.mechanism.loads:
-        match load:
-            case Force():
-                found[f"{load.name}_force_x"], found[f"{load.name}_force_y"] = load.force
-            case Torque():
-                found[f"{load.name}_torque"] = load.torque
-            case Spring():
-                found[f"{load.name}_stiffness"] = load.stiffness
-                found[f"{load.name}_damping"] = load.damping
-                found[f"{load.name}_length"] = load.length
-            case Acting():
-                found |= load.numbers()
+        found |= load.numbers()
 
 
 def row_of(motion: Motion, base: dict[str, Any]) -> dict[int, Any]:

@@ -6,8 +6,8 @@ angles count counter-clockwise.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, NamedTuple, Self
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -392,89 +392,34 @@ class RunUp(TorqueDrive):
 Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 
-@dataclass(frozen=True)
-class By:
-    """What a load's table goes by in place of the angle of the period's body: that of another, or the time where it has a
-    length in s; then it repeats, or stays level."""
+class Load(Protocol):
+    """What is known here of a load (`hpcclear.scene.loads`): its parameters, and the terms that it adds by an `acting.Acting`.
 
-    body: str = ""
-    seconds: float = 0.0
-    repeats: bool = False
-
-
-@dataclass(frozen=True)
-class Force:
-    """A force (N, along the ground's axes) at a place; `table`: times a curve over the angle of the period's body, or `by`.
-
-    `follows`: along the axes of its body instead.
+    Its entries `place`, `first` and `second` are places, `body` and `other` bodies that rotate, where it has these.
     """
 
-    name: str
-    place: str
-    force: Pair
-    table: bool = False
-    follows: bool = False
-    by: By | None = None
+    @property
+    def name(self) -> str:
+        """That of its parameters and curve."""
 
-
-@dataclass(frozen=True)
-class Torque:
-    """A torque on a body, N m; `table` and `by` as of a force."""
-
-    name: str
-    body: str
-    torque: float
-    table: bool = False
-    by: By | None = None
-
-
-@dataclass(frozen=True)
-class Spring:
-    """A spring (N/m, free length in m) and damper (N s/m) between two places.
-
-    `side`: 1 acts beyond the length only, as a rope, -1 within it only, as a buffer; 0 on both sides.
-    """
-
-    name: str
-    first: str
-    second: str
-    stiffness: float
-    length: float = 0.0
-    damping: float = 0.0
-    side: int = 0
-
-
-@dataclass(frozen=True)
-class Acting:
-    """A load that writes itself, one of `hpcclear.dynamics.linkage.loads`.
-
-    Its fields `first` and `second` are places, `body` and `other` bodies; the mechanism checks that there are such.
-    """
-
-    name: str
-    kind: ClassVar[str]
-    """That the scene names."""
+    @property
+    def table(self) -> bool:
+        """Whether it follows a curve."""
 
     @property
     def by_angle(self) -> bool:
-        """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
-        return False
-
-    @classmethod
-    def of(cls, table: object) -> Self:
-        """That of a table of the scene, whose entries have the names of the fields."""
-        return cls(**{one.name: getattr(table, one.name) for one in fields(cls)})
+        """Whether it goes by the angle of its `body`, or between that and `other`."""
 
     def numbers(self) -> dict[str, Any]:
-        """Its parameters by the names that `act` reads, SI; numbers or arrays of samples."""
-        raise NotImplementedError
+        """Its parameters, SI; numbers or arrays of samples."""
 
     def act(self, on: Any) -> Any:
-        """Add its forces and moments to a motion (`loads.writing.Writing`); return the power that it gives, W, as a term."""
-        raise NotImplementedError
+        """Add its forces and torques to a motion; return the power that it gives, W, as a term."""
 
 
-Load = Force | Torque | Spring | Acting
+def seconds_of(load: object) -> float:
+    """Length of a load's curve over the time, s; 0 where it has none."""
+    return float(getattr(load, "seconds", 0.0))
 
 
 def curves_of(part: Drive | Load) -> list[str]:

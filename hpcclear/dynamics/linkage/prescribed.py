@@ -21,7 +21,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import WORDS, Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import GROUND, split
+from hpcclear.dynamics.linkage.parts import GROUND, seconds_of, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Node, Passage, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows
@@ -264,20 +264,19 @@ def _reactions(
     mechanism, n = assembly.loops.mechanism, assembly.loops.size
     holds = 3 * n + 1
     rates = holds + len(assembly.loops.owners)
-    tabled = [load for load in mechanism.loads if getattr(load, "table", False)]
+    tabled = [load for load in mechanism.loads if load.table]
     curves = {load.name: rates + at.RATES + k for k, load in enumerate(tabled)}
     rows = Rows(0, n, 2 * n, rates, 3 * n, holds, curves=curves)
     on = On(gravity=gravity != 0.0, energies=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
-    names: dict[str, Any] = WORDS | words_of(mechanism)
+    names: dict[str, Any] = {**WORDS, **words_of(mechanism), **text.functions}
     exec(text.source, names)
     work = np.zeros((rates + at.RATES + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times
     for load in tabled:
-        by = load.by  # type: ignore[union-attr]
-        body = mechanism.period.body if by is None else by.body
+        body = getattr(load, "angle_of", None) or mechanism.period.body
         turned = assembly.loops.forest.index("angle", body)  # every body turns by itself here
-        place = times if by is not None and by.seconds else work[turned]
+        place = times if seconds_of(load) else work[turned]
         work[curves[load.name]] = tabulated.get(load.name, np.ones_like)(place)
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
     names["lane"](None, (), work, par, 0, 1)

@@ -11,7 +11,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Slide, TableDrive, split
+from hpcclear.dynamics.linkage.parts import Slide, TableDrive, seconds_of, split
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
 from hpcclear.dynamics.planar.path import rigid_acceleration
@@ -81,15 +81,15 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
             found.append(_levels(stops, True, times / drive.seconds) * drive.seconds)
     curves = curves_of(scene.linkage, scene.numerics.interpolation)
     tabled = [load for load in mechanism.loads if load.name in curves]
-    by_time = {load.name for load in tabled if load.by is not None and load.by.seconds}  # type: ignore[union-attr]
+    by_time = {load.name for load in tabled if seconds_of(load)}
     coarse = prescribed_motion(mechanism, times) if len(tabled) > len(by_time) else None
     for load in tabled:
-        curve, by = curves[load.name], load.by  # type: ignore[union-attr]
+        curve = curves[load.name]
         stops = breaks(curve, BEND)
         if coarse is None or load.name in by_time:
             found.append(_levels(stops, curve.repeats, times / curve.length) * curve.length)
             continue
-        body = mechanism.period.body if by is None else by.body
+        body = getattr(load, "angle_of", None) or mechanism.period.body
         turned = coarse.assembly.loops.forest.index("angle", body)
         found.append(_crossed(stops, coarse.q[:, turned], coarse.v[:, turned], times, curve.length))
     every = np.unique(np.concatenate(found))

@@ -28,10 +28,12 @@ PLACEHOLDER = 1e-3
 """Stands for a number that is zero in the scene and varied by its study: zeros are left out of the generated source."""
 
 NOT_GEOMETRY = ("mass", "inertia", "inertia_ratio", "clearance", "bearing_radius", "youngs_modulus", "poisson_ratio",
-                "torque", "no_load_speed", "flywheel_inertia", "stiffness", "damping", "size", "direction",
-                "linear", "quadratic", "stop_stiffness",
+                "torque", "no_load_speed", "flywheel_inertia", "stiffness", "damping",
                 "coefficient", "radius", "ramp_speed")  # fmt: skip
-"""Entries that no sample's start depends on."""
+"""Entries that no sample's start depends on, nor on any of a load."""
+
+NOT_OF_MOTION = (".out_of_round.", ".start_eccentricity.")
+"""Parts of paths of entries that may be zero and have no term of their own in a motion."""
 
 
 @lru_cache(maxsize=16)
@@ -126,7 +128,7 @@ def _may_vary(scene: Scene) -> set[str]:
     if scene.template is None:
         return _varied(scene)
     found = {path for path in scene.numeric_paths() if _in_tables(scene, path)}
-    return {path for path in found if ".out_of_round." not in path}
+    return {path for path in found if not any(part in path for part in NOT_OF_MOTION)}
 
 
 def is_prescribed(scene: Scene) -> bool:
@@ -280,7 +282,7 @@ def moves_start(path: str) -> bool:
     """Whether samples' starts may depend on an entry of the linkage's tables."""
     entry = path.split(".")[-1]
     shaped = path.startswith("mechanism.") and ".out_of_round." not in path
-    return shaped and entry not in NOT_GEOMETRY
+    return shaped and not path.startswith("mechanism.loads.") and entry not in NOT_GEOMETRY
 
 
 def moves_geometry(path: str) -> bool:

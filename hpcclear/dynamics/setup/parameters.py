@@ -23,7 +23,7 @@ from hpcclear.dynamics.setup.further import (
     with_waves,
 )
 from hpcclear.scene import Scene
-from hpcclear.scene.mechanism import length_path
+from hpcclear.scene.bearings import length_path
 from hpcclear.scene.points import Numbers, Points
 from hpcclear.scene.record import has_pressure
 

@@ -1,17 +1,17 @@
 """Tables of a scene as they are drawn: loads and torques against the crank angle, motions against time."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.pieces import Pieces, Rows, level, periodic
+from hpcclear.base.pieces import Pieces, level, periodic
 from hpcclear.report.figures import labels, style
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.planar import Planar, turns_of
+from hpcclear.scene.planar import turns_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,48 +40,29 @@ class Tabulated(NamedTuple):
 
 def tabulated(scene: Scene) -> list[Tabulated]:
     """Every table of a scene: what acts on it, and how it is moved."""
-    planar = isinstance(scene.mechanism, Planar)
-    turns = turns_of(scene.mechanism) if planar else getattr(scene.drive, "turns", 1)  # type: ignore[arg-type]
-    entries = [
-        ("effects.slider_load", scene.effects.slider_load, "N"),
-        ("drive.torque", getattr(scene.drive, "torque", None), "N*m"),
-    ]
-    if isinstance(scene.mechanism, Planar):
-        for table in ("drives", "loads"):
-            for row in getattr(scene.mechanism, table):
-                entries += [
-                    (f"mechanism.{table}.{row.name}.{name}", getattr(row, name, None), unit)
-                    for name, unit in _ENTRIES.items()
-                ]
-    rows_of = {row.name: row for row in getattr(scene.mechanism, "loads", ())}
-    found = []
-    for key, rows, unit in entries:
-        if isinstance(rows, tuple):
-            load = rows_of.get(key.split(".")[2]) if key.startswith("mechanism.loads.") else None
-            found.append(_tabulated(scene, key, rows, unit, turns, load))
-    return found
-
-
-_ENTRIES = {
-    "size": "N", "torque": "N*m", "angle": "rad", "speed_by_time": "rad/s", "size_by_time": "N", "torque_by_time": "N*m",
-}  # fmt: skip
-
-
-def _tabulated(scene: Scene, key: str, rows: Rows, unit: str, turns: int, load: Any) -> Tabulated:
-    interpolation = scene.numerics.interpolation
-    if unit == "rad":
-        return Tabulated(key, rows, unit, 0, "time")
-    if key.endswith("_by_time"):
-        repeats = getattr(load, "repeats", False)
-        how = "smooth" if unit == "rad/s" else interpolation
-        curve = periodic(rows, rows[-1][0], how) if repeats else level(rows, how)
-        return Tabulated(key, rows, unit, 0, "time", curve)
-    body = getattr(load, "angle_of", None)
-    turns = turns if body is None else 1
-    over = "crank angle" if body is None else f"angle of {body}"
-    return Tabulated(
-        key, rows, unit, turns, over, periodic(rows, 2.0 * np.pi * turns, interpolation)
-    )
+    linkage, how, found = scene.linkage, scene.numerics.interpolation, []
+    turns = turns_of(linkage)
+    for drive in linkage.drives:
+        key = f"mechanism.drives.{drive.name}"
+        if drive.kind == "table":
+            found.append(Tabulated(f"{key}.angle", drive.angle, "rad", 0, "time"))
+        elif drive.kind == "run-up":
+            rows = drive.speed_by_time
+            found.append(Tabulated(f"{key}.speed_by_time", rows, "rad/s", 0, "time", level(rows)))
+        elif isinstance(rows := getattr(drive, "torque", None), tuple):
+            curve = periodic(rows, 2.0 * np.pi * turns, how)
+            found.append(Tabulated(f"{key}.torque", rows, "N*m", turns, "crank angle", curve))
+    for load in linkage.loads:
+        if not load.table:
+            continue
+        entry, rows, over = load.size_entry, load.timed, "time"
+        if rows is None:
+            rows = getattr(load, entry)
+            over = f"angle of {load.angle_of}" if load.angle_of else "crank angle"
+        key = f"mechanism.loads.{load.name}.{entry}{'_by_time' if load.timed else ''}"
+        own = 0 if load.timed else 1 if load.angle_of else turns
+        found.append(Tabulated(key, rows, load.unit, own, over, load.curve(turns, how)))
+    return [one._replace(key=scene.path_in_scene(one.key)) for one in found]
 
 
 @style.drawn

@@ -1,0 +1,54 @@
+"""A force between two points by a law of their distance: hydraulic or pneumatic cylinder, gas spring, end stop, cable."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from hpcclear.base.pieces import hinges
+from hpcclear.scene.fields import Quantity
+from hpcclear.scene.loads.declared import Load
+from hpcclear.scene.piecewise import Piecewise
+
+
+def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
+    """Direction, length and rate of the length of an offset."""
+    square = (
+        ex * ex + ey * ey + 1e-300
+    )  # keeps the direction of an offset without length defined (and zero)
+    inverse = 1.0 / np.sqrt(square)
+    nx = ex * inverse
+    ny = ey * inverse
+    return nx, ny, square * inverse, vx * nx + vy * ny
+
+
+class CylinderLoad(Load):
+    """A force between two points by a law of their distance: cylinder, gas spring, end stop, cable."""
+
+    kind: Literal["cylinder"]
+    first: str
+    """``body.point``, or ``ground.point``."""
+    second: str
+    """``body.point``, or ``ground.point``."""
+    force: Annotated[Any, Piecewise("m", "N", constant=True)]
+    """Force that pushes both points apart (negative: together), N; constant or ``[[distance, force], ...]``."""
+    damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
+    """Damping along the line between both points, N s/m."""
+
+    def numbers(self) -> dict[str, Any]:
+        """Its damping, and its force or where the table of it bends."""
+        found = super().numbers()
+        return found | hinges(self.name, self.force) if isinstance(self.force, tuple) else found
+
+    def act(self, on: Any) -> Any:
+        """Opposite forces along the line of both places."""
+        apart, moving = on.apart(self.first, self.second)
+        nx, ny, length, rate = on.call(
+            along, *apart, *moving, results=("nx", "ny", "length", "rate")
+        )
+        if isinstance(self.force, tuple):
+            push = on.piecewise(self.force, length)
+        else:
+            push = on.parameter("force")
+        push = on.let(f"push_{self.name}", push - on.parameter("damping") * rate)
+        on.push_apart(self.first, self.second, push * nx, push * ny)
+        return push * rate

@@ -1,0 +1,99 @@
+"""What a load declares: its table in a scene, its numbers, and the terms that it adds to a motion."""
+
+import math
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import Field, model_validator
+
+from hpcclear.base.pieces import Pieces, level, periodic
+from hpcclear.scene.fields import Table, invalid
+
+
+class Load(Table):
+    """A load of a linkage; each kind is a file beside this one.
+
+    Entries `place`, `first` and `second` are places ``body.point``, `body` and `other` bodies that rotate; whether there are
+    such is checked for all loads alike. A number that is zero in the scene and not varied is zero in every sample.
+    """
+
+    name: str
+
+    table: ClassVar[bool] = False
+    """Whether its size follows a curve over an angle or the time."""
+    by_angle: ClassVar[bool] = False
+    """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
+
+    def numbers(self) -> dict[str, Any]:
+        """Parameters of its terms, ``NAME_ENTRY``, SI; numbers or arrays of samples: its entries that are numbers."""
+        entries = {entry: getattr(self, entry) for entry in type(self).model_fields}
+        return {
+            f"{self.name}_{entry}": value
+            for entry, value in entries.items()
+            if not (value is None or isinstance(value, (str, bool, tuple, Table)))
+        }
+
+    def act(self, on: Any) -> Any:
+        """Add its forces and torques to a motion by `on`, a `hpcclear.dynamics.linkage.acting.Acting`.
+
+        Returns the power that it gives, W, as a term.
+        """
+        raise NotImplementedError
+
+
+class SizedLoad(Load):
+    """A load whose size is constant or follows a curve, over an angle in the entry of its `size`, or over the time."""
+
+    size_entry: ClassVar[str]
+    """Its entry; ``ENTRY_by_time`` has the curve over the time."""
+    unit: ClassVar[str]
+
+    repeats: Annotated[bool, Field(strict=True)] = False
+    """Whether the table over time repeats after its last row."""
+    angle_of: str | None = None
+    """Another body against whose angle the table is read; it repeats with each turn of that body."""
+
+    @property
+    def constant(self) -> Any:
+        """Its size; 1 where a curve has it."""
+        return 1.0 if self.table else getattr(self, self.size_entry)
+
+    @property
+    def timed(self) -> Any:
+        """Rows of its curve over the time; None where there is none."""
+        return getattr(self, f"{self.size_entry}_by_time")
+
+    @property
+    def seconds(self) -> float:
+        """Length of its curve over the time, s; 0 where there is none."""
+        return 0.0 if self.timed is None else float(self.timed[-1][0])
+
+    @property
+    def table(self) -> bool:  # type: ignore[override]
+        """Whether its size follows a curve."""
+        return self.timed is not None or isinstance(getattr(self, self.size_entry), tuple)
+
+    def curve(self, turns: int, interpolation: str) -> Pieces:
+        """The curve that its size follows; `turns`: of the body that defines the period, until tables repeat."""
+        if self.timed is not None:
+            repeated = periodic(self.timed, self.seconds, interpolation) if self.repeats else None
+            return repeated or level(self.timed, interpolation)
+        turns = turns if self.angle_of is None else 1
+        return periodic(getattr(self, self.size_entry), 2.0 * math.pi * turns, interpolation)
+
+    @model_validator(mode="after")
+    def _by_one_thing(self) -> Self:
+        entry, size, timed = self.size_entry, getattr(self, self.size_entry), self.timed
+        if timed is not None and size is not None:
+            raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
+        if self.angle_of is not None and not isinstance(size, tuple):
+            reason = f"there is no table of {entry} against an angle"
+            raise invalid(reason, "Remove it", key="angle_of", value=self.angle_of)
+        if self.repeats and timed is None:
+            raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
+        if self.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
+            raise invalid(
+                "a table that repeats begins at 0 s, and ends at the value with which it begins",
+                "Make its first and last value equal",
+                key=f"{entry}_by_time",
+            )
+        return self

@@ -1,0 +1,76 @@
+"""A force at a point: gas, wind, the resistance of a workpiece."""
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hpcclear.scene.fields import Curve, CurveOf, Quantity, check_one_of
+from hpcclear.scene.loads.declared import SizedLoad
+from hpcclear.scene.piecewise import by_time
+from hpcclear.scene.places import Angle, PairTable
+
+
+class Components(PairTable):
+    """A force by its components along the ground's axes, N. ``[x, y]`` is a short form."""
+
+    x: Annotated[float, Quantity("N")]
+    """x component, N."""
+    y: Annotated[float, Quantity("N")]
+    """y component, N."""
+
+
+class ForceLoad(SizedLoad):
+    """A force at a point: by its components along the ground's axes, or by size and direction."""
+
+    kind: Literal["force"]
+    place: str
+    """``body.point`` on which the force acts."""
+    force: Components | None = None
+    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    """Force along `direction`, N; constant, or a table against the angle of the body that defines the period. The angle
+    is measured counter-clockwise from the x axis and includes `start_angle`, for both directions of rotation."""
+    size_by_time: Annotated[Any, by_time("N")] | None = None
+    """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
+    direction: Angle = 0.0
+    """Angle of the force from the ground's x axis, rad."""
+    follows: Annotated[bool, Field(strict=True)] = False
+    """Whether the force rotates with the body. Components and direction then refer to the axes of the body."""
+
+    size_entry: ClassVar[str] = "size"
+    unit: ClassVar[str] = "N"
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        force = None if self.force is None else [self.force.x, self.force.y]
+        size = self.size if self.size is not None else self.size_by_time
+        check_one_of("force", force, size, "Write force = [x, y], or size and direction")
+        return self
+
+    def components(self) -> tuple[Any, Any]:
+        """Force along x and y, N; where a curve has its size, the direction. Numbers or arrays of samples."""
+        if self.force is not None:
+            return self.force.x, self.force.y
+        # a quarter turn is one, to the last bit
+        cosine, sine = (
+            np.where(np.abs(part) < 1e-15, 0.0, part)[()]
+            for part in (np.cos(self.direction), np.sin(self.direction))
+        )
+        return self.constant * cosine, self.constant * sine
+
+    def numbers(self) -> dict[str, Any]:
+        """Its components."""
+        x, y = self.components()
+        return {f"{self.name}_force_x": x, f"{self.name}_force_y": y}
+
+    def act(self, on: Any) -> Any:
+        """The force at its place."""
+        now = on.curve() if self.table else on.one
+        parts = zip("xy", self.components(), strict=True)
+        given = (on.parameter(f"force_{axis}") if part else on.zero for axis, part in parts)
+        force = on.vector(self.name, *(part * now for part in given))
+        if self.follows:
+            body = self.place.partition(".")[0]
+            force = on.vector(self.name, *on.along_ground(body, force))
+        on.push(self.place, force)
+        return on.power(self.place, force)

@@ -1,0 +1,42 @@
+"""A torque on a body."""
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import model_validator
+
+from hpcclear.scene.fields import Curve, CurveOf, check_one_of
+from hpcclear.scene.loads.declared import SizedLoad
+from hpcclear.scene.piecewise import by_time
+
+
+class TorqueLoad(SizedLoad):
+    """A torque on a body."""
+
+    kind: Literal["torque"]
+    body: str
+    """Body on which the torque acts; the reaction acts on the ground."""
+    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
+    """Torque, N m; constant, or a table against the angle of the body that defines the period."""
+    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
+    """Instead of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on; smooth between the rows, constant after the
+    last."""
+
+    size_entry: ClassVar[str] = "torque"
+    unit: ClassVar[str] = "N*m"
+
+    @model_validator(mode="after")
+    def _by_one(self) -> Self:
+        remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
+        check_one_of("torque", self.torque, self.torque_by_time, remedy)
+        return self
+
+    def numbers(self) -> dict[str, Any]:
+        """Its size."""
+        return {f"{self.name}_torque": self.constant}
+
+    def act(self, on: Any) -> Any:
+        """The torque on its body."""
+        now = on.curve() if self.table else on.one
+        torque = on.let(self.name, on.parameter("torque") * now)
+        on.twist(self.body, torque)
+        return torque * on.spin(self.body)
