@@ -43,7 +43,7 @@ SOURCES = {
         "scene effects.slider_load: is gone",
     ),
     "a changed unit": (
-        {"results/columns.py": ('"crank_angle": number(("time",), "rad"', '"crank_angle": number(("time",), "deg"')},
+        {"results/kinds/response.py": ('"crank_angle": number(("time",), "rad"', '"crank_angle": number(("time",), "deg"')},
         "file response: crank_angle: units: rad before, deg now",
     ),
 }  # fmt: skip

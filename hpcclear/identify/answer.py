@@ -31,7 +31,7 @@ from hpcclear.identify.signals import Sensor, names_of, revolutions_of
 from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
-from hpcclear.results.identified import with_units
+from hpcclear.results.kinds.identify import with_units
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 

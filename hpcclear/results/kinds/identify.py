@@ -1,17 +1,17 @@
-"""The table of files of kind ``identify``: unknowns of a machine from measured signals."""
+"""Unknowns of a machine from measured signals."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hpcclear.results.rows import Columns, count, flag, number, text
+from hpcclear.results.rows import Columns, count, flag, kind_of, number, text
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # fmt: off
-IDENTIFY: Columns = {
+COLUMNS: Columns = {
     "unknown": text(("unknown",), "entry of the scene that is identified"),
     "input": text(("input",), "unknowns, then random inputs of the scene"),
     "end": text(("end",), "lower end of the 95 % interval, median, upper end"),
@@ -26,7 +26,7 @@ IDENTIFY: Columns = {
     "posterior": number(("record", "particle", "input"), "1", "samples of the posterior, each in the unit of its input"),
     "interval": number(("record", "unknown", "end"), "m", "calibrated 95 % interval and median"),
     "correlation": number(("record",), "1", "largest correlation of two unknowns in the posterior"),
-    "explained": flag(("record",), "whether the model explains the signal"),
+    "explained": flag(("record",), "whether the model explains the signal", "not_explained explained"),
     "doubt": number(("record",), "1", "standard score of the fit among those of simulated signals"),
     "worst_feature": count(("record",), "number of the feature that fits least"),
     "measured": number(("record", "feature"), "1", "measured feature, in SI units of its signal; NaN where a record lacks it"),
@@ -42,7 +42,17 @@ IDENTIFY: Columns = {
     "expected_half_width": number(("candidate", "revolutions", "unknown"), "m", "half-width of the 95 % interval to expect"),
     "expected_correlation": number(("candidate", "revolutions"), "1", "largest correlation of the errors of two unknowns"),
 }
+# fmt: on
 """Unknowns are clearances as a rule; where they have another unit, `with_units` writes it."""
+
+KIND = kind_of(
+    160,
+    "Unknowns of a machine from measured signals",
+    COLUMNS,
+    ("unknown",),
+    optional=("record", "particle", "feature", "candidate", "revolutions"),
+    alone=True,
+)
 
 OF_UNKNOWNS = ("prior_lower", "prior_upper", "interval", "expected_half_width", "rate")
 

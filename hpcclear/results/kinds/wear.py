@@ -1,0 +1,73 @@
+"""Service lives of worn joints."""
+
+from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.results.rows import Columns, count, flag, kind_of, number, text
+
+# fmt: off
+COLUMNS: Columns = {
+    "life": count(("life",), "number of the service life"),
+    "joint": text(("joint",), "worn joint"),
+    "open_joint": text(("open_joint",), "joint of the scene"),
+    "cycle": number(("cycle",), "1", "revolutions since new"),
+    "quantile": number(("quantile",), "1", "share of service lives at or below the value"),
+    "random_input": text(("random_input",), "random input"),
+    "angle": number(("angle",), "rad", "angle around a surface, in its body"),
+    "clearance": number(("life", "cycle", "joint"), "m", "radial clearance", required=True),
+    "local_clearance": number(("life", "cycle", "joint"), "m", "largest clearance around the joint"),
+    "bearing_profile": number(("quantile", "cycle", "joint", "angle"), "m",
+        "quantiles of the depth of wear around the bearing"),
+    "journal_profile": number(("quantile", "cycle", "joint", "angle"), "m",
+        "quantiles of the depth of wear around the journal"),
+    "sharpest": number(("life",), "1", "largest curvature of a groove over that of the clearance circle"),
+    "even_clearance": number(("life", "cycle", "joint"), "m", "clearance of the same service life with uniform wear"),
+    "even_lifetime": number(("life",), "1",
+        "revolutions until the first limit is passed, with uniform wear; infinite if none is"),
+    "even_lifetime_quantile": number(("quantile",), "1", "quantiles of the service life with uniform wear"),
+    "even_simulations": count(("life",), "number of simulations with uniform wear"),
+    "bearing_depth": number(("life", "cycle", "joint"), "m", "mean depth of wear of the bearing", required=True),
+    "journal_depth": number(("life", "cycle", "joint"), "m", "mean depth of wear of the journal", required=True),
+    "objective": number(("life", "cycle"), "objective", f"objective f, {MEAN_GAP.words}", required=True),
+    "peak_contact_force": number(("life", "cycle", "open_joint"), "N",
+        "peak contact force over the averaged revolutions, mean of the replicas", required=True),
+    "clearance_limit": number(("life", "joint"), "m",
+        "95 % half-width of the final clearance due to the uncertainty of the wear rates", required=True),
+    "clearance_error": number(("life", "joint"), "m",
+        "largest extrapolation error: sum over jumps, one jump against two half jumps", required=True),
+    "drift": number(("life",), "1",
+        "largest change of a wear rate or of f with a longer transient, beyond scatter, relative",
+        required=True),
+    "lifetime": number(("life",), "1", "revolutions until the first limit is passed; infinite if none is", required=True),
+    "lifetime_hours": number(("life",), "h", "the same at the drive's nominal speed"),
+    "revolution_time": number(("life",), "s", "duration of a revolution at the drive's nominal speed"),
+    "ended": number(("life",), "1", "revolutions simulated", required=True),
+    "end_reason": text(("life",), "cycles, failed, worn_through, or the limit that ended the service life"),
+    "end_clearance": number(("life", "joint"), "m", "largest clearance around the joint at the end of the service life"),
+    "jumps": count(("life",), "number of extrapolation jumps", required=True),
+    "simulations": count(("life",), "number of simulations", required=True),
+    "ending": flag(("life",), "outcome of the service life", Status, required=True),
+    "flags": flag(("life",), "validity warnings of the result", Flag, required=True),
+    "clearance_quantile": number(("quantile", "cycle", "joint"), "m", "quantiles of the clearance", required=True),
+    "objective_quantile": number(("quantile", "cycle"), "objective", "quantiles of the objective", required=True),
+    "lifetime_quantile": number(("quantile",), "1", "quantiles of the service life; infinite if not reached", required=True),
+    "lifetime_hours_quantile": number(("quantile",), "h", "the same at the drive's nominal speed"),
+    "survival": number(("cycle",), "1", "share of service lives that have not ended", required=True),
+    "survival_lower": number(("cycle",), "1", "lower end of the 95 % confidence interval of the survival", required=True),
+    "survival_upper": number(("cycle",), "1", "upper end of the 95 % confidence interval of the survival", required=True),
+    "exceedance": number(("cycle", "joint"), "1", "share of service lives whose clearance is above its limit"),
+    "exceedance_lower": number(("cycle", "joint"), "1", "lower end of its 95 % confidence interval"),
+    "exceedance_upper": number(("cycle", "joint"), "1", "upper end of its 95 % confidence interval"),
+    "rank_correlation": number(("random_input", "joint"), "1",
+        "rank correlation of the growth of the clearance per revolution with the random input", required=True),
+}
+# fmt: on
+
+KIND = kind_of(
+    140,
+    "Service lives of a mechanism with wear",
+    COLUMNS,
+    ("life", "cycle"),
+    design_dims=("life",),
+    optional=("angle",),
+    alone=True,
+)
