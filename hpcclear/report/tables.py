@@ -96,8 +96,8 @@ class _Table:
     def add(self, name: str) -> None:
         """Add a variable: as columns, as single values, or to what is left out."""
         variable = self.content[name]
-        if name in self.content.dims and name not in self.rows:
-            return  # labels of columns
+        if (name in self.content.dims and name not in self.rows) or "rival" in variable.dims:
+            return  # labels of columns; rows against rows, which a text has as well
         variable, dims = _lower_edges(variable, self.content, self.rows)
         across = [dim for dim in dims if dim not in self.rows]
         alone = not set(dims) & set(self.rows)

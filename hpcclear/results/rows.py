@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.objectives import MEAN_GAP, Objective, Usual
 from hpcclear.base.outcome import FIELDS, IMPACTS, JUDGED, ON_REQUEST, Flag, Regime, Status
 
 Dims = tuple[str, ...]
@@ -98,9 +98,9 @@ class Kind(NamedTuple):
 def kind_of(
     order: int,
     title: str,
-    table: Columns,
     rows: Dims,
     *,
+    table: Columns,
     design_dims: Dims | None = None,
     limit_dims: Dims | None = None,
     optional: Collection[str] = (),
@@ -235,6 +235,7 @@ def goal(name: str) -> Columns:
     return {
         f"{name}_goal": text(("design",), f"{of}, in words"),
         f"{name}_unit": text(("design",), f"{of}: unit, empty for none"),
+        f"{name}_usual": flag(("design",), f"{of}: whether it is reported of every design", Usual),
         f"{name}_true": number(("design",), "", f"{of}, by simulation"),
         f"{name}_lower": number(("design",), "", f"{of}: lower end of its confidence interval"),
         f"{name}_upper": number(("design",), "", f"{of}: upper end of its confidence interval"),

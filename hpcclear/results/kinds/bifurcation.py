@@ -1,21 +1,14 @@
 """One value for each revolution, against an entry of the scene."""
 
 from hpcclear.base.objectives import MEAN_GAP
-from hpcclear.results.rows import Columns, count, kind_of, number
-
-# fmt: off
-COLUMNS: Columns = {
-    "value": count(("value",), "number of the value"),
-    "crossing": count(("crossing",), "number of the revolution, the first after the transient"),
-    "observed": number(("value", "crossing"), "objective", MEAN_GAP.words, required=True),
-}
-# fmt: on
+from hpcclear.results.rows import count, kind_of, number
 
 KIND = kind_of(
-    30,
-    "One value for each revolution, against an entry of the scene",
-    COLUMNS,
-    ("value", "crossing"),
-    design_dims=("value",),
-    alone=True,
+    30, "One value for each revolution, against an entry of the scene", ("value", "crossing"),
+    design_dims=("value",), alone=True,
+    table={
+        "value": count(("value",), "number of the value"),
+        "crossing": count(("crossing",), "number of the revolution, the first after the transient"),
+        "observed": number(("value", "crossing"), "objective", MEAN_GAP.words, required=True),
+    },
 )
