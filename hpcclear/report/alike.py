@@ -60,17 +60,21 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     return text + _lightest(together, best)
 
 
+def masses(verified: xr.Dataset) -> list[xr.DataArray]:
+    """Return the design variables that are masses."""
+    return [
+        one
+        for one in labels.design_variables(verified)
+        if one.attrs.get("units") == "kg" and "of_random_inputs" not in one.attrs
+    ]
+
+
 def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
     """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
-    masses = [
-        one.name
-        for one in labels.design_variables(together)
-        if one.attrs["units"] == "kg" and "of_random_inputs" not in one.attrs
-    ]
-    if not masses:
+    if not (found := masses(together)):
         return ""
-    whole = np.sum([together[name].to_numpy() for name in masses], axis=0)
-    saved = float(sum(float(best[name]) for name in masses)) - float(np.nanmin(whole))
+    whole = np.sum([one.to_numpy() for one in found], axis=0)
+    saved = sum(map(float, masses(best))) - float(np.nanmin(whole))
     if not saved > 1e-6:
         return ""
     name = str(together["design"].to_numpy()[int(np.nanargmin(whole))])

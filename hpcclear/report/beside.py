@@ -102,15 +102,6 @@ def _role(end: str, own: xr.Dataset) -> str:
     return f"lowest {words} ({end})"
 
 
-def masses(verified: xr.Dataset) -> list[xr.DataArray]:
-    """Return the design variables that are masses."""
-    return [
-        v
-        for v in labels.design_variables(verified)
-        if v.attrs.get("units") == "kg" and "of_random_inputs" not in v.attrs
-    ]
-
-
 def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
     """The design of a case with the lowest sum of masses within its constraints; "" if one of the chosen is as light."""
     own = [
@@ -120,7 +111,7 @@ def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
         and str(one["design"].item()).startswith(f"{case} ")
         and alike.satisfies(one)
     ]
-    weights = {str(one["design"].item()): sum(map(float, masses(one))) for one in own}
+    weights = {str(one["design"].item()): sum(map(float, alike.masses(one))) for one in own}
     known = {name: weight for name, weight in weights.items() if np.isfinite(weight) and weight}
     if not known:
         return ""

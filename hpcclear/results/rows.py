@@ -147,7 +147,7 @@ def text(dims: Dims, long_name: str, *, required: bool = False) -> Column:
 
 
 _CODES = {
-    "latched": Codes.of("free latched"),
+    "latched": Codes((0, 1), ("free", "latched")),
     "regime": Codes.of(Regime),
     "status": Codes.of(Status),
     "flags": Codes.of(Flag),
