@@ -17,11 +17,11 @@ class Verdict(IntEnum):
 
 
 def together(verdicts: Sequence[int]) -> Verdict:
-    """The verdict that all of some statements hold: it fails where one fails, and is undecided where one is."""
+    """The verdict that all of some statements hold: it fails where one fails, and is undecided where one is not known to hold."""
     found = set(verdicts)
     if Verdict.FAILS in found:
         return Verdict.FAILS
-    return Verdict.UNDECIDED if Verdict.UNDECIDED in found else Verdict.HOLDS
+    return Verdict.HOLDS if found <= {Verdict.HOLDS} else Verdict.UNDECIDED
 
 
 def best(verdicts: Sequence[Verdict]) -> tuple[Verdict, Booleans]:
