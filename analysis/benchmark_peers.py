@@ -2,7 +2,7 @@
 
     python analysis/benchmark_peers.py            # about 15 minutes on a quiet machine
     python analysis/benchmark_peers.py --quick    # one round, fewer tolerances
-    python analysis/benchmark_peers.py --record   # also writes the rows of this processor to docs/performance.md
+    python analysis/benchmark_peers.py --record   # also writes the rows of this processor to analysis/results/peers.csv
 
 Peers: pip install 'hpcclear[bench]'; numbalsoda is built from source and needs gfortran
 (apt-get install gfortran). One that does not load is listed as missing.
@@ -23,7 +23,6 @@ import csv
 import datetime
 import importlib
 import os
-import re
 import sys
 import time
 from collections.abc import Callable
@@ -325,8 +324,6 @@ def draw(runs: dict[str, xr.Dataset], path: Path) -> None:
 
 
 RESULTS = ROOT / "analysis" / "results" / "peers.csv"
-PAGE = ROOT / "docs" / "performance.md"
-FIRST, LAST = "<!-- peers.csv: first -->", "<!-- peers.csv: last -->"
 RECORDED = 1e-8  # m, error of the single responses that are recorded
 
 
@@ -356,7 +353,7 @@ def _row(ratio: xr.DataArray, error: str) -> dict[str, str]:
 
 
 def record(rows: list[dict[str, str]]) -> None:
-    """Write this processor's rows into the table of results, in place of its earlier ones, and the table into the page."""
+    """Write this processor's rows into the table of results, in place of its earlier ones."""
     same = {
         "processor": host.processor(), "lanes": str(DEFAULT_LANES),
         "bits": os.environ.get("HPCCLEAR_VECTOR_BITS", "widest"),
@@ -371,13 +368,6 @@ def record(rows: list[dict[str, str]]) -> None:
         writer = csv.DictWriter(file, list(kept[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(kept)
-    table = [f"| {' | '.join(kept[0])} |", "| --- " * len(kept[0]) + "|"]
-    table += [f"| {' | '.join(row.values())} |" for row in kept]
-    text = PAGE.read_text(encoding="utf-8")
-    between = "\n".join(["", "", *table, "", ""])
-    assert FIRST in text, f"{PAGE} lacks {FIRST}"
-    pattern = re.compile(f"(?<={re.escape(FIRST)}).*(?={re.escape(LAST)})", re.DOTALL)
-    PAGE.write_text(pattern.sub(lambda _: between, text), encoding="utf-8")
 
 
 def main() -> None:

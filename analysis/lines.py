@@ -1,26 +1,18 @@
-"""The lines of the package by the feature that they serve, then and now; a table of docs/architecture.md comes from here.
+"""The lines of the package, by the feature that they serve and by package.
 
-    python analysis/lines.py            # print the tables
-    python analysis/lines.py --write    # renew those in docs/architecture.md
+    python analysis/lines.py [COMMIT]    # also against another commit
 
 A module belongs to the first feature one of whose patterns it matches; what no pattern names is the core: scenes, mechanisms,
 kernel, sampling, statistics, surrogates, the search and its verification, ranks, files, the report's frame.
 """
 
 import argparse
-import re
 import tempfile
 from collections import Counter
 from fnmatch import fnmatch
 from pathlib import Path
 
 from structure import PACKAGE, ROOT, checkout
-
-AIM_COMMIT, AIM = "2e8158b", 46_000
-"""Where the aim was set, and the aim."""
-
-PAGE = ROOT / "docs" / "architecture.md"
-FIRST, LAST = "<!-- analysis/lines.py: first -->", "<!-- analysis/lines.py: last -->"
 
 FEATURES = {
     "unknowns of a machine from measured signals":
@@ -51,7 +43,7 @@ FEATURES = {
         "report/scatter.py",
     "fits of ISO 286, catalogues, costs":
         "scene/iso286.py scene/fits.py scene/fitted.py scene/costs.py scene/choices.py scene/materials.py "
-        "report/html/costs.py report/figures/catalogue.py report/html/designs.py",
+        "report/html/designs.py",
     "oil films":
         "dynamics/laws/film/* dynamics/physics/film.py dynamics/contacts/lubrication.py scene/film.py "
         "report/bearings.py dynamics/lubrication/*",
@@ -135,65 +127,37 @@ def by(sizes: dict[str, int], key: object) -> Counter[str]:
     return total
 
 
-MOVED = {
-    "explicit": "stepping",
-    "implicit": "stepping",
-    "collocation": "stepping",
-    "steady": "evaluation",
-}
-"""Packages of `dynamics` by where they, or what replaced them, are now."""
-
-
 def package_of(path: str) -> str:
     """Package of a module; packages with packages of their own by these."""
-    parts = path.split("/")[:-1]
-    if parts[:1] == ["dynamics"] and len(parts) > 1:
-        parts[1] = MOVED.get(parts[1], parts[1])
-    return "/".join(parts[:2]) or "(modules outside the packages)"
+    return "/".join(path.split("/")[:-1][:2]) or "(modules outside the packages)"
 
 
-def table(title: str, before: Counter[str], now: Counter[str], rest: str = "") -> list[str]:
+def table(title: str, before: Counter[str] | None, now: Counter[str]) -> list[str]:
     """Rows of a table, the largest first, and their sum."""
-    rows = [f"| {title} | {AIM_COMMIT} | now | change |", "| --- | ---: | ---: | ---: |"]
-    for name in sorted(before | now, key=lambda one: (one == rest, -now[one], one)):
-        then, today = before[name], now[name]
-        words = "core: all the rest" if name == "" else name
-        rows.append(f"| {words} | {then} | {today} | {today - then:+d} |")
-    then, today = before.total(), now.total()
-    return [*rows, f"| **all** | {then} | {today} | {today - then:+d} |"]
-
-
-def text() -> str:
-    """Both tables, and what is above the aim."""
-    now = lines_of(ROOT)
-    with tempfile.TemporaryDirectory() as place:
-        before = lines_of(checkout(AIM_COMMIT, Path(place)))
-    features = table("feature", by(before, feature_of), by(now, feature_of), "")
-    packages = table(
-        "package", by(before, package_of), by(now, package_of), "(modules outside the packages)"
-    )
-    total, core = sum(now.values()), by(now, feature_of)[""]
-    words = (
-        f"The package has {total} lines, docstrings included. At commit {AIM_COMMIT} the aim was {AIM} lines. "
-        f"The core has {core} lines, fewer than the aim. The features below have the other {total - core} lines; "
-        f"they account for the {total - AIM} lines above the aim."
-    )
-    return "\n".join([words, "", *features, "", *packages])
+    rows = [f"| {title} | lines |" + (" change |" if before is not None else "")]
+    rows.append("| --- | ---: |" + (" ---: |" if before is not None else ""))
+    names = sorted((before or Counter()) | now, key=lambda one: (-now[one], one))
+    every = [*((name or "core: all the rest", name) for name in names), ("**all**", None)]
+    for words, name in every:
+        size = now.total() if name is None else now[name]
+        row = f"| {words} | {size} |"
+        if before is not None:
+            row += f" {size - (before.total() if name is None else before[name]):+d} |"
+        rows.append(row)
+    return rows
 
 
 def main() -> None:
-    """Print the tables, or write them into the page."""
+    """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--write", action="store_true", help="renew the page")
-    found = text()
-    if parser.parse_args().write:
-        page = PAGE.read_text(encoding="utf-8")
-        made = f"{FIRST}\n\n{found}\n\n{LAST}"
-        PAGE.write_text(
-            re.sub(f"{FIRST}.*{LAST}", lambda _: made, page, flags=re.S), encoding="utf-8"
-        )
-    else:
-        print(found)
+    parser.add_argument("commit", nargs="?", help="to compare with")
+    commit, now, before = parser.parse_args().commit, lines_of(ROOT), None
+    if commit is not None:
+        with tempfile.TemporaryDirectory() as place:
+            before = lines_of(checkout(commit, Path(place)))
+    for title, key in (("feature", feature_of), ("package", package_of)):
+        then = None if before is None else by(before, key)
+        print("\n".join([*table(title, then, by(now, key)), ""]))
 
 
 if __name__ == "__main__":

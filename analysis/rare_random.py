@@ -21,6 +21,7 @@ import numpy as np
 from closed_forms import DESIGN, PATHS, Form, Judge, dynamics, form_of, random_inputs, scene_of
 from regret import carried_out
 
+from hpcclear.base.verdict import Verdict
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.merit import recommended
@@ -109,14 +110,14 @@ def judged(seed: int) -> dict[str, Any]:
         scene.required_study.cases[0].kept[0].limit,
     )
     assert limit is not None
-    kept = [": kept" in str(text) for text in table["constraints"].to_numpy()]
+    kept = (table["constraint_verdict"].to_numpy() == Verdict.HOLDS).all(axis=1)
     designs = [{n: float(table[n][k]) for n in names} for k in range(len(kept))]
     shares = [
         judge.probability(one, limit) if its else (0.0, 0.0)
         for one, its in zip(designs, kept, strict=True)
     ]
     found |= {
-        "kept": sum(kept),
+        "kept": int(kept.sum()),
         "false": sum(share - 2.0 * error > most for share, error in shares),
     }
     best = list(table["design"].to_numpy()).index(recommended(table))

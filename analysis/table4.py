@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.verdict import Verdict
 from hpcclear.results import dataset
 
 COLUMNS = {"m2": 1.0, "m3": 1.0, "u2": 1.0, "I2": 1e4}
@@ -22,7 +23,7 @@ def main(directory: Path) -> None:
     print("\nsurrogate:", table.attrs["remarks"])
     claims = dataset.read(directory / "claims.nc", "claims")
     for number, claim in enumerate(claims["text"].to_numpy()):
-        print(f"\n{number + 1}. {claim}: {claims['verdict'].to_numpy()[number].upper()}")
+        print(f"\n{number + 1}. {claim}: {Verdict(int(claims['verdict'][number])).name}")
         print(f"   {claims['figure'].to_numpy()[number]}")
     if (directory / "readings.nc").exists():
         print("\nThe paper's designs, read so (distance of the means from the printed ones):")

@@ -1,11 +1,13 @@
 """Small result files with known content, for the tests of figures and of the report."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.base.verdict import Verdict
 from hpcclear.results import dataset
 from hpcclear.results.provenance import provenance
 from hpcclear.statistics.surrogate.fitting import fit_kriging
@@ -185,7 +187,7 @@ def claims() -> xr.Dataset:
     """One claim of each verdict, one with hostile text."""
     data = {
         "text": np.array(["f grows with C", "f <b>hardly</b> moves with m1", "the order stays"]),
-        "verdict": np.array(["holds", "does not hold", "cannot be told"]),
+        "verdict": np.array([0, 1, 2], np.int8),
         "figure": np.array(
             ["slope 0.3 ± 0.01", "<img src=x onerror=alert(1)>", "2 of 8 clearances"]
         ),
@@ -367,3 +369,18 @@ def write_study(directory: Path) -> Path:
         content.attrs["design"] = name
         dataset.write(content, directory / "responses" / f"{name.replace(' ', '_')}.nc")
     return directory
+
+
+def constrained(verdicts: list[Verdict], prices: list[float] | None = None) -> dict[str, Any]:
+    """Columns of one constraint of each design, by the verdicts on it, with its coordinate ``constraint``."""
+    values = {Verdict.HOLDS: 0.01, Verdict.FAILS: 0.09, Verdict.UNDECIDED: 0.05}
+    shape = (len(verdicts), 1)
+    found = np.array([values[one] for one in verdicts]).reshape(shape)
+    return {
+        "constraint_goal": np.full(shape, "probability of f above 1 N"),
+        "constraint_unit": np.full(shape, ""),
+        "constraint_true": found, "constraint_lower": found, "constraint_upper": found,
+        "constraint_most": np.full(shape, 0.05),
+        "constraint_verdict": np.array(verdicts, np.int8).reshape(shape),
+        "constraint_price": np.reshape(np.full(shape, np.nan) if prices is None else prices, shape),
+    }  # fmt: skip

@@ -251,7 +251,7 @@ def test_a_column_of_names_is_kept(tmp_path):
 
 def test_the_page_draws_the_tables_of_a_scene(tmp_path):
     """Also of one that came from a file, whose values the result carries."""
-    from hpcclear.report.figures import catalogue
+    from hpcclear.report.figures.catalogue import of_response
     from hpcclear.report.figures.curves import tables_figure
     from hpcclear.report.html.gallery import picture
 
@@ -262,9 +262,7 @@ def test_the_page_draws_the_tables_of_a_scene(tmp_path):
     curve, rows = tables_figure(found).axes[0].get_lines()
     assert [round(one, 9) for one in rows.get_ydata()] == [1.0, -0.5, 0.0, 0.2]
     assert {1.0, -0.5, 0.2} <= {round(one, 6) for one in curve.get_ydata()}
-    assert tables_figure in [
-        entry.draw for entry in catalogue.RESPONSE
-    ]  # all of them are on the page
+    assert tables_figure in [one.draw for one in of_response(found)]  # all are on the page
     assert picture(tables_figure, found, "tables") is not None
     without = data.response().assign_attrs(scene=plain.text)
     assert picture(tables_figure, without, "tables") is None

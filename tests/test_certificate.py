@@ -16,13 +16,13 @@ from scipy.interpolate import PchipInterpolator
 
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
+from hpcclear.base.verdict import Verdict
 from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
     Certificate,
     Plan,
     Seen,
-    Verdict,
     certificate,
     interaction,
 )
@@ -41,7 +41,7 @@ from hpcclear.report.figures.effects import (
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
-from hpcclear.results.names import SECONDS_PER_SAMPLE
+from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import parse
 from hpcclear.scene.switches import Off, switches
@@ -148,7 +148,7 @@ def test_what_is_within_the_tolerance_is_left_out_together():
     sizes = [0.002, 0.2, -0.003, 0.004]
     found = followed(lambda off: sum(sizes[k] for k in off), 4)
     assert found.recommended == (0, 2, 3)
-    assert found.book.verdict((1,)) is Verdict.BEYOND
+    assert found.book.verdict((1,)) is Verdict.FAILS
     assert found.book.changes((0, 2, 3)).mean.value == pytest.approx(0.003, abs=1e-9)
 
 
@@ -161,7 +161,7 @@ def test_a_sum_beyond_the_tolerance_drops_what_saves_least():
 def test_an_effect_whose_absence_costs_more_stays_on():
     found = followed(lambda off: 0.001 * len(off), 2, saves=[-0.5, 0.2])
     assert found.recommended == (1,)
-    assert found.book.verdict((0,)) is Verdict.WITHIN
+    assert found.book.verdict((0,)) is Verdict.HOLDS
     assert followed(lambda off: 0.001 * len(off), 1, saves=[-0.5]).recommended == ()
 
 
@@ -585,7 +585,7 @@ def test_savings_have_intervals_and_these_hold(certified, shift):
     assert held >= fewest(200, 0.93)
     drift = saving(content, 1, {"all on": [1.0, 3.0, 9.0], name: [0.6, 1.8, 5.4]})
     assert drift[:2] == pytest.approx((0.4, 0.0), abs=1e-12)
-    old = xr.Dataset(attrs={SECONDS_PER_SAMPLE: json.dumps({"all on": 4.0, name: 1.0})})
+    old = xr.Dataset(attrs={SECONDS_BY_ROUND: json.dumps({"all on": [4.0], name: [1.0]})})
     assert saving(content, 1, seconds_of(old)).words == "about 75 %"
 
 
@@ -664,7 +664,7 @@ def test_a_linkage_is_certified(tmp_path):
     rows = {str(name): k + 1 for k, name in enumerate(found["effect"].to_numpy())}
     assert set(rows) >= {"clearance in o2", "friction in joints", "gravity", "torque breath"}
     assert float(found["change"][rows["clearance in o2"], 0]) == -1.0  # no other gap is left
-    assert int(found["decision"][rows["torque breath"]]) == Verdict.WITHIN
+    assert int(found["decision"][rows["torque breath"]]) == Verdict.HOLDS
     chosen = found.isel(variant=int(np.argmax(found["recommended"].to_numpy())))
     assert int(chosen["off"].sel(effect="torque breath")) == 1
     assert int(chosen["off"].sel(effect="clearance in o2")) == 0

@@ -5,18 +5,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import report_data as data
 from formula_study import scene_of
 from margins import most
 from scipy import stats
 
-from hpcclear.report import merit
+from hpcclear.base.objectives import Usual
+from hpcclear.base.verdict import Verdict
+from hpcclear.report import constraints
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.study import goals, verdicts
 from hpcclear.study.optimisation import Choice
-from hpcclear.study.verdicts import Standing
 
 # -- verdicts ---------------------------------------------------------------------------------------
 
@@ -38,7 +40,7 @@ def test_what_breaks_a_constraint_is_hardly_ever_called_kept(share, shift):
                 if verdicts.settled(goal, seen, Choice("", "", {}), settings, 12):
                     told = goals.goal_value(goal, seen, {}, verdicts.level(settings, 12, seen.size))
                     wrong += (
-                        verdicts.of_interval(goal, told, seen.size, 0.9).standing is Standing.KEPT
+                        verdicts.of_interval(goal, told, seen.size, 0.9).verdict is Verdict.HOLDS
                     )
                     break
     assert wrong <= most(300, 0.05), wrong
@@ -48,12 +50,12 @@ def test_what_is_not_decided_has_a_price():
     """Half the reach needs four times the simulations; where nothing was exceeded the upper limit falls as one over them."""
     goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
     one = goals.GoalValue(0.008, 0.004, 0.012, np.zeros(16))
-    assert verdicts.of_interval(goal, one, 2048, 0.95) == (Standing.UNDECIDED, 8192.0)
+    assert verdicts.of_interval(goal, one, 2048, 0.95) == (Verdict.UNDECIDED, 8192.0)
     none = goals.goal_value(goal, np.zeros((16, 8)), {}, 0.95)
     found = verdicts.of_interval(goal, none, 128, 0.95)
-    assert found == (Standing.UNDECIDED, 512.0)  # 368, by doubling
+    assert found == (Verdict.UNDECIDED, 512.0)  # 368, by doubling
     enough = goals.goal_value(goal, np.zeros((16, 32)), {}, 0.95)
-    assert verdicts.of_interval(goal, enough, 512, 0.95).standing is Standing.KEPT
+    assert verdicts.of_interval(goal, enough, 512, 0.95).verdict is Verdict.HOLDS
     at = goals.GoalValue(0.01, 0.004, 0.012, np.zeros(16))
     assert np.isnan(verdicts.of_interval(goal, at, 2048, 0.95).price)
 
@@ -62,7 +64,7 @@ def test_what_the_tolerance_leaves_open_no_simulations_decide():
     """Of a half-width of 4e-3 the tolerance has half: what is left to the samples falls to 0, or is not enough."""
     goal = Constraint(statistic="exceedance", limit=1.0, most=0.01)
     near, far = (goals.GoalValue(x, 0.0, x + 0.004, np.zeros(16)) for x in (0.0085, 0.007))
-    assert verdicts.of_interval(goal, near, 2048, 0.95, 0.002) == (Standing.UNDECIDED, np.inf)
+    assert verdicts.of_interval(goal, near, 2048, 0.95, 0.002) == (Verdict.UNDECIDED, np.inf)
     assert verdicts.of_interval(goal, far, 2048, 0.95, 0.002).price == 8192.0
     case = SimpleNamespace(goals=[], kept=[goal])
     run = SimpleNamespace(
@@ -74,17 +76,12 @@ def test_what_the_tolerance_leaves_open_no_simulations_decide():
         true["taken"] = np.array([[taken]])
         found = verdicts.decided(run, [Choice("", "made", {})], true)
         assert found["price"][0, 0] == price
-    values = [np.array([one]) for one in (0.0085, 0.0045, 0.0125)]
-    text = verdicts.words(
-        case, "N", values, np.array([float(Standing.UNDECIDED)]), np.array([np.inf])
-    )
-    assert text.endswith(f"cannot be told ({merit.OPEN})")
 
 
 # -- the answer -------------------------------------------------------------------------------------
 
 
-def verified(verdict: str, excess: list[float]):
+def verified(verdict: Verdict, price: float, excess: list[float]):
     """Two designs and the baseline of one case, whose constraints all stand so."""
     names = ["robust alpha", "robust beta", "robust original"]
     values = np.array([1.0, 2.0, 3.0])
@@ -93,40 +90,48 @@ def verified(verdict: str, excess: list[float]):
         "mean_true": values, "deviation_true": 0.1 * values,
         "first_goal": np.array(["mean of f"] * 3), "second_goal": np.array(["m2"] * 3),
         "first_unit": np.array(["m"] * 3), "second_unit": np.array([""] * 3),
-        "constraints": np.array([f"share with f above 1 m 0.06 at most 0.05: {verdict}"] * 3),
+        "first_usual": np.array([Usual.MEAN] * 3, np.int8), "second_usual": np.array([Usual.OTHER] * 3, np.int8),
+        **data.constrained([verdict] * 3, [price] * 3),
         "constraint_excess": np.array(excess),
     }  # fmt: skip
     for name in ("first", "second"):
         columns |= {f"{name}_{end}": values for end in ("true", "lower", "upper")}
-    content = dataset.dataset("verification", {"design": np.array(names)}, columns)
+    coords = {"design": np.array(names), "constraint": np.arange(1)}
+    content = dataset.dataset("verification", coords, columns)
     content.attrs["method"] = "qmc"
     return content
 
 
 @pytest.mark.parametrize(
-    ("verdict", "excess", "nearest"),
+    ("verdict", "price", "excess", "nearest"),
     [
-        ("broken", [0.2, 0.1, 0.3], "robust beta"),
-        ("cannot be told (about 8192 simulations would decide)", [0.2, 0.1, 0.3], "robust beta"),
-        ("cannot be told (about 8192 simulations would decide)", [-0.1, -0.2, 0.3], "robust alpha"),
-        (f"cannot be told ({merit.OPEN})", [-0.1, -0.2, 0.3], "robust alpha"),
+        (Verdict.FAILS, np.nan, [0.2, 0.1, 0.3], "robust beta"),
+        (Verdict.UNDECIDED, 8192.0, [0.2, 0.1, 0.3], "robust beta"),
+        (Verdict.UNDECIDED, 8192.0, [-0.1, -0.2, 0.3], "robust alpha"),
+        (Verdict.UNDECIDED, np.inf, [-0.1, -0.2, 0.3], "robust alpha"),
     ],
 )
-def test_no_design_is_recommended_within_constraints_that_it_may_break(verdict, excess, nearest):
-    lines = answer({"verification": verified(verdict, excess)}, "out")
+def test_no_design_is_recommended_within_constraints_that_it_may_break(
+    verdict, price, excess, nearest
+):
+    lines = answer({"verification": verified(verdict, price, excess)}, "out")
     text = {line.label: line.text for line in lines}
     assert text["recommended"].startswith("none: ")
     assert text["recommended"].endswith(f"nearest: {nearest}")
     assert "within the constraints" not in " ".join(one.text for one in lines)
     decides = "study.verification.most_samples=8192 to decide the constraints"
-    assert (decides in text["next steps"]) is ("8192" in verdict)
-    assert ("a smaller numerics.rtol" in text["next steps"]) is (merit.OPEN in verdict)
+    assert (decides in text["next steps"]) is (price == 8192.0)
+    assert ("a smaller numerics.rtol" in text["next steps"]) is (price == np.inf)
+    assert (constraints.OPEN in text["constraint"]) is (price == np.inf)
+    assert ("about 8192 simulations would decide" in text["constraint"]) is (price == 8192.0)
 
 
 def test_a_design_that_surely_satisfies_them_is_recommended():
     text = {
         line.label: line.text
-        for line in answer({"verification": verified("kept", [-0.1, -0.2, -0.3])}, "out")
+        for line in answer(
+            {"verification": verified(Verdict.HOLDS, np.nan, [-0.1, -0.2, -0.3])}, "out"
+        )
     }
     assert text["recommended"] == "robust alpha"
     assert text["criterion"].startswith("lowest mean of f within the constraints of 3")
@@ -182,12 +187,16 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
     done = done["verification"]
     shares = [share_above(float(m2)) for m2 in done["m2"]]
     assert min(shares) < 0.001 < max(shares)
-    for share, text in zip(shares, done["constraints"].to_numpy(), strict=True):
-        assert not (": kept" in str(text) and share > 0.001)
-        assert not (": broken" in str(text) and share < 0.001)
-        assert "95 % CI 0 to " in str(text) or " 0 at most" not in str(text)
+    verdicts = done["constraint_verdict"].to_numpy()[:, 0]
+    for share, verdict in zip(shares, verdicts, strict=True):
+        assert not (verdict == Verdict.HOLDS and share > 0.001)
+        assert not (verdict == Verdict.FAILS and share < 0.001)
+    unseen = done["constraint_true"].to_numpy() == 0.0
+    assert (done["constraint_upper"].to_numpy()[unseen] > 0.0).all()
+    for verdict, text in zip(verdicts, done["constraints"].to_numpy(), strict=True):
+        assert f": {constraints.WORDS[verdict]}" in str(text)
     best = done.sel(design="light alpha")
-    assert ": kept" in str(best["constraints"].item())
+    assert int(best["constraint_verdict"]) == Verdict.HOLDS
     assert (
         int(best["samples"]) > 512
     )  # as many as the rare failure needs, not as mean and deviation do
@@ -197,7 +206,8 @@ def test_check_states_what_a_rare_failure_costs():
     study = scene_of(STUDY).required_study
     (text,) = verdicts.costs(study, "m")
     assert (
-        "share with f above 0.00047 m at most 0.001: 3687 simulations of a design without" in text
+        "probability of f above 0.00047 m at most 0.001: 3687 simulations of a design without"
+        in text
     )
     assert "12288 decide a design near it by importance sampling" in text
     few = study.model_copy(update={"verification": Verification(samples=1024)})

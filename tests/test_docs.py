@@ -9,10 +9,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import click
+import hooks
 import matplotlib.pyplot as plt
 import pytest
 import reference
 from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
+from markdown_it import MarkdownIt
 from patience import crowded
 
 from hpcclear.cli import cli
@@ -152,6 +154,18 @@ def test_links_lead_somewhere(page):
             assert place.exists(), f"{page} links to {target}"
             if anchor and place.name != "python.md":  # headings there are made by the site
                 assert anchor in anchors(place), f"{page} links to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=list(BLOCKS))
+def test_measured_results_fill_the_pages(page):
+    """Each line that stands for a table has a file, and the site shows it whole."""
+    text = page.read_text(encoding="utf-8")
+    shown = hooks.on_page_markdown(text)
+    assert "[measured:" not in shown.replace("`[measured:", "")
+    for match in hooks.MEASURED.finditer(text):
+        parsed = MarkdownIt().enable("table").parse(hooks.table(match[1]))
+        assert sum(token.type == "tr_open" for token in parsed) > 1, match[1]
+        assert hooks.table(match[1]) in shown
 
 
 class Site(HTMLParser):

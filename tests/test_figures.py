@@ -80,8 +80,10 @@ def test_what_slides_is_drawn_by_its_place() -> None:
 def _other_goals() -> tuple[xr.Dataset, xr.Dataset]:
     """The first case asks for a quantile and a formula, the second for mean and deviation."""
     front, verified = data.front(), data.verification()
-    asked = ["95th percentile of f, m2 + m3", "mean of f, deviation of f"]
-    front["searched"] = ("case", np.array(asked))
+    asked = {"first": ("95th percentile of f", "m"), "second": ("m2 + m3", "")}
+    for name, row in asked.items():
+        for end, text in zip(("goal", "unit"), row, strict=True):
+            front[f"searched_{name}_{end}"] = ("case", np.array([text, ""]))
     first = np.arange(2)[:, None, None] == 0
     for name, moment, value in (
         ("first", "mean", 1.5 * front["mean"]),
@@ -104,10 +106,12 @@ def _three_goals() -> tuple[xr.Dataset, xr.Dataset]:
     """The first case asks for three things, the least of the third where also the mean is least; the second for two."""
     front, verified = _other_goals()
     words = "((m2 - 0.21)/0.21)**2 + ((m3 - 0.14)/0.14)**2"
-    front["searched"] = (
-        "case",
-        np.array([f"mean of f, deviation of f, {words}", "mean of f, deviation of f"]),
-    )
+    asked = {
+        "first": ("mean of f", "m"), "second": ("standard deviation of f", "m"), "third": (words, "")
+    }  # fmt: skip
+    for name, row in asked.items():
+        for end, text in zip(("goal", "unit"), row, strict=True):
+            front[f"searched_{name}_{end}"] = ("case", np.array([text, ""]))
     first = np.arange(2)[:, None, None] == 0
     far = (front["m2"] / 0.21 - 1) ** 2 + (front["m3"] / 0.14 - 1) ** 2
     for name, value in zip(

@@ -21,7 +21,8 @@ from hpcclear.ensemble.maps import SHAPE
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import motion
 from hpcclear.report.figures.animation import RATE, animate
-from hpcclear.report.figures.catalogue import CROSSINGS, drawings
+from hpcclear.report.figures.catalogue import drawings
+from hpcclear.report.figures.portraits import CROSSINGS
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 

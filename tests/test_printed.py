@@ -12,6 +12,7 @@ from test_figures import _other_goals
 
 from hpcclear import load_scene, report
 from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import Usual
 from hpcclear.cli import cli
 from hpcclear.cli.response import describe_response
 from hpcclear.ranks.stopping import Stopped
@@ -123,6 +124,9 @@ def test_a_figure_of_a_poor_fit_says_so_across_its_panel(draw, which, words):
 # -- the front on the page -----------------------------------------------------------------------------
 
 
+USUAL = {"mean of f": Usual.MEAN, "standard deviation of f": Usual.DEVIATION}
+
+
 def with_goals(verified: xr.Dataset, words: dict[str, tuple[str, ...]]) -> xr.Dataset:
     """The same with what each case makes small, as the study writes it."""
     cases = [str(case) for case in verified["case"].to_numpy()]
@@ -130,6 +134,8 @@ def with_goals(verified: xr.Dataset, words: dict[str, tuple[str, ...]]) -> xr.Da
         verified[f"{name}_goal"] = ("design", np.array([words[case][k] for case in cases]))
         units = ["m" if words[case][k].endswith(" of f") else "" for case in cases]
         verified[f"{name}_unit"] = ("design", np.array(units))
+        usual = [USUAL.get(words[case][k], Usual.OTHER) for case in cases]
+        verified[f"{name}_usual"] = ("design", np.array(usual, np.int8))
     verified["constraints"] = ("design", np.array([""] * len(cases)))
     return verified
 

@@ -6,6 +6,7 @@ it by the requested objective, on the rank that simulated it, and everybody afte
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cache
 from inspect import signature
 from typing import Any, Literal
@@ -290,6 +291,16 @@ case may name: hypervolumes are exact so far, and the designs that a study can a
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 """The same places, as variables of files are called by them."""
+
+
+class Usual(IntEnum):
+    """Statistics of f that are reported of every design, whatever its case makes small."""
+
+    OTHER = 0
+    MEAN = 1
+    DEVIATION = 2
+    PERCENTILE = 3
+
 
 MEAN_GAP = OURS["mean-gap"]
 """f of eq. 13, of a scene without a study, and of a study that names no other."""

@@ -17,6 +17,7 @@ from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
 from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
+from hpcclear.report.parts import LinesOf, declared
 from hpcclear.results import dataset
 
 if TYPE_CHECKING:
@@ -52,16 +53,7 @@ def describe_statistics(found: "Finished") -> None:
 
 def describe_study(place: Path) -> None:
     """Print the ends of its fronts beside the baseline, the answer of a finished study, its run time, and its files."""
-    kinds = (
-        "samples",
-        "sensitivity",
-        "kriging",
-        "verification",
-        "contributions",
-        "worst",
-        "chaos",
-        "timing",
-    )
+    kinds = {"timing", *(kind for part in declared(LinesOf) for kind in part.kinds)}
     paths = {kind: place / f"{kind}.nc" for kind in kinds}
     found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
     out = console()

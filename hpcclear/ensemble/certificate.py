@@ -16,12 +16,12 @@ out all rids the scene of these, what is more expensive by itself goes with the 
 import itertools
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.verdict import Verdict
 from hpcclear.statistics.random.paired import (
     Change,
     deviation_change,
@@ -51,14 +51,6 @@ effects is recommended, then the one whose effects come first: an effect stands 
 
 SINGLY = 0.6
 """Of the budget that single effects may take; the rest is for sets."""
-
-
-class Verdict(IntEnum):
-    """What a change is to the tolerance."""
-
-    WITHIN = 0
-    BEYOND = 1
-    UNDECIDED = 2
 
 
 class Asked(NamedTuple):
@@ -153,7 +145,7 @@ class Book:
         )
 
     def verdict(self, off: Variant) -> Verdict:
-        """What the changes that count come to."""
+        """Whether the changes that count are within the tolerance."""
         found = self.changes(off)
         counted = [found.mean]
         counted += [found.deviation] if self.plan.scattered else []
@@ -172,8 +164,8 @@ class Book:
 def judged(changes: Sequence[Change], tolerance: float) -> Verdict:
     """Within the tolerance if all are, beyond it if any is; NaN is undecided."""
     if any(change.beyond(tolerance) for change in changes):
-        return Verdict.BEYOND
-    return Verdict.WITHIN if all(c.within(tolerance) for c in changes) else Verdict.UNDECIDED
+        return Verdict.FAILS
+    return Verdict.HOLDS if all(c.within(tolerance) for c in changes) else Verdict.UNDECIDED
 
 
 def _largest(on: Array, off: Array) -> tuple[Array, Array]:
@@ -194,7 +186,7 @@ def certificate(plan: Plan) -> Asking:
     singles = [(k,) for k in range(plan.effects) if plan.possible((k,))]
     yield from _judge(book, [()], plan.budget)
     yield from _judge(book, singles, SINGLY * plan.budget)
-    good = [one for one in singles if book.verdict(one) is Verdict.WITHIN]
+    good = [one for one in singles if book.verdict(one) is Verdict.HOLDS]
     yield from _together(book, [one[0] for one in good])
     return Certificate(tuple(book.seen), _recommended(book), book)
 
@@ -244,7 +236,7 @@ def _together(book: Book, good: list[int]) -> Part:
     for effects in [good, cheap] if explicit else [cheap]:  # what is stiff saves nothing alone
         chosen = _set(book, effects)
         yield from _judge(book, [one for one in [chosen] if one not in book.seen], plan.budget)
-        if len(chosen) < 3 or book.verdict(chosen) is Verdict.WITHIN or book.spent() > plan.budget:
+        if len(chosen) < 3 or book.verdict(chosen) is Verdict.HOLDS or book.spent() > plan.budget:
             continue
         pairs = [p for p in itertools.combinations(chosen, 2) if plan.possible(p)]
         yield from _judge(book, pairs[:MOST_PAIRS], plan.budget)
@@ -282,7 +274,7 @@ def _recommended(book: Book) -> Variant:
     """Of all that was simulated and passes the largest, unless another one is much cheaper; () where none does."""
     passed = [
         one for one in book.seen
-        if one and book.verdict(one) is Verdict.WITHIN and book.work(one) <= MORE_WORK
+        if one and book.verdict(one) is Verdict.HOLDS and book.work(one) <= MORE_WORK
     ]  # fmt: skip
     if not passed:
         return ()

@@ -24,14 +24,14 @@ from hpcclear.identify.advice import (
 from hpcclear.identify.features import Layout
 from hpcclear.identify.history import history, seconds_of
 from hpcclear.identify.inputs import Inputs
-from hpcclear.identify.judgement import Prepared, Verdict, features_of, judged, prepare
+from hpcclear.identify.judgement import Judgement, Prepared, features_of, judged, prepare
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.settings import Settings
 from hpcclear.identify.signals import Sensor, names_of, revolutions_of
 from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
-from hpcclear.results.identified import with_units
+from hpcclear.results.kinds.identify import with_units
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -116,7 +116,7 @@ def _driven(scene: Scene) -> tuple[float, int, list[str]]:
     return frequency, -1 if angle[-1] < angle[0] else 1, names_of(response)
 
 
-Found = Sequence[tuple[Prepared, Verdict]]
+Found = Sequence[tuple[Prepared, Judgement]]
 """Of each record its models and what it says."""
 
 
@@ -127,7 +127,7 @@ def _layouts(row: Sequence[Measured], settings: Settings) -> list[Layout]:
 
 def _verdict(
     ensemble: Ensemble, row: Sequence[Measured], layouts: Sequence[Layout], sensor: Sensor, seed: int
-) -> tuple[Prepared, Verdict]:  # fmt: skip
+) -> tuple[Prepared, Judgement]:  # fmt: skip
     """What a record says, by models for its own features and noise: the same whatever the other records are."""
     values, variance = features_of(row, layouts)
     made = prepare(ensemble, layouts, sensor, row[0].frequency, variance, seed)

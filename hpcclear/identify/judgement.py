@@ -53,7 +53,7 @@ class Prepared:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """What one measurement says.
 
     Attributes
@@ -146,7 +146,7 @@ def as_measured(features: Array, own: Array, variance: Array, rng: np.random.Gen
     return features + rng.standard_normal(features.shape) * np.sqrt(np.maximum(variance - own, 0.0))
 
 
-def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTICLES) -> Verdict:
+def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTICLES) -> Judgement:
     """Return what the features (p,) of a measurement say."""
     with threadpool_limits(limits=1, user_api="blas"):
         rng = np.random.default_rng([seed, 0x706F])
@@ -165,7 +165,7 @@ def judged(prepared: Prepared, values: Array, seed: int, particles: int = PARTIC
     physical = inputs.values(wide[:, :size])
     interval = np.quantile(physical[:, :unknowns], LEVELS, axis=0)
     score = np.abs(values - mean) / deviation
-    return Verdict(
+    return Judgement(
         physical, interval, doubt, doubt < REFUSED, int(np.argmax(score)), values, mean, deviation
     )  # fmt: skip
 

@@ -3,8 +3,9 @@
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.verdict import Verdict
+from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
-from hpcclear.report.merit import standing
 
 SAME = 0.01
 """Relative difference up to which a variable of two designs is called the same."""
@@ -59,17 +60,21 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     return text + _lightest(together, best)
 
 
+def masses(verified: xr.Dataset) -> list[xr.DataArray]:
+    """Return the design variables that are masses."""
+    return [
+        one
+        for one in labels.design_variables(verified)
+        if one.attrs.get("units") == "kg" and "of_random_inputs" not in one.attrs
+    ]
+
+
 def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
     """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
-    masses = [
-        one.name
-        for one in labels.design_variables(together)
-        if one.attrs["units"] == "kg" and "of_random_inputs" not in one.attrs
-    ]
-    if not masses:
+    if not (found := masses(together)):
         return ""
-    whole = np.sum([together[name].to_numpy() for name in masses], axis=0)
-    saved = float(sum(float(best[name]) for name in masses)) - float(np.nanmin(whole))
+    whole = np.sum([one.to_numpy() for one in found], axis=0)
+    saved = sum(map(float, masses(best))) - float(np.nanmin(whole))
     if not saved > 1e-6:
         return ""
     name = str(together["design"].to_numpy()[int(np.nanargmin(whole))])
@@ -89,8 +94,7 @@ def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
 
 def satisfies(one: xr.Dataset) -> bool:
     """Return whether a design significantly satisfies all constraints of its case."""
-    text = str(one["constraints"].item()) if "constraints" in one else ""
-    return standing(text) in ("", "kept")
+    return verdict_of(one) in (None, Verdict.HOLDS)
 
 
 def _each(ours: xr.Dataset) -> list[xr.Dataset]:
@@ -126,12 +130,9 @@ def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     """As the file states, else those whose confidence intervals overlap."""
     names = [str(name) for name in ours["design"].to_numpy()]
     own = str(best["design"].item())
-    if "equivalent" in ours:
-        stated = str(best["equivalent"].item()).split("; ")
+    if "equivalence" in ours:
+        stated = best["rival"].to_numpy()[best["equivalence"].to_numpy() == 1]
         return [name for name in names if name in stated]
-    if "same_as" in ours:  # of an earlier version: each design states the first before it only
-        first = dict(zip(names, map(str, ours["same_as"].to_numpy()), strict=True))
-        return [one for one in names if one != own and (first[one] == own or first[own] == one)]
     if not {"mean_lower", "deviation_lower"} <= set(ours.data_vars):
         return []
     alike = _overlaps(ours, best, "mean") & _overlaps(ours, best, "deviation")

@@ -3,19 +3,18 @@
 The command prints them at its end, and they head the page.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
 
+from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Flag
-from hpcclear.report import alike, failures, scatter
-from hpcclear.report.figures import fits, labels
+from hpcclear.base.verdict import Verdict
+from hpcclear.report import alike
+from hpcclear.report.constraints import prices_of, verdict_of, worded
+from hpcclear.report.figures import labels
 from hpcclear.report.merit import (
-    OPEN,
-    USUAL,
-    VERDICTS,
     baseline_of,
     best_of,
     goals_of,
@@ -23,9 +22,9 @@ from hpcclear.report.merit import (
     judged,
     merit,
     ours_of,
-    standing,
+    usual_of,
 )
-from hpcclear.report.scatter import HALF_WIDTH
+from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
 
 MANY = 0.05
@@ -33,18 +32,6 @@ MANY = 0.05
 
 FAR = 0.2
 """Relative error of the surrogate above which more samples are advised."""
-
-SOME = 0.05
-"""Share of samples that change with a perturbation above which a design is called sensitive to initial conditions."""
-
-LARGE = 0.1
-"""Share of the variance above which chaotic scatter is worth more revolutions."""
-
-LITTLE = 0.01
-"""Share of the variance of f, with its half-width, below which a variable is called negligible."""
-
-COARSE = 0.1
-"""Half-width of a Sobol index above which more samples are advised."""
 
 
 def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
@@ -61,32 +48,37 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     if verified is None or not np.isfinite(verified["mean_true"]).any():
         return []
     ours = ours_of(verified)
-    best = best_of(ours)
-    original = baseline_of(ours)
-    chaotic = _scatter(files, best)
-    near = alike.flat(ours, best, judged(ours))
+    of, parts = Recommended(files, ours, best_of(ours)), declared(LinesOf)
+    steps = [text for part in parts for text in part.steps(of)]
+    steps.append(
+        f"hpcclear report {place}"
+        if place
+        else "click its mark on the front below for its response"
+    )
     return [
-        Line("recommended", _named(best)),
-        Line("criterion", f"{merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}; "
-             f"f: {labels.objective(verified)}"),
-        Line("values", _values(best)),
-        Line("mean", _moment(best, "mean", original)),
-        Line("std. deviation", _moment(best, "deviation", original)),
-        *(Line("objective", text) for text in _goals(best)),
-        *(Line("constraint", text) for text in constraints(best)),
-        Line("equivalent", alike.words(ours, best)),
-        *([Line("near", near)] if near else []),
-        Line("active bounds", bounds(best)),
-        *scatter.lines(files, best),
-        *scatter.worst(files, best),
-        *_shares(files),
-        *(Line("warning", text) for text in _poor_fits(files)),
-        Line("contact model", _left(files, best)),
-        *(Line("failed", text) for text in _failed(files)),
-        *([Line("chaos", chaotic)] if chaotic else []),
-        Line("confidence", _sure(best, verified)),
-        Line("next steps", "; ".join(_next(files, ours, best, place))),
-    ]  # fmt: skip
+        *(line for part in parts for line in part.lines(of)),
+        Line("next steps", "; ".join(steps)),
+    ]
+
+
+def _head(of: Recommended) -> Iterator[Line]:
+    """The recommended design, and what was simulated of it."""
+    ours, best = of.ours, of.best
+    original = baseline_of(ours)
+    yield Line("recommended", _named(best))
+    criterion = (
+        f"{merit(ours, best)} of {ours.sizes['design']} simulated designs, case {_case(best)}"
+    )
+    yield Line("criterion", f"{criterion}; f: {labels.objective(ours)}")
+    yield Line("values", _values(best))
+    yield Line("mean", _moment(best, "mean", original))
+    yield Line("std. deviation", _moment(best, "deviation", original))
+    yield from (Line("objective", text) for text in _goals(best))
+    yield from (Line("constraint", text) for text in worded(best))
+    yield Line("equivalent", alike.words(ours, best))
+    if near := alike.flat(ours, best, judged(ours)):
+        yield Line("near", near)
+    yield Line("active bounds", bounds(best))
 
 
 def unit_of(one: xr.Dataset, name: str) -> str:
@@ -99,32 +91,19 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
     """Objectives of the case of a design besides mean and standard deviation, with confidence intervals."""
     names = [] if is_plain(best) else goals_of(best)
     for name in names:
-        if len(names) > 2 and str(best[f"{name}_goal"].item()) in USUAL[:2]:
+        if len(names) > 2 and usual_of(best, name) in (Usual.MEAN, Usual.DEVIATION):
             continue  # has a line of its own
         value, unit = float(best[f"{name}_true"]), unit_of(best, f"{name}_true")
         low, high = (float(best[f"{name}_{end}"]) for end in ("lower", "upper"))
-        text = (
-            f"{labels.statistic(str(best[f'{name}_goal'].item()))} {labels.quantity(value, unit)}"
-        )
+        text = f"{best[f'{name}_goal'].item()} {labels.quantity(value, unit)}"
         if low < high:
             text += f" (95 % CI {labels.between(low, high, unit)})"
         yield text
 
 
-def constraints(best: xr.Dataset) -> Iterator[str]:
-    """Yield the constraints of the case of a design, each with its value and verdict."""
-    if "constraints" in best and str(best["constraints"].item()):
-        for text in str(best["constraints"].item()).split("; "):
-            text = re.sub(r" ([^\s)]+) at most", r" = \1, at most", labels.statistic(text))
-            text = text.replace(") at most", "), at most")
-            for word, printed in VERDICTS.items():
-                text = text.replace(f": {word}", f": {printed}")
-            yield text
-
-
 _NONE = {
-    "broken": "none: every simulated design violates a constraint",
-    "cannot be told": "none: no simulated design is certain to satisfy the constraints",
+    Verdict.FAILS: "none: every simulated design violates a constraint",
+    Verdict.UNDECIDED: "none: no simulated design is certain to satisfy the constraints",
 }
 """What stands in place of a recommendation where no design significantly satisfies the constraints, by the best verdict."""
 
@@ -135,7 +114,7 @@ ENDS_IN_WORDS = {"alpha": "lowest mean of f", "beta": "lowest standard deviation
 
 def _named(best: xr.Dataset) -> str:
     name = str(best["design"].item())
-    if (verdict := standing(str(best.get("constraints", xr.DataArray("")).item()))) in _NONE:
+    if (verdict := verdict_of(best)) in _NONE:
         return f"{_NONE[verdict]}; nearest: {name}"
     if name.rpartition(" ")[2] == "original":
         return f"keep the baseline design ({name}): no simulated design is better"
@@ -177,96 +156,27 @@ def bounds(best: xr.Dataset) -> str:
     return found or "none"
 
 
-def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
+def _left(of: Recommended) -> Iterator[Line]:
     """Share of simulations outside the range of Hertz contact."""
-    parts = []
+    parts, best = [], of.best
     if "beyond_hertz" in best:
         share = int(best["beyond_hertz"]) / int(best["samples"])
         parts.append(f"{share:.0%} of the simulations of this design")
-    samples = files.get("samples")
+    samples = of.files.get("samples")
     if samples is not None and "flags" in samples:
         beyond = (samples["flags"].to_numpy() & int(Flag.BEYOND_HERTZ)) != 0
         parts.append(f"{beyond.mean():.0%} of all {beyond.size} samples")
-    return "outside the range of Hertz contact in " + " and ".join(parts) if parts else "not known"
+    shown = f"outside the range of Hertz contact in {' and '.join(parts)}" if parts else "not known"
+    yield Line("contact model", shown)
 
 
-def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
-    """First-order and total Sobol indices with their errors, the largest total first; none where they are not known."""
-    found = files.get("sensitivity")
-    if found is None or "sobol_total" not in found:
-        return
-    indices = {
-        kind: [found[f"sobol_{kind}{end}"].to_numpy() for end in ("", "_error")]
-        for kind in ("first", "total")
-        if f"sobol_{kind}" in found
-    }
-    total, error = indices["total"]
-    if not total.size or not np.isfinite([total, error]).all():
-        return
-    names = [str(name) for name in found["parameter"].to_numpy()]
-    order = np.argsort(-total, kind="stable")
-    little = total + HALF_WIDTH * error < LITTLE
-    texts = {
-        kind: ", ".join(
-            scatter.share(names[k], value[k], HALF_WIDTH * error[k]) for k in order if not little[k]
-        )
-        for kind, (value, error) in indices.items()
-    }
-    own = "first-order Sobol indices, the share of the variance of f that a variable explains alone (± 95 % half-width)"
-    if texts["total"] and "first" in texts:
-        yield Line("sensitivity", f"{own}: {texts['first']}")
-    if texts["total"]:
-        words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
-        yield Line("interactions", f"{words}: {texts['total']}")
-    noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
-    if noise > HALF_WIDTH * doubt and noise > LITTLE:
-        text = f"{scatter.share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
-        yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
-    if little.any():
-        hardly = ", ".join(names[k] for k in order if little[k])
-        yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")
-    if any(HALF_WIDTH * float(np.nanmax(error)) > COARSE for _, error in indices.values()):
-        text = f"Sobol indices are known to ± {COARSE:.0%} or worse: raise study.sensitivity.sobol_samples"
-        yield Line("warning", text)
-
-
-def _failed(files: Mapping[str, xr.Dataset]) -> list[str]:
-    """Why samples failed, where, and what to do; none where all succeeded."""
-    samples = files.get("samples")
-    return failures.explained(samples) if samples is not None and "status" in samples else []
-
-
-def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
-    """Surrogates that do not fit, a sentence for each kind of them."""
-    for kind, what in (
-        ("sensitivity", "sensitivities by slopes"),
-        ("kriging", "the search began there"),
-    ):
-        if found := fits.warnings(kind, files.get(kind)):
-            yield f"{'; '.join(found)} ({what}); simulated values do not depend on surrogates"
-
-
-def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
-    """Share of the design's variance that is chaos, and how many designs are chaotic; "" if not simulated."""
-    found, name = files.get("chaos"), str(best["design"].item())
-    if found is None or name not in found["design"].to_numpy():
-        return ""
-    own = found.sel(design=name)
-    moved = (found["chaotic"] > SOME).to_numpy()
-    text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
-    if not float(own["chaotic"]) > SOME:
-        return f"{text}; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
-    return (
-        f"{text}. Relative perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples "
-        f"and explain {float(own['chaos_share']):.0%} of its variance"
-    )
-
-
-def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
+def _sure(of: Recommended) -> Iterator[Line]:
+    """How well the numbers of the recommended design are known."""
+    best = of.best
     count = int(best["samples"]) if "samples" in best else 0
-    level = float(verified.attrs.get("confidence", np.nan))
+    level = float(best.attrs.get("confidence", np.nan))
     text = f"{count} simulations of the recommended design"
-    text += " by randomised quasi-Monte Carlo" if verified.attrs.get("method") == "qmc" else ""
+    text += " by randomised quasi-Monte Carlo" if best.attrs.get("method") == "qmc" else ""
     if weighted := int(best.get("rare_samples", 0)):
         text += (
             f" and {weighted} weighted ones (importance sampling) for its probabilities of failure"
@@ -284,7 +194,7 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     errors = _surrogate_errors(best)
     if len(errors) == 2:
         text += f". Surrogate error: mean {errors[0]:+.1%}, standard deviation {errors[1]:+.1%}"
-    return text
+    yield Line("confidence", text)
 
 
 def _surrogate_errors(best: xr.Dataset) -> list[float]:
@@ -293,19 +203,17 @@ def _surrogate_errors(best: xr.Dataset) -> list[float]:
     return [error for error in found if np.isfinite(error)]
 
 
-def _next(
-    files: Mapping[str, xr.Dataset], ours: xr.Dataset, best: xr.Dataset, place: str
-) -> Iterator[str]:
-    """What to do, the most useful first; the report in the end."""
+def _steps(of: Recommended) -> Iterator[str]:
+    """What to do, the most useful first."""
+    ours, best = of.ours, of.best
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
         yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
-    constraints = str(best.get("constraints", ""))
-    prices = re.findall(r"about (\d+) simulations would decide", constraints)
-    if OPEN in constraints:
+    prices = prices_of(best)
+    if np.inf in prices:
         yield "a smaller numerics.rtol (or target_error), to decide the constraints"
     elif prices:
         key = "most_samples" if ours.attrs.get("method") == "qmc" else "samples"
-        yield f"study.verification.{key}={max(map(int, prices))} to decide the constraints"
+        yield f"study.verification.{key}={max(prices):.0f} to decide the constraints"
     if "on_bounds" in best and str(best["on_bounds"].item()):
         yield "wider ranges for the variables at active bounds, if the machine allows it"
     if any(abs(error) > FAR for error in _surrogate_errors(best)):
@@ -315,15 +223,10 @@ def _next(
         yield "a smaller study.accuracy, to separate equivalent designs"
     elif twins and "samples" in best:
         yield f"study.verification.samples={10 * int(best['samples'])} for confidence intervals a third as wide"
-    found, name = files.get("chaos"), str(best["design"].item())
-    if (
-        found is not None
-        and name in found["design"]
-        and float(found.sel(design=name)["chaos_share"]) > LARGE
-    ):
-        yield "a larger numerics.averaged_revolutions, since chaotic scatter decreases with it"
-    yield (
-        f"hpcclear report {place}"
-        if place
-        else "click its mark on the front below for its response"
-    )
+
+
+PARTS = (
+    LinesOf(10, ("verification",), _head, _steps),
+    LinesOf(60, ("verification", "samples"), _left),
+    LinesOf(90, ("verification",), _sure),
+)

@@ -6,17 +6,16 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ENDS, ORDINALS
+from hpcclear.base.objectives import ENDS, ORDINALS, Usual
 from hpcclear.report import alike
 from hpcclear.report.answer import bounds, unit_of
+from hpcclear.report.constraints import WORDS, verdict_of
 from hpcclear.report.figures import labels
 from hpcclear.report.merit import (
-    USUAL,
-    VERDICTS,
     counts,
     goals_of,
     recommended,
-    standing,
+    usual_of,
 )
 
 BESIDE = ("original", *ENDS[:2])
@@ -98,18 +97,9 @@ def _role(end: str, own: xr.Dataset) -> str:
         return "baseline"
     place = ENDS.index(end)
     name = f"{ORDINALS[place]}_goal"
-    goal = labels.statistic(str(own[name].item()) if name in own else USUAL[place])
+    goal = str(own[name].item()) if name in own else ("mean", "standard deviation")[place]
     words = goal.removesuffix(" of f").replace("standard deviation", "std. dev.")
     return f"lowest {words} ({end})"
-
-
-def masses(verified: xr.Dataset) -> list[xr.DataArray]:
-    """Return the design variables that are masses."""
-    return [
-        v
-        for v in labels.design_variables(verified)
-        if v.attrs.get("units") == "kg" and "of_random_inputs" not in v.attrs
-    ]
 
 
 def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
@@ -121,7 +111,7 @@ def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
         and str(one["design"].item()).startswith(f"{case} ")
         and alike.satisfies(one)
     ]
-    weights = {str(one["design"].item()): sum(map(float, masses(one))) for one in own}
+    weights = {str(one["design"].item()): sum(map(float, alike.masses(one))) for one in own}
     known = {name: weight for name, weight in weights.items() if np.isfinite(weight) and weight}
     if not known:
         return ""
@@ -148,10 +138,11 @@ def beside_original(
             if name in verified or not name.startswith("life_")
         ]
         for name in _asked(designs[0]):
-            words = labels.statistic(str(designs[0][f"{name}_goal"].item())).removesuffix(" of f")
+            words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")
             lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
-        if kept := [str(one["constraints"].item()) for one in designs if "constraints" in one]:
-            lines.append(("constraints", *(VERDICTS.get(standing(text), "none") for text in kept)))
+        if "constraints" in verified:
+            found = map(verdict_of, designs)
+            lines.append(("constraints", *("none" if v is None else WORDS[v] for v in found)))
         lines.append(("active bounds", "", *(bounds(one) for one in designs[1:])))
         yield case, tuple(one.words for one in shown), lines
 
@@ -177,4 +168,4 @@ def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
 
 def _asked(one: xr.Dataset) -> list[str]:
     """Objectives of the case of a design that have no line anyway: "first", "second"."""
-    return [name for name in goals_of(one) if str(one[f"{name}_goal"].item()) not in USUAL]
+    return [name for name in goals_of(one) if usual_of(one, name) is Usual.OTHER]

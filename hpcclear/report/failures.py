@@ -9,6 +9,8 @@ import xarray as xr
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.outcome import Status
 from hpcclear.report.figures import labels
+from hpcclear.report.parts import LinesOf, Recommended
+from hpcclear.report.spread import Line
 
 CLEAR = 0.3
 """Largest distance of two distributions (Kolmogorov's) below which a variable is not named at all."""
@@ -92,3 +94,13 @@ def _distance(values: Array, failed: Booleans) -> float:
         for part in (failed, ~failed)
     ]
     return float(np.abs(shares[0] - shares[1]).max())
+
+
+def _lines(of: Recommended) -> Iterator[Line]:
+    """Why samples failed, where, and what to do; none where all succeeded."""
+    samples = of.files.get("samples")
+    if samples is not None and "status" in samples:
+        yield from (Line("failed", text) for text in explained(samples))
+
+
+PARTS = (LinesOf(70, ("samples",), _lines),)

@@ -3,7 +3,9 @@
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ORDINALS
+from hpcclear.base.objectives import ORDINALS, Usual
+from hpcclear.base.verdict import Verdict, best
+from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
 
 SPAN = 2.0
@@ -14,10 +16,6 @@ def recommended(verified: xr.Dataset) -> str:
     """Return the name of the recommended design; "" if no design was verified."""
     known = bool(np.isfinite(verified["mean_true"]).any())
     return str(best_of(ours_of(verified))["design"].item()) if known else ""
-
-
-USUAL = ("mean of f", "deviation of f", "95th percentile of f")
-"""Quantities that are printed of every design, whatever the objectives of its case."""
 
 
 def goals_of(one: xr.Dataset) -> list[str]:
@@ -33,28 +31,17 @@ def leading_goals(verified: xr.Dataset) -> list[str]:
     return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
 
 
-VERDICTS = {"broken": "violated", "cannot be told": "undecided", "kept": "satisfied"}
-"""How a file states the verdict on a constraint, the worst first, and what is printed."""
-
-
-OPEN = "the integration tolerance leaves it open"
-"""Said of a constraint that no number of simulations would decide."""
+def usual_of(one: xr.Dataset, name: str) -> Usual:
+    """Which of the statistics that are reported of every design an objective of a design's case is."""
+    return Usual(int(one[f"{name}_usual"])) if f"{name}_usual" in one else Usual.OTHER
 
 
 def is_plain(one: xr.Dataset) -> bool:
     """Return whether the objectives of its case are mean and standard deviation, without constraints."""
     if "first_goal" not in one:
         return True
-    asked = tuple(str(one[f"{name}_goal"].item()) for name in goals_of(one))
-    return asked == USUAL[:2] and not str(one["constraints"].item())
-
-
-def standing(text: str) -> str:
-    """Return the worst verdict on a design's constraints, in the words of the file."""
-    for word in VERDICTS:
-        if f": {word}" in text:
-            return word
-    return ""
+    asked = [usual_of(one, name) for name in goals_of(one)]
+    return asked == [Usual.MEAN, Usual.DEVIATION] and verdict_of(one) is None
 
 
 def ours_of(verified: xr.Dataset) -> xr.Dataset:
@@ -94,11 +81,12 @@ def judged(ours: xr.Dataset) -> np.ndarray:
     """Merit of the designs of a case, (designs,): infinite for those that satisfy its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
         return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
-    order = ("", "kept", "cannot be told", "broken")
-    ranks = np.array([order.index(standing(str(one))) for one in ours["constraints"].to_numpy()])
+    each = [verdict_of(ours.isel(design=k)) for k in range(ours.sizes["design"])]
+    found, level = best([Verdict.HOLDS if one is None else one for one in each])
     merit = ours["first_true"].to_numpy()
-    level = ranks == ranks.min()
-    if ranks.min() > 1 and "constraint_excess" in ours:  # none is surely within: the nearest
+    if (
+        found is not Verdict.HOLDS and "constraint_excess" in ours
+    ):  # none is surely within: the nearest
         excess = ours["constraint_excess"].to_numpy()
         within = level & (excess <= 0.0)
         level, merit = (within, merit) if within.any() else (level, excess)
@@ -109,15 +97,14 @@ def merit(ours: xr.Dataset, best: xr.Dataset) -> str:
     """What `judged` goes by, in words."""
     if is_plain(best):
         return f"lowest mean + {SPAN:g} standard deviations of f"
-    words = f"lowest {labels.statistic(str(best['first_goal'].item()))}"
-    found = standing(str(best["constraints"].item()))
-    if found == "broken":
+    words, found = f"lowest {best['first_goal'].item()}", verdict_of(best)
+    if found is Verdict.FAILS:
         return "smallest violation of the constraints"
-    if found == "cannot be told":
+    if found is Verdict.UNDECIDED:
         inside = float(best.get("constraint_excess", np.nan)) <= 0.0
         return (
             f"{words} where estimates satisfy the constraints,"
             if inside
             else "smallest estimated violation of the constraints"
         )
-    return f"{words} within the constraints" if found else words
+    return words if found is None else f"{words} within the constraints"

@@ -1,12 +1,12 @@
 """Lines on the scatter of one design: which random inputs contribute to its variance, and what tighter tolerances bring."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report.figures.labels import quantity
+from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
 
 if TYPE_CHECKING:
@@ -29,13 +29,12 @@ SMALL = 0.005
 """Share below which, half-width included, an input is listed without a number."""
 
 
-def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+def _lines(of: Recommended) -> Iterator[Line]:
     """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
     they are not known."""
-    found, name = files.get("contributions"), str(best["design"].item())
-    if found is None or name not in found["design"].to_numpy():
+    own = of.of_best("contributions")
+    if own is None:
         return
-    own = found.sel(design=name)
     rows = np.flatnonzero(np.isfinite(own["contribution"].to_numpy()))
     if not len(rows):
         return
@@ -98,12 +97,11 @@ def _first(names: list[str], falls: "Falls", errors: np.ndarray, prices: np.ndar
     return text + (", most for its cost" if known else "")
 
 
-def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+def _worst(of: Recommended) -> Iterator[Line]:
     """Yield the worst case of a design, and where it lies; none where it was not searched."""
-    found, name = files.get("worst"), str(best["design"].item())
-    if found is None or name not in found["design"].to_numpy():
+    own = of.of_best("worst")
+    if own is None:
         return
-    own = found.sel(design=name)
     value, corner = float(own["worst"]), float(own["worst_corner"])
     if not np.isfinite(value):
         return
@@ -143,3 +141,6 @@ def share(name: str, value: float, half_width: float) -> str:
 def _upwards(half_width: float, step: float) -> float:
     """A half-width in whole steps, no narrower than it is."""
     return float(max(np.ceil(half_width / step - 1e-9), 1.0) * step)
+
+
+PARTS = (LinesOf(20, ("contributions",), _lines), LinesOf(30, ("worst",), _worst))

@@ -14,34 +14,13 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
+from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.units import factor, fits, is_unit
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-ROWS: dict[str, tuple[str, ...]] = {
-    "response": ("time",),
-    "samples": ("sample",),
-    "bifurcation": ("value", "crossing"),
-    "sensitivity": ("surface", "interval", "clearance", "parameter"),
-    "kriging": ("model", "point"),
-    "front": ("case", "run", "solution"),
-    "verification": ("design",),
-    "chaos": ("design",),
-    "contributions": ("design", "input"),
-    "worst": ("design", "input"),
-    "claims": ("claim",),
-    "readings": ("reading", "design"),
-    "statistics": ("bin",),
-    "wear": ("life", "cycle"),
-    "effects": ("variant",),
-    "identify": ("unknown",),
-    "timing": ("rank", "stage"),
-    "accuracy": ("integrator", "rung"),
-}
-"""Dimensions along which the rows of a table go, by the kind of a result."""
 
 MOST_UNITS = 64
 """Units of a scene's text that its table is written in, at most: a forged text may have any number of them."""
@@ -80,11 +59,12 @@ def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
     import pandas as pd  # comes with xarray
 
     kind = str(content.attrs.get("hpcclear_kind"))
-    if kind not in ROWS:
+    if kind not in KINDS:
         reason = "the dataset is no result of hpcclear"
         raise InputError("kind", kind, reason, "Give a dataset that hpcclear wrote or returned")
-    made = _Table(content, ROWS[kind], Units(content, units))
-    for variable in dict.fromkeys([*ROWS[kind], *map(str, content.variables)]):
+    rows = KINDS[kind].rows
+    made = _Table(content, rows, Units(content, units))
+    for variable in dict.fromkeys([*rows, *map(str, content.variables)]):
         made.add(variable)
     table = pd.DataFrame(made.columns)
     if len(made.rows) > 1:  # places of a grid that nothing fills
@@ -116,8 +96,8 @@ class _Table:
     def add(self, name: str) -> None:
         """Add a variable: as columns, as single values, or to what is left out."""
         variable = self.content[name]
-        if name in self.content.dims and name not in self.rows:
-            return  # labels of columns
+        if (name in self.content.dims and name not in self.rows) or "rival" in variable.dims:
+            return  # labels of columns; rows against rows, which a text has as well
         variable, dims = _lower_edges(variable, self.content, self.rows)
         across = [dim for dim in dims if dim not in self.rows]
         alone = not set(dims) & set(self.rows)

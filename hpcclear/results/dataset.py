@@ -34,14 +34,11 @@ from hpcclear.results.content import Content, Results, Variable
 from hpcclear.results.faults import fault_of
 from hpcclear.results.names import (
     DESIGN_VARIABLES,
-    FURTHER,
-    FURTHER_DIMS,
     KINDS,
     LIMIT,
     ROLE,
-    Column,
-    Kind,
 )
+from hpcclear.results.rows import Column, Kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,7 +102,7 @@ def filled(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
-    least = set(table.coords) - FURTHER_DIMS if whole else set()
+    least = set(table.coords) - table.optional if whole else set()
     if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
     missing = table.required - set(data)
@@ -157,7 +154,9 @@ def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int
     attributes: dict[str, object] = {"long_name": row.long_name}
     if row.units:
         attributes["units"] = row.units
-    return Variable(row.dims, array, {**attributes, **FURTHER.get(name, {})})
+    if row.codes is not None:
+        attributes |= row.codes.attributes
+    return Variable(row.dims, array, attributes)
 
 
 def _design_row(

@@ -4,7 +4,8 @@ import numpy as np
 
 from hpcclear.base.outcome import JUDGED, NUMBERS, Status
 from hpcclear.results.content import Content
-from hpcclear.results.names import FURTHER_DIMS, KINDS, LIMIT, ROLE, Column, designs_in
+from hpcclear.results.names import KINDS, LIMIT, ROLE, designs_in
+from hpcclear.results.rows import Column
 
 
 def fault_of(content: Content, kind: str | None) -> str | None:
@@ -15,7 +16,7 @@ def fault_of(content: Content, kind: str | None) -> str | None:
     if kind is not None and found != kind:
         return f"it holds {found}, not {kind}"
     table = KINDS[found]
-    missing = (table.required | (set(table.coords) - FURTHER_DIMS)) - set(content.variables)
+    missing = (table.required | (set(table.coords) - table.optional)) - set(content.variables)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
     for name, variable in content.variables.items():

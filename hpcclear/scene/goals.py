@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.objectives import Objective
+from hpcclear.base.objectives import Objective, Usual
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.formula import FormulaError, names_in, value_of
@@ -111,15 +111,25 @@ class Goal(Table):
         return same and self.formula == other.formula and self.order == other.order
 
     def words(self, unit: str) -> str:
-        """What it is, for people: "95th percentile of f", "share with f above 0.3 mm" by the `unit` of f."""
+        """What it is, for people: "95th percentile of f", "probability of f above 0.3 mm" by the `unit` of f."""
         if self.formula is not None:
             return self.formula
         what, unit = self._response(unit)
         if self.statistic == "quantile":
             return f"{100 * self.order:g}th percentile of {what}"
         if self.statistic == "exceedance":
-            return f"share with {what} above {self.limit:g} {unit}"
+            return f"probability of {what} above {self.limit:g} {unit}"
+        if self.statistic == "deviation":
+            return f"standard deviation of {what}"
         return "cost" if self.statistic == "cost" else f"{self.statistic} of {what}"
+
+    @property
+    def usual(self) -> Usual:
+        """Which of the statistics it is that are reported of every design."""
+        if self.of is not None or (self.statistic == "quantile" and self.order != 0.95):
+            return Usual.OTHER
+        known = {"mean": Usual.MEAN, "deviation": Usual.DEVIATION, "quantile": Usual.PERCENTILE}
+        return known.get(self.statistic or "", Usual.OTHER)
 
     def _response(self, unit: str) -> tuple[str, str]:
         """What it is of, "f" by the `unit` of f, and the unit."""

@@ -46,7 +46,7 @@ def certify(run: StudyRun, extent: Extent) -> None:
         plan = trial.plan(Wanted(asked.tolerance, *extent(run.scene, asked.samples), asked.forces))
         found = trial.certify(plan, simulate)
     content = effects_dataset(trial, found, {})
-    run.write(content, "effects.nc")
+    run.write(content)
     with run.ranks.stage("effects: cost"):
         seconds = trial.seconds(found.variants)
     run.times.update(times_of(seconds))

@@ -79,4 +79,4 @@ def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
         "pairs": np.full(len(choices), PAIRS),
     }
     content = dataset.dataset("chaos", coords, data, objective=run.scene.objective)
-    run.write(content, "chaos.nc")
+    run.write(content)

@@ -20,6 +20,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.verdict import Verdict, together
 from hpcclear.scene.cases import Case
 from hpcclear.scene.points import snapped
 from hpcclear.scene.stages import REPLICATES
@@ -34,7 +35,6 @@ from hpcclear.study import goals, nearby, rare, tried, truth, verdicts
 from hpcclear.study.nearby import Nearby
 from hpcclear.study.optimisation import Choice, chosen_in_all
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.verdicts import Standing
 
 ROUNDS = 4
 """Designs that are tried at the edge of a case, at most."""
@@ -233,18 +233,18 @@ def _of_case(
             true = _simulated(run, choice)
         except InputError:  # it fails with all inputs, or makes no mechanism with some
             break
-        standing = float(true["standing"][0, : len(case.kept)].max())
+        verdict = together(true["verdict"][0, : len(case.kept)].astype(int).tolist())
         now = _precise(case, true)
-        if standing < Standing.BROKEN:
+        if verdict is not Verdict.FAILS:
             kept.append(choice)
-        clear = standing == Standing.KEPT and now <= -_gap(case, CLOSE)
+        clear = verdict is Verdict.HOLDS and now <= -_gap(case, CLOSE)
         if clear and now > -_gap(case, NEAR):
             break
         if clear:
             safe = place, now
         else:
             beyond = place, now
-        shift, aim = now - guess, aim * (LESS if standing == Standing.UNDECIDED else 1.0)
+        shift, aim = now - guess, aim * (LESS if verdict is Verdict.UNDECIDED else 1.0)
     return kept
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from hpcclear.base.objectives import ORDINALS
 from hpcclear.results import dataset
 from hpcclear.scene.domain import to_physical
+from hpcclear.scene.goals import Goal
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import most_of, names_of
 from hpcclear.study.optimisation import Choice
@@ -34,6 +35,12 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piec
         data["searched"] = np.array([", ".join(names_of(case, unit)) for case in run.study.cases])
         searched = [f"searched_{name}" for name in ORDINALS[: most_of(run.study.cases)]]
         data |= {name: np.full(shape, np.nan) for name in searched}
+        for column, name in enumerate(searched):
+            asked = [
+                None if case.plain else case.goals[column : column + 1] for case in run.study.cases
+            ]
+            data[f"{name}_goal"] = np.array([one[0].words(unit) if one else "" for one in asked])
+            data[f"{name}_unit"] = np.array([_unit(one[0], unit) if one else "" for one in asked])
     for k, case in enumerate(cases):
         padded, own = fronts[f"front_{k}"], run.study.design_variables(case)
         place = np.s_[k, :, : padded.shape[1]]
@@ -57,4 +64,9 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piec
     }
     units = {name: run.study.variable(name).unit or "1" for name in used}
     content = dataset.dataset("front", coords, data, None, units, run.scene.objective, run.words)
-    run.write(content, "front.nc")
+    run.write(content)
+
+
+def _unit(goal: Goal, unit: str) -> str:
+    """The unit of an objective by that of f: "1" of a probability, "" of a formula."""
+    return goal.unit(unit) or ("1" if goal.statistic == "exceedance" else "")

@@ -15,6 +15,7 @@ from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
+from hpcclear.base.verdict import Verdict
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
@@ -25,7 +26,6 @@ from hpcclear.study import goals, tolerance, verdicts
 from hpcclear.study.goals import GoalValue
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.verdicts import Standing
 
 NEGLIGIBLE = 0.05
 """Of the allowed probability: less of it is not looked at closely."""
@@ -68,7 +68,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result, stage: str) 
         for row, choice in enumerate(choices)
         for k, goal in enumerate(run.study.case(choice.case).kept)
         if verdicts.rare(goal, run.study.verification)
-        and true["standing"][row, k] == Standing.UNDECIDED
+        and true["verdict"][row, k] == Verdict.UNDECIDED
     ]
     many = verdicts.rivals(choices)
     found = probabilities(
@@ -176,8 +176,8 @@ def _enough(run: StudyRun, one: Failing, rate: Rare, many: int) -> bool:
     if (
         verdicts.of_interval(
             one.goal, _goal_value(_interval(one, rate, sure)), rate.f.size, sure
-        ).standing
-        is not Standing.UNDECIDED
+        ).verdict
+        is not Verdict.UNDECIDED
     ):
         return True
     return goals.accurate(

@@ -103,9 +103,10 @@ class StudyRun:
         return len(self.checkpoint.completed(0, count)) == count
 
     def write(
-        self, content: xr.Dataset, name: str, attributes: Mapping[str, str] | None = None
+        self, content: xr.Dataset, name: str = "", attributes: Mapping[str, str] | None = None
     ) -> None:
-        """Write a result file, with what made it; `attributes` where that differs from the study's."""
+        """Write a result file, called after its kind unless it has a name, with what made it; `attributes` where that differs
+        from the study's."""
         content.attrs.update(self.checkpoint.attributes | dict(attributes or {}))
         for variable in self.study.variables:
             own = content.get(variable.name)
@@ -114,7 +115,9 @@ class StudyRun:
             if own is not None and variable.silent:
                 own.attrs["of_random_inputs"] = ", ".join(variable.input_paths)
         with self.ranks.stage("results"), self.ranks.writing():
-            dataset.write(content, self.directory / name)
+            dataset.write(
+                content, self.directory / (name or f"{content.attrs['hpcclear_kind']}.nc")
+            )
 
     def write_samples(self) -> None:
         """Write samples.nc: all simulations so far, the points that surfaces and models are made of."""
@@ -132,4 +135,4 @@ class StudyRun:
             words=self.words,
             joints=self.scene.joint_labels,
         )
-        self.write(content, "samples.nc")
+        self.write(content)

@@ -111,7 +111,7 @@ def write(run: StudyRun, result: Result) -> None:
     content["clearance"].attrs.update(long_name=held.words, units=held.unit or "1")
     content.attrs["failed_simulations"] = int(result["failed"])
     content.attrs["inertias"] = "varied as the ratio to m L^2/12 where the study gives a ratio"
-    run.write(content, "sensitivity.nc")
+    run.write(content)
 
 
 def _designs(run: StudyRun) -> list[sensitivity.IntervalDesign]:

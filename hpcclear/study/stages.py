@@ -57,8 +57,8 @@ class Stage:
     """Whether a study of this scene has it."""
     words: Mapping[str, str] = field(default_factory=dict)
     """What to announce of it, by the names of its parts (without the number of a round); nothing: it is not counted."""
-    files: tuple[str, ...] = ()
-    """Results without which it is not finished."""
+    writes: tuple[str, ...] = ()
+    """Kinds of the result files without which it is not finished."""
     samples: Callable[[Scene], Mapping[str, int]] = lambda scene: {}
     """Samples on the ranks, by parts; 0 where it does not apply."""
     responses: Callable[[Scene], int] = lambda scene: 0
@@ -225,15 +225,15 @@ STAGES = (
     Stage(
         "effects", certificate.certify, needs=("extent",),
         applies=lambda scene: scene.required_study.certificate is not None,
-        words={"effects": "effect screening"}, files=("effects.nc",),
+        words={"effects": "effect screening"}, writes=("effects",),
     ),
     Stage(
         "sensitivity", _sensitivity, applies=lambda scene: bool(scene.required_study.groups),
-        words={"sensitivity": "sensitivity analysis"}, files=("sensitivity.nc",), samples=_of_sensitivity,
+        words={"sensitivity": "sensitivity analysis"}, writes=("sensitivity",), samples=_of_sensitivity,
     ),
     Stage(
         "surrogates", _surrogates,
-        words={"kriging": "surrogate models"}, files=("samples.nc", "kriging.nc"), samples=_of_surrogates,
+        words={"kriging": "surrogate models"}, writes=("samples", "kriging"), samples=_of_surrogates,
     ),
     Stage(
         "search", _search, needs=("surrogates",),
@@ -243,7 +243,7 @@ STAGES = (
             "infill": "adaptive refinement of the Pareto front",
             "edge": "search along constraints",
         },
-        files=("front.nc",), samples=_of_search,
+        writes=("front",), samples=_of_search,
     ),
     Stage(
         "verification", _verification, needs=("surrogates", "search"),
@@ -255,17 +255,17 @@ STAGES = (
         needs=("scene", "verification"), applies=_worn,
         words={"lives": "wear of the baseline and the best designs"}, samples=_of_lives,
     ),
-    Stage("front", _front, needs=("surrogates", "verification", "lives"), files=("verification.nc",)),
+    Stage("front", _front, needs=("surrogates", "verification", "lives"), writes=("verification",)),
     Stage(
         "contributions", lambda run, verified: contributions.write(run, verified.table.choices, verified.true),
-        needs=("verification",), files=("contributions.nc",),
+        needs=("verification",), writes=("contributions",),
     ),
     Stage(
         "worst", _worst, needs=("verification",), applies=lambda scene: scene.required_study.worst_case,
-        words={"worst": "worst case of the best designs"}, files=("worst.nc",),
+        words={"worst": "worst case of the best designs"}, writes=("worst",),
         samples=lambda scene: {"worst": worst.simulations(scene) if scene.required_study.worst_case else 0},
     ),
-    Stage("chaos", _chaos, needs=("verification",), files=("chaos.nc",), samples=_of_chaos),
+    Stage("chaos", _chaos, needs=("verification",), writes=("chaos",), samples=_of_chaos),
     Stage(
         "responses", _responses, needs=("verification",),
         words={"responses": "responses of the baseline and the best designs"},
@@ -274,10 +274,10 @@ STAGES = (
     Stage(
         "readings", lambda run: readings.write(run, run.stage("readings", readings.evaluate)), applies=readings.applies,
         words={"readings": "published designs under alternative interpretations"},
-        files=("readings.nc",), samples=_of_readings, responses=lambda scene: readings.simulations(scene)[1],
+        writes=("readings",), samples=_of_readings, responses=lambda scene: readings.simulations(scene)[1],
     ),
     Stage(
-        "claims", _claims, needs=("sensitivity", "surrogates", "responses"), applies=is_the_papers, files=("claims.nc",),
+        "claims", _claims, needs=("sensitivity", "surrogates", "responses"), applies=is_the_papers, writes=("claims",),
     ),
 )  # fmt: skip
 """In their order."""
@@ -290,7 +290,7 @@ def stages_of(scene: Scene) -> list[Stage]:
 
 def files_of(scene: Scene) -> list[str]:
     """Results without which a study of this scene is not finished; service lives are looked at by themselves."""
-    return [name for stage in stages_of(scene) for name in stage.files]
+    return [f"{kind}.nc" for stage in stages_of(scene) for kind in stage.writes]
 
 
 def carry_out(run: StudyRun, extent: Extent) -> None:

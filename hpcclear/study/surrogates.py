@@ -191,7 +191,7 @@ def write(run: StudyRun, result: Result, models: Sequence[Piecewise]) -> None:
     )
     if leaves[0][1].label and "surrogate" in content:
         content.attrs["title"] = f"Surrogates of the objective, {leaves[0][1].label}"
-    run.write(content, "kriging.nc")
+    run.write(content)
 
 
 def _label(model: Piecewise, family: str, leaf: Leaf) -> str:

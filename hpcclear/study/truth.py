@@ -316,7 +316,7 @@ def results_of(run: StudyRun, choices: Sequence[Choice], made: Sequence[Array]) 
         ``mean`` and ``deviation``, each with its ``_error`` (standard), ``_reach`` (half-width of the
         interval) and ``_shifts`` (n, replicates); ``percentile``, ``percentile_lower``, ``percentile_upper``;
         ``goal``, ``goal_lower``, ``goal_upper`` (n, objectives), ``goal_shifts`` (n, objectives, replicates): objectives,
-        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``taken`` (by the tolerance), ``counted``, ``standing``
+        then constraints, NaN beyond; ``sure_lower``, ``sure_upper``, ``taken`` (by the tolerance), ``counted``, ``verdict``
         and ``price`` (n, constraints): of `hpcclear.study.verdicts.decided`; ``excess`` (n,): of
         `hpcclear.study.goals.steered`; ``beyond`` (n, constraints): of `hpcclear.study.goals.beyond`; ``samples``, ``failed``,
         ``beyond_hertz``.

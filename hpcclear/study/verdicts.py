@@ -10,14 +10,12 @@ doi:10.1093/biomet/70.3.659). What is printed beside it is the usual interval of
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.report.figures.labels import between, quantity
-from hpcclear.report.merit import OPEN
+from hpcclear.base.verdict import Verdict
 from hpcclear.scene.cases import Case
 from hpcclear.scene.goals import Constraint
 from hpcclear.scene.stages import Verification
@@ -28,23 +26,10 @@ from hpcclear.study.optimisation import Choice
 from hpcclear.study.run import Result, StudyRun
 
 
-class Standing(IntEnum):
-    """How a design stands to a constraint, the best first."""
-
-    KEPT = 0
-    UNDECIDED = 1
-    BROKEN = 2
-
-    @property
-    def words(self) -> str:
-        """Its word in the files."""
-        return ("kept", "cannot be told", "broken")[self]
-
-
-class Verdict(NamedTuple):
+class Decision(NamedTuple):
     """A constraint of one design."""
 
-    standing: Standing
+    verdict: Verdict
     price: float
     """Simulations of the design that would decide; infinite where the error of the tolerance leaves it open, NaN where it is
     decided or the estimate lies on the threshold."""
@@ -72,10 +57,10 @@ def level(settings: Verification, many: int, simulations: int) -> float:
 def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
     """What is known of designs, with the verdicts on their constraints from ``sure_lower`` and ``sure_upper``.
 
-    ``counted`` are the simulations behind each constraint, ``taken`` what the tolerance takes of it. Added are ``standing``
-    (`Standing`) and ``price`` of `Verdict`, (n, constraints).
+    ``counted`` are the simulations behind each constraint, ``taken`` what the tolerance takes of it. Added are ``verdict``
+    and ``price`` of `Decision`, (n, constraints), NaN beyond those of a case.
     """
-    true["standing"], true["price"] = np.full((2, *true["sure_lower"].shape), np.nan)
+    true["verdict"], true["price"] = np.full((2, *true["sure_lower"].shape), np.nan)
     many = rivals(choices)
     for row, choice in enumerate(choices):
         case = run.study.case(choice.case)
@@ -86,7 +71,7 @@ def decided(run: StudyRun, choices: Sequence[Choice], true: Result) -> Result:
             interval = true["sure_lower"][row, k], true["sure_upper"][row, k]
             one, taken = GoalValue(value, *interval, _NOTHING), true["taken"][row, k]
             found = of_interval(goal, one, simulations, sure, taken)
-            true["standing"][row, k], true["price"][row, k] = found
+            true["verdict"][row, k], true["price"][row, k] = found
     return true
 
 
@@ -95,14 +80,14 @@ _NOTHING = np.empty(0)
 
 def of_interval(
     goal: Constraint, one: GoalValue, simulations: int, confidence: float, taken: float = 0.0
-) -> Verdict:
+) -> Decision:
     """How a design stands to a constraint, from an interval at a two-sided confidence by so many simulations, and its price.
     `taken` is the part of the half-width that more simulations leave."""
     if one.upper <= goal.most:
-        return Verdict(Standing.KEPT, np.nan)
+        return Decision(Verdict.HOLDS, np.nan)
     if one.lower > goal.most:
-        return Verdict(Standing.BROKEN, np.nan)
-    return Verdict(Standing.UNDECIDED, _price(goal, one, simulations, confidence, taken))
+        return Decision(Verdict.FAILS, np.nan)
+    return Decision(Verdict.UNDECIDED, _price(goal, one, simulations, confidence, taken))
 
 
 def _price(
@@ -192,32 +177,4 @@ def settled(
     count = values[0].size if values.ndim == 3 else values.size
     sure = level(settings, many, count)
     one = goals.goal_value(goal, values, choice.design, sure)
-    return of_interval(goal, one, count, sure).standing is not Standing.UNDECIDED
-
-
-def words(case: Case, unit: str, values: Sequence[Array], standings: Array, prices: Array) -> str:
-    """How a design stands to its constraints: "share with f above 0.3 mm 0.012 (95 % CI 0.01 to 0.014) at most 0.05: kept".
-
-    Parameters
-    ----------
-    unit : str
-        Of f.
-    values : sequence of arrays, shape (objectives,)
-        Values, lower and upper ends of the intervals of what its case makes small and, behind these, of its constraints.
-    standings, prices : array, shape (constraints,)
-    """
-    texts = []
-    rows = zip(
-        case.kept, *(one[len(case.goals) :] for one in values), standings, prices, strict=False
-    )
-    for goal, value, low, high, standing, price in rows:
-        own = goal.unit(unit)
-        text = f"{goal.words(unit)} {quantity(value, own)}"
-        text += f" (95 % CI {between(low, high, own)})" if low < high else ""
-        text += f" at most {quantity(goal.most, own)}: {Standing(int(standing)).words}"
-        if np.isinf(price):
-            text += f" ({OPEN})"
-        elif np.isfinite(price):
-            text += f" (about {price:.0f} simulations would decide)"
-        texts.append(text)
-    return "; ".join(texts)
+    return of_interval(goal, one, count, sure).verdict is not Verdict.UNDECIDED

@@ -6,19 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.objectives import ORDINALS
-from hpcclear.report.merit import USUAL
+from hpcclear.base.objectives import ORDINALS, Usual
+from hpcclear.base.verdict import Verdict, best, together
+from hpcclear.report.constraints import ABSENT, worded
 from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study import verdicts
 from hpcclear.study.goals import excess, most_of, names_of, wanted
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.problem import problem_of
 from hpcclear.study.run import Result, StudyRun
-from hpcclear.study.verdicts import Standing
 
 ROUND_OFF = 1.0001
 """Half-width over the one requested up to which an accuracy is reached."""
@@ -79,8 +78,8 @@ class Table:
         Number of each in what was simulated.
     same_as : list of str
         The first design before it that it is statistically indistinguishable from; empty if there is none.
-    equivalent : list of str
-        All designs of its case that it is statistically indistinguishable from, separated by "; ".
+    equivalent : list of list of str
+        All designs of its case that it is statistically indistinguishable from.
     dominated : list of bool
         Whether another design of its case is significantly better in all that the case makes small.
     """
@@ -88,7 +87,7 @@ class Table:
     choices: list[Choice]
     rows: list[int]
     same_as: list[str]
-    equivalent: list[str]
+    equivalent: list[list[str]]
     dominated: list[bool]
 
 
@@ -122,7 +121,8 @@ def _name_case(
     ours = [k for k, row in enumerate(rows) if choices[row].origin == "search"]
     if kept:
         broken = _broken(case, true)[rows]
-        ours = _nearest(ours, true["standing"][rows, : len(kept)].max(axis=1), broken)
+        each = true["verdict"][rows, : len(kept)].astype(int).tolist()
+        ours = _nearest(ours, [together(one) for one in each], broken)
     mine = Compared(values[ours], shifts[:, ours], run.study.verification.confidence)
     known = mine.known.any()
     ends = [ours[mine.best(k)] for k in range(count)] if known else ours[:1] * count
@@ -143,19 +143,20 @@ def _name_case(
         table.choices.append(replace(choices[rows[k]], name=name))
         table.rows.append(rows[k])
         table.same_as.append(next((label for j, label in seen if everything.one[j, k]), ""))
-        alike = [label for j, label in named if everything.one[j, k] and label != name]
-        table.equivalent.append("; ".join(alike))
+        table.equivalent.append(
+            [label for j, label in named if everything.one[j, k] and label != name]
+        )
         table.dominated.append(bool(everything.beaten[k]))
         seen.append((k, name))
 
 
-def _nearest(rows: Sequence[int], standing: Array, broken: Array) -> list[int]:
+def _nearest(rows: Sequence[int], verdicts: Sequence[Verdict], broken: Array) -> list[int]:
     """Designs that significantly satisfy all constraints; if none does, those that may, first those whose estimates do; else
-    the nearest one. `standing`, `broken`: the worst standing and excess of all designs, (n,)."""
-    best = min((standing[k] for k in rows), default=np.nan)
-    level = [k for k in rows if standing[k] == best]
-    if best == Standing.KEPT or not level:
-        return level or list(rows)
+    the nearest one. `verdicts`, `broken`: on all constraints, and the excess, of all designs, (n,)."""
+    found, have = best([verdicts[k] for k in rows])
+    level = [k for k, has in zip(rows, have, strict=True) if has]
+    if found is Verdict.HOLDS:
+        return level
     within = [k for k in level if broken[k] <= 0.0]
     return within or [min(level, key=lambda k: float(broken[k]))]
 
@@ -185,18 +186,44 @@ def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
         there = np.array([goal is not None for goal in asked])
         data[f"{name}_goal"] = np.array([goal.words(unit) if goal else "" for goal in asked])
         data[f"{name}_unit"] = np.array([goal.unit(unit) if goal else "" for goal in asked])
+        data[f"{name}_usual"] = np.array(
+            [goal.usual if goal else Usual.OTHER for goal in asked], np.int8
+        )
         for end in ("", "_lower", "_upper"):  # behind what a case makes small stand its constraints
             values = true[f"goal{end}"][:, column]
             data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
-    table_of_intervals = [true[f"goal{end}"] for end in ("", "_lower", "_upper")]
-    rows = zip(
-        cases, zip(*table_of_intervals, strict=True), true["standing"], true["price"], strict=True
-    )
-    data["constraints"] = np.array([verdicts.words(case, unit, *row) for case, *row in rows])
+    data["constraints"] = np.full(len(cases), "")
     if any(case.kept for case in cases):
         each = {case.name: _broken(case, true) for case in cases}
         found = np.array([each[case.name][row] for row, case in enumerate(cases)])
         data["constraint_excess"] = np.where(np.isneginf(found), np.nan, found)
+        data |= _constraints(cases, unit, true)
+    return data
+
+
+def _constraints(cases: Sequence[Case], unit: str, true: Result) -> dict[str, Array]:
+    """Values of the constraints of the cases of designs (n,) with confidence intervals, and the verdicts on them."""
+    many = max(len(case.kept) for case in cases)
+    rows = [[*case.kept, *[None] * (many - len(case.kept))] for case in cases]
+    data = {
+        "constraint_goal": np.array(
+            [[one.words(unit) if one else "" for one in row] for row in rows]
+        ),
+        "constraint_unit": np.array(
+            [[one.unit(unit) if one else "" for one in row] for row in rows]
+        ),
+        "constraint_most": np.array([[one.most if one else np.nan for one in row] for row in rows]),
+        "constraint_price": true["price"][:, :many],
+        "constraint_verdict": np.where(
+            np.isnan(true["verdict"][:, :many]), ABSENT, true["verdict"][:, :many]
+        ).astype(np.int8),
+    }
+    for end in ("", "_lower", "_upper"):  # they stand behind what a case makes small
+        values = np.full((len(rows), many), np.nan)
+        for row, case in enumerate(cases):
+            first = len(case.goals)
+            values[row, : len(case.kept)] = true[f"goal{end}"][row, first : first + len(case.kept)]
+        data[f"constraint{end or '_true'}"] = values
     return data
 
 
@@ -217,7 +244,7 @@ def _missed(run: StudyRun, table: Table, true: Result) -> Array:
             ("standard deviation", true["deviation_reach"][k] / true["deviation"][k], accuracy.deviation),
         ]  # fmt: skip
         for column, goal in enumerate(run.study.case(choice.case).goals):
-            if goal.exact or goal.words(unit) in USUAL[:2]:
+            if goal.exact or goal.usual in (Usual.MEAN, Usual.DEVIATION):
                 continue
             half = (true["goal_upper"][k, column] - true["goal_lower"][k, column]) / 2.0
             share, relative = wanted(goal, accuracy)
@@ -288,7 +315,9 @@ def write(
     if true["rare_samples"].any():
         data["rare_samples"] = true["rare_samples"].astype(np.int64)
     data["same_as"] = np.array(table.same_as)
-    data["equivalent"] = np.array(table.equivalent)
+    names = np.array([choice.name for choice in choices])
+    data["equivalent"] = np.array(["; ".join(alike) for alike in table.equivalent])
+    data["equivalence"] = np.array([np.isin(names, alike) for alike in table.equivalent], np.int8)
     if study.paired:
         data["accuracy_missed"] = _missed(run, table, true)
     data["dominated"] = np.array(table.dominated, np.int8)
@@ -296,18 +325,23 @@ def write(
     data["on_bounds"] = np.array([_on_bounds(run, choice) for choice in choices])
     data |= _goals(run, table, true)
     units = {name: study.variable(name).unit or "1" for name in used}
-    coords = {"design": np.array([choice.name for choice in choices])}
+    coords = {"design": names, "rival": names}
+    if "constraint_verdict" in data:
+        coords["constraint"] = np.arange(data["constraint_verdict"].shape[1])
     content = dataset.dataset(
         "verification", coords, data, None, units, run.scene.objective, run.words
     )
     if "first_goal" in content:
+        each = (content.isel(design=row) for row in range(len(names)))
+        texts = np.array(["; ".join(worded(one)) for one in each])
+        content["constraints"] = content["constraints"].copy(data=texts)
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
-        for name in ("same_as", "equivalent", "dominated"):
+        for name in ("same_as", "equivalent", "equivalence", "dominated"):
             words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence
     content.attrs["method"] = "qmc" if study.verification.draws is None else "monte-carlo"
     content.attrs["remarks"] = " ".join(remarks) if remarks else "none"
-    run.write(content, "verification.nc")
+    run.write(content)

@@ -157,4 +157,4 @@ def write(run: StudyRun, choices: Sequence[Choice], found: Result) -> None:
     data["input_unit"] = np.array([run.scene.unit(row.paths[0]) for row in rows])
     coords = {"design": np.array([one.name for one in choices]), "input": np.array(names)}
     content = dataset.dataset("worst", coords, data, objective=run.scene.objective)
-    run.write(content, "worst.nc")
+    run.write(content)

@@ -9,6 +9,7 @@ import xarray as xr
 
 from hpcclear.report import targets
 from hpcclear.report.figures import labels, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -385,6 +386,27 @@ FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
     "parallel": parallel_figure,
 }
 """The figures of a dataset, by the name of their file."""
+
+_CAPTIONS = {
+    "spending": "Error of a steady mean against run time, by tolerance, and the bias of each tolerance.",
+    "integration": "Error of one revolution against run time and force evaluations, by integrator.",
+    "averaging": "Error of f against averaged revolutions, by transient.",
+    "surrogate": "Accuracy of the surrogates against training samples.",
+    "random_inputs": "Error of mean and standard deviation against Monte Carlo samples.",
+    "parallel": "Speed-up on the available ranks, and time lost.",
+}
+
+
+def _total_caption(found: xr.Dataset) -> str:
+    return f"Total error of f of one design against core time. {targets.caption(found)}"
+
+
+PARTS = tuple(
+    FigureOf(
+        "accuracy", f"accuracy-{name.replace('_', '-')}", draw, _CAPTIONS.get(name, _total_caption), k, apart=True
+    )
+    for k, (name, draw) in enumerate(FIGURES.items())
+)  # fmt: skip
 
 MAIN = {
     "total": ("spent_error", "averaging_error"),

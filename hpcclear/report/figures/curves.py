@@ -9,6 +9,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces, level, periodic
 from hpcclear.report.figures import labels, style
+from hpcclear.report.parts import FigureOf
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.planar import turns_of
@@ -115,3 +116,10 @@ def _drawn(curve: Pieces) -> tuple[Array, Array]:
     last = np.nextafter(1.0, 0.0)
     places = np.append(share, last) * curve.length
     return places, curve.at(places)
+
+
+PARTS = (
+    FigureOf(
+        "response", "tables", tables_figure, "tables of the scene, as they are simulated", 100
+    ),
+)

@@ -11,6 +11,7 @@ import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,16 +78,23 @@ _GREEK = "αβγδε"
 _SIDES = ((4, 3), (4, -9), (12, 3), (12, -9), (20, 3))
 """Where letters stand right of their marks, points; of three and more, left of marks in the right half of a panel."""
 
-_MOMENTS = ("mean of f", "deviation of f")
 _LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"standard deviation $\sigma_f$"))
 
 
 def _goals(one: xr.Dataset) -> list[_Goal]:
     """What a case makes small, from its part of the fronts."""
-    asked = str(one["searched"].item()).split(", ") if "searched" in one else []
-    if len(asked) < 2 or tuple(asked) == _MOMENTS:
+    asked = searched(one)
+    if len(asked) < 2:
         return [_moment(one, *row) for row in _LETTERS]
-    return [_asked(one, words, name) for words, name in zip(asked, ORDINALS, strict=False)]
+    return [_asked(one, name, *row) for name, row in asked.items()]
+
+
+def searched(one: xr.Dataset) -> dict[str, tuple[str, str]]:
+    """Words and unit of what a case makes small, from its part of the fronts (kind ``front``), by the variable; none where that
+    is mean and standard deviation."""
+    names = [f"searched_{name}" for name in ORDINALS if f"searched_{name}_goal" in one]
+    every = {n: (str(one[f"{n}_goal"].item()), str(one[f"{n}_unit"].item())) for n in names}
+    return {name: row for name, row in every.items() if row[0]}
 
 
 def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
@@ -94,18 +102,14 @@ def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
     return _Goal(unit.label(words), name, name, unit)
 
 
-def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
-    """One of them, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
-    values = one[f"searched_{name}"]
-    words = labels.statistic(words)
-    of_f = words.endswith(" of f")
-    unit = labels.scale(str(one["mean"].attrs.get("units", "1")) if of_f else "1", values)
-    share = words.startswith("probability ")
+def _asked(one: xr.Dataset, name: str, words: str, unit: str) -> _Goal:
+    """One of them: a formula of the user has no unit."""
+    scale = labels.scale(unit or "1", one[name])
     if len(words) > 2 * NARROW:
         words = f"{words[: 2 * NARROW - 6].rstrip()} …"
-    label = unit.label(words) if of_f or share else f"{words} (SI)"
+    label = scale.label(words) if unit else f"{words} (SI)"
     label = textwrap.fill(labels.literal(label), NARROW)
-    return _Goal(label, f"searched_{name}", name, unit)
+    return _Goal(label, name, name.removeprefix("searched_"), scale)
 
 
 def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
@@ -287,3 +291,12 @@ def end_of(name: str) -> str:
     """Which end of a front a design is by its name: "alpha", "beta" and so on; "" for none."""
     words = re.split(r"[\s_.,-]+", name)
     return next((word for word in reversed(words) if word in ENDS), "")
+
+
+PARTS = (
+    FigureOf(
+        "front", "front", front_figure,
+        "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs.",
+        beside="verification",
+    ),
+)  # fmt: skip

@@ -8,8 +8,10 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.student import student
+from hpcclear.base.verdict import Verdict
 from hpcclear.report.figures import labels, style
-from hpcclear.results.names import ALL_ON, SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
+from hpcclear.report.parts import FigureOf
+from hpcclear.results.names import ALL_ON, SECONDS_BY_ROUND
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,12 +70,8 @@ class Saving(NamedTuple):
 
 def seconds_of(timing: xr.Dataset | None) -> Times:
     """Processor times of a sample of each variant; empty where they were not measured."""
-    attrs = {} if timing is None else timing.attrs
-    if SECONDS_BY_ROUND in attrs:
-        found: Times = json.loads(attrs[SECONDS_BY_ROUND])
-        return found
-    once = json.loads(attrs.get(SECONDS_PER_SAMPLE, "{}"))  # of an earlier version
-    return {name: [value] for name, value in once.items()}
+    found: Times = json.loads("{}" if timing is None else timing.attrs.get(SECONDS_BY_ROUND, "{}"))
+    return found
 
 
 def saving(content: xr.Dataset, variant: int, seconds: Times) -> Saving:
@@ -116,13 +114,13 @@ def statement(content: xr.Dataset, variant: int, seconds: Times) -> str:
 def _verdict(one: xr.Dataset, tolerance: float) -> str:
     """What a single variant's changes come to, as the end of its sentence."""
     counted, found = one["judged"].to_numpy() == 1, one["finding"].to_numpy()
-    if int(one["decision"]) == 0:
+    if int(one["decision"]) == Verdict.HOLDS:
         return ""
-    if int(one["decision"]) == 1:
-        worst = one["response"].to_numpy()[counted & (found == 1)][0]
+    if int(one["decision"]) == Verdict.FAILS:
+        worst = one["response"].to_numpy()[counted & (found == Verdict.FAILS)][0]
         worst = "standard deviation" if worst == "deviation" else worst
-        return "; needed" if found[0] == 1 else f"; needed for the {worst}"
-    open_ = counted & (found == 2)
+        return "; needed" if found[0] == Verdict.FAILS else f"; needed for the {worst}"
+    open_ = counted & (found == Verdict.UNDECIDED)
     room = tolerance - np.abs(one["change"].to_numpy()[open_])
     count = int(one["samples"])
     if np.isnan(room).any():
@@ -237,3 +235,6 @@ def _wrapped(names: list[str], recommended: bool) -> str:
     """A label of few words a line, marked if it is what is recommended."""
     lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
     return "\n".join(lines) + (" (left out)" if recommended else "")
+
+
+PARTS = (FigureOf("effects", "effects", effects_figure, caption, beside="timing"),)

@@ -1,11 +1,14 @@
 """How well surrogates fit: R2 on test points, and words for those that do not."""
 
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures import style
+from hpcclear.report.parts import LinesOf, Recommended
+from hpcclear.report.spread import Line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,6 +50,30 @@ def warnings(kind: str, content: xr.Dataset | None) -> list[str]:
         for name, r2 in known(content).items()
         if (text := verdict(r2))
     ]
+
+
+def captioned(kind: str, caption: str) -> Callable[[xr.Dataset], str]:
+    """Return what makes the caption of a figure of surrogates: behind its words, those that do not fit."""
+
+    def of(content: xr.Dataset) -> str:
+        found = warnings(kind, content)
+        return f"{caption} Warning: {'; '.join(found)}." if found else caption
+
+    return of
+
+
+def _poor(of: Recommended) -> Iterator[Line]:
+    """Surrogates that do not fit, a sentence for each kind of them."""
+    for kind, what in (
+        ("sensitivity", "sensitivities by slopes"),
+        ("kriging", "the search began there"),
+    ):
+        if found := warnings(kind, of.files.get(kind)):
+            text = f"{'; '.join(found)} ({what}); simulated values do not depend on surrogates"
+            yield Line("warning", text)
+
+
+PARTS = (LinesOf(50, ("sensitivity", "kriging"), _poor),)
 
 
 def mark(axes: "Axes", r2: float, height: float = 0.5) -> None:

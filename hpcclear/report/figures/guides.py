@@ -8,6 +8,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,3 +94,10 @@ def _corners(panel: "Axes", shown: xr.Dataset, turn: Array) -> None:
     panel.set_yticks(range(len(rows)), [label.replace("_", " ") for label in rows])
     panel.set_ylim(len(rows) - 0.5, -0.5)
     panel.set_title("corners in contact")
+
+
+PARTS = (
+    FigureOf(
+        "response", "guide", guide_figure, "offset, tilt and contacts in guides", 40, along="guide"
+    ),
+)

@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,3 +123,18 @@ def growth_figure(content: xr.Dataset) -> "Figure":
         panel.legend(loc="best")
     style.settle(axes)
     return figure
+
+
+PARTS = (
+    FigureOf(
+        "identify", "posterior", posterior_figure, "Posterior of each unknown with its calibrated 95 % interval."
+    ),
+    FigureOf(
+        "identify", "features", features_figure,
+        "Measured less predicted features of the last record, in standard deviations of the prediction.", 1,
+    ),
+    FigureOf(
+        "identify", "growth", growth_figure,
+        "Unknowns over the dates of the records, with 95 % intervals and the median rate.", 2,
+    ),
+)  # fmt: skip

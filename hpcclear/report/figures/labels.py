@@ -157,12 +157,6 @@ def objective(content: Results) -> str:
     return str(content.attrs.get("objective", MEAN_GAP.words))
 
 
-def statistic(words: str) -> str:
-    """A statistic of f as files name it, in the words that are printed."""
-    words = re.sub(r"^deviation of f", "standard deviation of f", words)
-    return re.sub(r"^share with f above", "probability of f above", words)
-
-
 def design_variables(content: xr.Dataset) -> list[xr.DataArray]:
     """The design variables of a dataset in its order."""
     return [v for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"]

@@ -13,6 +13,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.figures.varied import RPM, varied
+from hpcclear.report.parts import FigureOf
 from hpcclear.results.grids import grid
 
 if TYPE_CHECKING:
@@ -185,3 +186,15 @@ def _dots(panel: "Axes", x: Array, values: Array, units: str, words: str) -> Non
     y = values * unit.factor
     panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"], rasterized=len(x) > 5000)
     panel.set_ylabel("\n".join(textwrap.wrap(unit.label(words), 30)))
+
+
+PARTS = (
+    FigureOf(
+        "map", "map", map_figure,
+        "Largest Lyapunov exponent, period and regime of each cell of the map; along a line also f with its 95 % CI.",
+    ),
+    FigureOf(
+        "bifurcation", "bifurcation", bifurcation_figure,
+        "One value for each revolution against the varied entry: n dots where the motion repeats every n revolutions.",
+    ),
+)  # fmt: skip

@@ -8,6 +8,7 @@ import xarray as xr
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.noise import band_name
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,3 +83,6 @@ def _forces(
         if float(own[-1].max()) > 0.0:
             found[joint.replace("_", " ")] = own
     return found  # type: ignore[return-value]
+
+
+PARTS = (FigureOf("response", "noise", noise_figure, "force levels and orders", 80, along="band"),)

@@ -6,7 +6,9 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -245,3 +247,29 @@ def _equal(axes: "Axes", unit: labels.Scale, reach: float | None = None) -> None
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_xlabel(unit.label("eccentricity x"))
     axes.set_ylabel(unit.label("eccentricity y"))
+
+
+CROSSINGS = 200
+"""Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
+
+
+def section_figure(found: xr.Dataset) -> "Figure":
+    """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
+    count = motion.whole_turns(found) - int(found.attrs.get("transient_turns", 0))
+    if count < CROSSINGS:
+        reason = f"a Poincaré section takes at least {CROSSINGS} revolutions"
+        remedy = f"Simulate with --set numerics.averaged_revolutions={CROSSINGS}"
+        raise InputError("revolutions", count, reason, remedy)
+    return poincare_figure(found, revolutions=count)
+
+
+PARTS = (
+    FigureOf(
+        "response", "orbit", orbit_figure, "journal-centre orbits in the clearance circle", 10
+    ),
+    FigureOf(
+        "response", "force-direction", force_polar_figure, "contact force by its direction", 20
+    ),
+    FigureOf("response", "phase", phase_figure, "phase portraits", 50),
+    FigureOf("response", "poincare", section_figure, "Poincaré section, once a revolution", 60),
+)

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -154,3 +155,10 @@ def energy_figure(response: xr.Dataset) -> "Figure":
     axes[2, 0].set_xlabel(motion.turns_label(response))
     style.settle(axes)
     return figure
+
+
+PARTS = (
+    FigureOf("response", "penetration", penetration_figure, "penetration", 30),
+    FigureOf("response", "spectrum", spectrum_figure, "spectra", 70),
+    FigureOf("response", "energy", energy_figure, "energy balance", 90),
+)

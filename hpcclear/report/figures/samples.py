@@ -8,6 +8,7 @@ import xarray as xr
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
+from hpcclear.report.parts import FigureOf
 from hpcclear.results.names import DESIGN_VARIABLES
 
 if TYPE_CHECKING:
@@ -188,3 +189,11 @@ def _marks(samples: xr.Dataset) -> list[Any]:
     if bool((samples["status"] != 0).any()):
         marks.append(Line2D([], [], color="black", marker="x", ms=4, ls="none", label="failed"))
     return marks
+
+
+PARTS = (
+    FigureOf(
+        "samples", "samples", samples_figure,
+        "Objective against each design variable, its cycle-to-cycle standard deviation and histogram.",
+    ),
+)  # fmt: skip

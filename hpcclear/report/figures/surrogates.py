@@ -8,6 +8,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import fits, labels, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -298,3 +299,38 @@ def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:
     for k in range(max(used - columns, 0), used):
         axes.flat[k].set_xlabel(label)
         axes.flat[k].tick_params(labelbottom=True)
+
+
+PARTS = (
+    FigureOf(
+        "sensitivity", "sensitivities", sensitivity_figure,
+        fits.captioned(
+            "sensitivity",
+            "First-order sensitivities against clearance, with two standard errors. Lines: from the full ranges. Marks: "
+            "from the ranges at which they converged.",
+        ),
+    ),
+    FigureOf(
+        "sensitivity", "sobol", sobol_figure,
+        "Global sensitivities with two standard errors: first-order Sobol indices (each variable alone) and total "
+        "indices (with interactions; their sum may exceed 1).", 1,
+    ),
+    FigureOf(
+        "sensitivity", "surface-fit", fit_figure,
+        fits.captioned(
+            "sensitivity", "Fit of the response surfaces on test points, against clearance and length of the ranges."
+        ), 2,
+    ),
+    FigureOf(
+        "kriging", "surrogates", surfaces_figure,
+        fits.captioned(
+            "kriging", "Objective by Kriging over pairs of design variables, at the smallest and the largest clearance."
+        ),
+    ),
+    FigureOf(
+        "kriging", "parity", parity_figure,
+        fits.captioned(
+            "kriging", "Surrogate against simulation: leave-one-out predictions; R² on test points."
+        ), 1,
+    ),
+)  # fmt: skip

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.report.figures import labels, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,3 +47,10 @@ def timing_figure(timing: xr.Dataset) -> "Figure":
     figure.legend(handles, words, loc="outside lower center", ncols=4, columnspacing=1.0)
     style.settle(axes)
     return figure
+
+
+PARTS = (
+    FigureOf(
+        "timing", "timing", timing_figure, "Time of the ranks, by rank and by stage.", apart=True
+    ),
+)

@@ -7,6 +7,7 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
+from hpcclear.report.parts import FigureOf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -151,3 +152,18 @@ def profile_figure(wear: xr.Dataset) -> "Figure":
         handles, words = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, words, title="revolutions", loc="outside lower center", ncols=AGES)
     return figure
+
+
+PARTS = (
+    FigureOf(
+        "wear", "wear", fan_figure,
+        "Clearance and objective over the service life: median, 50 % and 90 % bands; individual runs in grey.",
+    ),
+    FigureOf(
+        "wear", "survival", survival_figure, "Survival, with 95 % confidence interval (Clopper and Pearson).", 1
+    ),
+    FigureOf(
+        "wear", "wear-profile", profile_figure,
+        "Depth of wear around bearings and journals, at several ages (medians over all runs).", 2,
+    ),
+)  # fmt: skip

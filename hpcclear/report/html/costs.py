@@ -8,18 +8,9 @@ from hpcclear.report.figures import accuracy as figures
 from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, folded
+from hpcclear.report.parts import SectionOf
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
-
-
-_CAPTIONS = {
-    "spending": "Error of a steady mean against run time, by tolerance, and the bias of each tolerance.",
-    "integration": "Error of one revolution against run time and force evaluations, by integrator.",
-    "averaging": "Error of f against averaged revolutions, by transient.",
-    "surrogate": "Accuracy of the surrogates against training samples.",
-    "random_inputs": "Error of mean and standard deviation against Monte Carlo samples.",
-    "parallel": "Speed-up on the available ranks, and time lost.",
-}
 
 
 def accuracy(content: Content) -> list[object] | None:
@@ -38,17 +29,11 @@ def accuracy(content: Content) -> list[object] | None:
         "Errors of the other approximations, and their run time",
     )
     note = "Errors are relative to references with much tighter settings. Times are those of one core of this machine."
-    total = gallery.picture(
-        figures.total_figure,
-        found,
-        f"Total error of f of one design against core time. {targets.caption(found)}",
+    total, *drawn, ranks = (
+        gallery.picture(one.draw, found, one.captioned({"accuracy": found}))
+        for one in figures.PARTS
     )
-    drawn = {
-        name: gallery.picture(figures.FIGURES[name], found, caption)
-        for name, caption in _CAPTIONS.items()
-    }
-    ranks = drawn.pop("parallel")
-    sources: list[object] = [cheapest, others, *(one for one in drawn.values() if one)]
+    sources: list[object] = [cheapest, others, *(one for one in drawn if one)]
     return [
         *([total] if total else []),
         *targets.sentences(found),
@@ -141,3 +126,6 @@ def _moments(found: xr.Dataset) -> list[list[object]]:
 def _cells(error: float, seconds: float) -> tuple[Number, Number]:
     shown = f"{seconds:.3g} s" if seconds >= 0.1 else f"{1e3 * seconds:.3g} ms"
     return Number(f"{error:.1e}"), Number(shown)
+
+
+PARTS = (SectionOf(90, "accuracy", "Accuracy and run time", "parts.html", accuracy),)

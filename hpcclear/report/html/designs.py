@@ -1,19 +1,20 @@
-"""The page's section on designs: those that a reader compares, each once, then the rest folded; and those of a paper."""
+"""The page's section on designs: those that a reader compares, each once, then the rest folded."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ENDS, ORDINALS
+from hpcclear.base.objectives import ORDINALS
 from hpcclear.report import alike, beside
-from hpcclear.report.answer import constraints
+from hpcclear.report.constraints import worded
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
 from hpcclear.report.merit import is_plain
+from hpcclear.report.parts import SectionOf
 
-_SIMULATED = (
+SIMULATED = (
     ("mean_true", "mean of f"),
     ("deviation_true", "std. deviation of f"),
     ("percentile", "95th percentile of f"),
@@ -24,7 +25,6 @@ _PREDICTED = (
     ("mean_surrogate", "surrogate: mean"),
     ("deviation_surrogate", "surrogate: std. deviation"),
 )
-_PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. deviation"))
 """Variables of kind ``verification``, and the heads of their columns."""
 
 _WORDS = (
@@ -41,24 +41,24 @@ def designs(content: Content) -> dict[str, object] | None:
     shown = beside.roles(verified)
     named = [one.design for each in shown.values() for one in each]
     tables = [
-        _table(verified, {one.design: one.words for one in each}, _SIMULATED, caption)
+        table_of(verified, {one.design: one.words for one in each}, SIMULATED, caption)
         for case, each in shown.items()
         if each and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
     ]
     if not named:
         tables = [
-            _table(verified, {name: name for name in _names(verified)}, _SIMULATED, "Designs")
+            table_of(verified, {name: name for name in names_in(verified)}, SIMULATED, "Designs")
         ]
-    spread = [name for name in _names(verified) if " front " in name]
+    spread = [name for name in names_in(verified) if " front " in name]
     remarks = str(verified.attrs.get("remarks", "none"))
-    columns = (*_SIMULATED[:2], *_PREDICTED)
+    columns = (*SIMULATED[:2], *_PREDICTED)
     return {
         "words": [_WORDS.format(labels.objective(verified)), *_findings(verified)],
         "remarks": "" if remarks == "none" else remarks,
         "tables": tables,
         "variables": _variables(verified),
         "more": [
-            _table(
+            table_of(
                 verified, {name: name for name in rest}, columns, "Simulated and predicted values"
             )
         ]
@@ -77,27 +77,7 @@ def _variables(verified: xr.Dataset) -> str:
     return "; ".join(f"{name}: {words}" for name, words in known if words and words != name)
 
 
-def of_a_paper(content: Content) -> list[object]:
-    """Words and table of the designs that a publication prints, beside the optimised ones; nothing without any."""
-    verified = content.get("verification")
-    if verified is None or not content.is_compared:
-        return []
-    ends = [f"{case} {end}" for case in beside.roles(verified) for end in ENDS]
-    printed = [name for name in _names(verified) if labels.is_printed(verified.sel(design=name))]
-    names = [name for name in _names(verified) if name in ends or name in printed]
-    words = (
-        "Mean and standard deviation of f: by simulation with 95 % half-widths, and as the paper prints them in its Table 4. "
-        "The printed standard deviations match neither the standard deviation nor the variance of f in this model; "
-        "nothing was fitted to them."
-    )
-    columns = (*_SIMULATED[:2], *_PRINTED)
-    table = _table(
-        verified, {name: name for name in names}, columns, "Table 4: this study and the paper"
-    )
-    return [words, table]
-
-
-def _names(verified: xr.Dataset) -> list[str]:
+def names_in(verified: xr.Dataset) -> list[str]:
     return [str(name) for name in verified["design"].to_numpy()]
 
 
@@ -113,7 +93,7 @@ def _distinct(verified: xr.Dataset, names: Sequence[str]) -> list[str]:
 
 def _findings(verified: xr.Dataset) -> list[str]:
     """A sentence for the lowest mean and the lowest standard deviation of each case."""
-    by_name = {name: verified.sel(design=name) for name in _names(verified)}
+    by_name = {name: verified.sel(design=name) for name in names_in(verified)}
     words = []
     for name, one in by_name.items():
         case, _, letter = name.rpartition(" ")
@@ -140,7 +120,7 @@ def _within_intervals(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: 
     return " (or is statistically indistinguishable from the lowest)" if less else ""
 
 
-def _table(
+def table_of(
     verified: xr.Dataset,
     shown: Mapping[str, str],
     columns: Sequence[tuple[str, str]],
@@ -179,9 +159,9 @@ def _goals(one: xr.Dataset, names: Sequence[str]) -> list[object]:
     cells: list[object] = []
     for name in names:
         value = labels.quantity(float(one[f"{name}_true"]), str(one[f"{name}_unit"].item()))
-        words = labels.statistic(str(one[f"{name}_goal"].item()))
+        words = str(one[f"{name}_goal"].item())
         cells.append(f"{words}: {value}" if words else "")
-    return [*cells, "; ".join(constraints(one)) or "none"]
+    return [*cells, "; ".join(worded(one)) or "none"]
 
 
 def _cell(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
@@ -191,3 +171,6 @@ def _cell(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
         return number(value)
     half = 0.5 * (float(one[f"{word}_upper"]) - float(one[f"{word}_lower"])) * scale.factor
     return labels.paired(value, half) if np.isfinite([value, half]).all() else number(value)
+
+
+PARTS = (SectionOf(30, "designs", "Optimised designs", "designs.html", designs),)

@@ -10,34 +10,13 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
-from hpcclear.report.figures import (
-    catalogue,
-    designs,
-    effects,
-    fits,
-    labels,
-    motion,
-    response,
-    style,
-    surrogates,
-)
+from hpcclear.report.figures import catalogue, designs, labels, motion, response, style
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
+from hpcclear.report.parts import FigureOf, SectionOf, declared
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_FITS = (
-    surrogates.sensitivity_figure,
-    surrogates.fit_figure,
-    surrogates.surfaces_figure,
-    surrogates.parity_figure,
-)
-"""Figures of surrogates: the captions name those that do not fit."""
-
-
-_ELSEWHERE = ("timing", "accuracy")
-"""Kinds whose figures stand in sections of their own."""
 
 
 def figures(content: Content, troubles: list[str]) -> list[dict[str, str]] | None:
@@ -51,22 +30,10 @@ Maker = Callable[[], dict[str, str] | None]
 
 def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
     """Every figure that there may be: what it shows, and what makes its picture and caption."""
-    for one in catalogue.RESULTS:
-        if one.kind in _ELSEWHERE:
-            continue
-        fit = _warnings(one.kind, content.get(one.kind)) if one.draw in _FITS else ""
-        yield from _of_file(one.draw, content.get(one.kind), one.caption + fit)
-    certificate, times = content.get("effects"), content.get("timing")
-    if certificate is not None:
-        about = effects.caption(certificate, times)
-        yield about, lambda: _shown(effects.effects_figure(certificate, times), about)
-    front = content.get("front")
-    if front is not None:
-        verified = content.get("verification")
-        caption = (
-            "Pareto fronts of all runs as predicted by the surrogate, and the simulated designs."
-        )
-        yield caption, lambda: _shown(designs.front_figure(front, verified), caption)
+    for one in declared(FigureOf):
+        if one.kind in content.files and not one.apart:
+            about = one.captioned(content.files)
+            yield about, functools.partial(_tried, one.of(content.files), about)
     found = content.responses
     for first in range(0, len(ENDS), 2):  # two columns a picture
         pair = ENDS[first : first + 2]
@@ -79,9 +46,10 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
         of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
         if len(found) == 1:
             yield "response", lambda: _response_alone(found[name])
-        for one in catalogue.RESPONSE:
-            caption = of + one.caption
-            yield from _of_file(one.draw, found[name], f"{caption[0].upper()}{caption[1:]}.")
+        for one in catalogue.of_response(found[name]):
+            about = of + one.captioned({"response": found[name]})
+            about = f"{about[0].upper()}{about[1:]}."
+            yield about, functools.partial(picture, one.draw, found[name], about)
 
 
 def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
@@ -100,20 +68,6 @@ def _shown(figure: "Figure", caption: str) -> dict[str, str]:
     return {"png": picture, "caption": caption}
 
 
-def _of_file(
-    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset | None, caption: str
-) -> Iterator[tuple[str, Maker]]:
-    """A figure of one file, unless that is missing."""
-    if found is not None:
-        yield caption, functools.partial(picture, draw, found, caption)
-
-
-def _warnings(kind: str, content: xr.Dataset | None) -> str:
-    """Which surrogates do not fit, behind a caption."""
-    found = fits.warnings(kind, content)
-    return f" Warning: {'; '.join(found)}." if found else ""
-
-
 def _clearances(*responses: xr.Dataset) -> str:
     """At which clearances these were simulated, where that is the same for all."""
     parts = []
@@ -129,10 +83,17 @@ def picture(
     draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset, caption: str
 ) -> dict[str, str] | None:
     """Draw a figure of one file with its caption; None if the file has not what it needs (no Sobol indices, say)."""
+    return _tried(functools.partial(draw, found), caption)
+
+
+def _tried(draw: "Callable[[], Figure]", caption: str) -> dict[str, str] | None:
     try:
-        made = draw(found)
+        made = draw()
     except InputError as error:
         if error.key == "matplotlib":
             raise
         return None
     return _shown(made, caption)
+
+
+PARTS = (SectionOf(100, "figures", "Figures", "figures.html", figures, each=True, piecewise=True),)

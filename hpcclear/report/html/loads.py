@@ -10,6 +10,7 @@ from hpcclear.report.figures import labels
 from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, quantity
+from hpcclear.report.parts import SectionOf
 
 _NO_ANGLE = "A dash instead of an angle: the peak lies between two stored instants, and the stored force there is lower."
 
@@ -113,3 +114,6 @@ def _whole(name: str, found: xr.Dataset) -> list[object]:
         Number(shown),
         validity,
     ]
+
+
+PARTS = (SectionOf(60, "loads", "Loads of the bearings", "parts.html", loads),)

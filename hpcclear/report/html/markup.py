@@ -7,11 +7,14 @@ import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from typing import TYPE_CHECKING
 
-import jinja2
 import numpy as np
 
 from hpcclear.report.figures import labels
+
+if TYPE_CHECKING:
+    import jinja2
 
 
 class Number(str):
@@ -60,7 +63,9 @@ def render(template: str, **content: object) -> str:
 
 
 @functools.cache
-def _templates() -> jinja2.Environment:
+def _templates() -> "jinja2.Environment":
+    import jinja2  # once a page is written
+
     made = jinja2.Environment(
         loader=jinja2.FunctionLoader(_source),
         autoescape=True,

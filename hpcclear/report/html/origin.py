@@ -7,10 +7,11 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
-from hpcclear.report.figures.timing import timing_figure
+from hpcclear.report.figures import timing as figures
 from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, folded, number, preformatted
+from hpcclear.report.parts import SectionOf
 from hpcclear.scene.loading import parse
 from hpcclear.scene.paths import quantities
 
@@ -76,7 +77,9 @@ def timing(content: Content) -> list[object] | None:
         *_fared(content, found),
         Table(header, rows, "Time of each rank, all stages"),
     ]
-    picture = gallery.picture(timing_figure, found, "Time of the ranks, by rank and by stage.")
+    picture = gallery.picture(
+        figures.timing_figure, found, figures.PARTS[0].captioned({"timing": found})
+    )
     return [*parts, picture] if picture else parts
 
 
@@ -123,3 +126,10 @@ def reproduce(content: Content) -> list[object]:
     if rows:
         steps += [words, Table(["item", "value"], rows, "Origin of these files")]
     return steps
+
+
+PARTS = (
+    SectionOf(120, "effects", "Effects and settings", "parts.html", effects, each=True),
+    SectionOf(130, "reproduce", "How to reproduce", "parts.html", reproduce, each=True),
+    SectionOf(150, "time", "Run time of the ranks", "parts.html", timing, folded=True),
+)

@@ -4,30 +4,22 @@ import base64
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
 from hpcclear.report.answer import answer
-from hpcclear.report.html import costs, designs, gallery, loads, origin, picture, sections
+from hpcclear.report.html import picture, sections
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.html.markup import Section, render
+from hpcclear.report.parts import SectionOf, declared
 from hpcclear.results import files
+from hpcclear.results.names import KINDS
 
 NAME = "report.html"
 _MARK = b'<meta name="generator" content="hpcclear">'  # also stands in the template
-
-_MISSING = {
-    "samples": "samples.nc: no design was sampled (`hpcclear sample` or `run`)",
-    "sensitivity": "sensitivity.nc: no sensitivities (`hpcclear run` of a study with `study.sensitivity.groups`)",
-    "kriging": "kriging.nc: no surrogate (`hpcclear run`)",
-    "front": "front.nc: nothing was optimised (`hpcclear run`)",
-    "verification": "verification.nc: no design was verified (`hpcclear run`)",
-    "accuracy": "accuracy.nc: the cost of accuracy was not measured (`hpcclear accuracy`)",
-    "timing": "timing.nc: the time of the ranks is not known",
-}
 
 
 def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
@@ -118,32 +110,13 @@ def _sections(
     if content.samples:
         yield from _several(content, troubles)
         content = replace(content, files={})
-    drawn = functools.partial(gallery.figures, troubles=troubles)
-    makers: tuple[tuple[str, str, str, Callable[[Content], object]], ...] = (
-        ("answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
-        ("identify", "Identified machine", "parts.html", sections.identified_machine),
-        ("designs", "Optimised designs", "designs.html", designs.designs),
-        ("pareto", "Pareto front", "pareto.html", lambda one: picture.front(one)["points"] or None),
-        ("statistics", "Statistics of the samples", "parts.html", sections.statistics),
-        ("loads", "Loads of the bearings", "parts.html", loads.loads),
-        ("summary", "Summary", "summary.html", sections.summary),
-        ("motion", "Animation", "motion.html", lambda one: one.responses or None),
-        ("accuracy", "Accuracy and run time", "parts.html", costs.accuracy),
-        ("figures", "Figures", "figures.html", drawn),
-        ("trust", "Data quality", "parts.html", sections.trust),
-        ("effects", "Effects and settings", "parts.html", origin.effects),
-        ("reproduce", "How to reproduce", "parts.html", origin.reproduce),
-        ("paper", "Comparison with the paper", "parts.html", _paper),
-        ("time", "Run time of the ranks", "parts.html", origin.timing),
-    )
-    for name, title, template, make in makers:
-        if wanted is not None and name not in wanted:
+    for part in declared(SectionOf):
+        if wanted is not None and part.name not in wanted:
             continue
-        if content.samples and (name in _OF_SAMPLES or not content.responses):
+        if content.samples and (part.of_samples or not content.responses):
             continue
-        # figures are limited one by one
-        section = functools.partial(_section, name, title, template, make, content)
-        made = section() if name == "figures" else attempt(f"“{title}”", section, troubles)
+        section = functools.partial(_section, part, content, troubles)
+        made = section() if part.piecewise else attempt(f"“{part.title}”", section, troubles)
         if made is not None:
             yield made
     yield Section("missing", "Results not available", "list.html", _missing(content, troubles))
@@ -151,19 +124,18 @@ def _sections(
 
 MOST_DRAWN = 4
 """Files of samples whose own figures stand on a page: each takes a second and up to 1 MB."""
-_OF_SAMPLES = ("statistics", "summary", "trust")
-"""Sections on samples alone."""
-_EACH = (*_OF_SAMPLES, "figures", "effects", "reproduce")
-"""Sections that each of several samples has by itself."""
 
 
 def _several(content: Content, troubles: list[str]) -> Iterator[Section]:
     """The comparison of several samples, then the sections of each, which name its file."""
-    yield _section("comparison", "Comparison", "parts.html", sections.compared, content)
+    comparison = SectionOf(0, "comparison", "Comparison", "parts.html", sections.compared)
+    yield _section(comparison, content, troubles)
     drawn = len(content.samples) <= MOST_DRAWN
     if not drawn:
         yield Section("figures", "Figures of single files", "parts.html", _on_demand(content))
-    each = [name for name in _EACH if drawn or name != "figures"]
+    each = [
+        one.name for one in declared(SectionOf) if one.each and (drawn or one.name != "figures")
+    ]
     for k, (name, one) in enumerate(content.each_of_samples(), 1):
         for section in _sections(one, troubles, each):
             if section.name in each:
@@ -182,35 +154,33 @@ def _on_demand(content: Content) -> list[object]:
     ]
 
 
-_FOLDED = ("paper", "time")
-"""Sections that few readers need."""
-
-
-def _paper(content: Content) -> list[object] | None:
-    """The paper's claims, its designs and how its text can be read; None for a study of another scene."""
-    parts = [sections.claims(content), designs.of_a_paper(content), sections.readings(content)]
-    return [one for part in parts for one in part or ()] or None
-
-
-def _section(
-    name: str, title: str, template: str, make: Callable[[Content], object], content: Content
-) -> Section:
+def _section(part: SectionOf, content: Content, troubles: list[str]) -> Section:
     """A section whose content its template can show, which is tried."""
-    section = Section(name, title, template, make(content), name in _FOLDED)
+    made = part.content(content, troubles)
+    section = Section(part.name, part.title, part.template, made, part.folded)
     if section.content is not None:
-        render(template, content=section.content)
+        render(part.template, content=section.content)
     return section
 
 
 def _missing(content: Content, troubles: list[str]) -> list[str] | None:
     if not content.whole or not set(content.files) - {"timing"}:
         return troubles or None
-    for kind in ("accuracy", "wear", "effects", "map", "bifurcation", "identify"):
-        if set(content.files) <= {kind, "timing"} and kind in content.files:
-            return troubles or None  # a directory of that command lacks nothing
-    words = [text for kind, text in _MISSING.items() if content.get(kind) is None]
+    kinds = set(content.files) - {"timing"}
+    if len(kinds) == 1 and all(kind not in KINDS or KINDS[kind].alone for kind in kinds):
+        return troubles or None  # a directory of that command lacks nothing
+    words = [
+        f"{name}.nc: {kind.absent}"
+        for name, kind in KINDS.items()
+        if kind.absent and content.get(name) is None
+    ]
     if not content.responses:
         words.append(
             "responses/: no response was stored, so there is no animation (`hpcclear simulate` or `run`)"
         )
     return [*troubles, *words] or None
+
+
+PARTS = (
+    SectionOf(10, "answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
+)

@@ -6,18 +6,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from hpcclear.base.objectives import ORDINALS
+from hpcclear.base.objectives import Usual
 from hpcclear.report.figures import labels, motion, moving
+from hpcclear.report.figures.designs import searched
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
-from hpcclear.report.merit import goals_of, leading_goals, recommended
+from hpcclear.report.merit import goals_of, leading_goals, recommended, usual_of
+from hpcclear.report.parts import SectionOf
 
 _LEGEND = {
     "design": "simulated",
     "original": "baseline design",
     "printed": "design of the paper",
 }
-_USUAL = ("mean of f", "deviation of f")
+_USUAL = ("mean of f", "standard deviation of f")
 _WORDS = {"mean": "mean", "deviation": "standard deviation"}
 FRAMES = 180  # of a revolution
 
@@ -65,8 +67,8 @@ def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence
     """The first two objectives of the case that the answer is about, else of the first case; mean and standard deviation by
     default."""
     asked = leading_goals(verified) if verified is not None else []
-    if not asked and fronts is not None and "searched" in fronts:
-        asked = str(fronts["searched"][0].item()).split(", ")
+    if not asked and fronts is not None:
+        asked = [words for words, _ in searched(fronts.isel(case=0)).values()]
     return asked[:2] if len(asked) > 1 else _USUAL
 
 
@@ -96,8 +98,7 @@ def _placed(points: list[dict[str, Any]], leading: Sequence[str]) -> list[str]:
             point["intervals"] = ends
         if len(names) > 2:
             point["at"] = at
-    words = map(labels.statistic, names)
-    return [s.label(w) if s.unit != "–" else w for w, s in zip(words, scales, strict=True)]
+    return [s.label(w) if s.unit != "–" else w for w, s in zip(names, scales, strict=True)]
 
 
 Goal = tuple[str, float] | tuple[str, float, float, float]
@@ -126,12 +127,7 @@ def _ends(one: xr.Dataset, name: str, ending: str = "_true") -> tuple[()] | tupl
 
 def _searched(one: xr.Dataset) -> dict[str, Goal]:
     """What the case of a solution makes small, by the surrogate: unit and value by its words."""
-    words = str(one["searched"].item()).split(", ") if "searched" in one else []
-    of_f = str(one["mean"].attrs["units"])
-    return {
-        text: (of_f if text.endswith(" of f") else "1", float(one[f"searched_{name}"]))
-        for text, name in zip(words, ORDINALS, strict=False)
-    }
+    return {words: (unit or "1", float(one[name])) for name, (words, unit) in searched(one).items()}
 
 
 def _verified(one: xr.Dataset) -> dict[str, Goal]:
@@ -230,7 +226,7 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
     for name in goals_of(one):
         words, unit = (str(one[f"{name}_{what}"].item()) for what in ("goal", "unit"))
         low, high = (float(one[f"{name}_{end}"]) for end in ("lower", "upper"))
-        if words not in _USUAL:
+        if usual_of(one, name) not in (Usual.MEAN, Usual.DEVIATION):
             known = f" ({labels.between(low, high, unit)})" if low < high else ""
             rows.append([words, f"{quantity(float(one[f'{name}_true']), unit)}{known}"])
     for word in ("mean", "deviation"):
@@ -302,3 +298,11 @@ def _digits(values: np.ndarray) -> Any:
     """Numbers for the page: six digits."""
     flat = [float(f"{value:.6g}") for value in np.ravel(values)]
     return np.reshape(flat, np.shape(values)).tolist()
+
+
+PARTS = (
+    SectionOf(
+        40, "pareto", "Pareto front", "pareto.html", lambda one: front(one)["points"] or None
+    ),
+    SectionOf(80, "motion", "Animation", "motion.html", lambda one: one.responses or None),
+)

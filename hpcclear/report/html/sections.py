@@ -8,11 +8,11 @@ from hpcclear.base.outcome import Status
 from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, number, quantity
+from hpcclear.report.html.markup import Number, Table, quantity
+from hpcclear.report.parts import SectionOf
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.statistics.random.survival import order_interval, quantiles
 
-_MARKS = {"holds": ("✓", "holds"), "does not hold": ("✗", "fails"), "cannot be told": ("?", "open")}
 LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
 """Endings of lives that count."""
 
@@ -100,53 +100,6 @@ def _facts(content: Content) -> list[tuple[str, object]]:
 
 def _failures(count: int) -> str:
     return "no failures" if count == 0 else f"{count} failed"
-
-
-def readings(content: Content) -> list[object] | None:
-    """The paper's designs under the possible readings of its text."""
-    found = content.get("readings")
-    if found is None:
-        return None
-    scale = labels.of(found["mean"])
-    names = [str(name) for name in found["design"].to_numpy()]
-    header = ["reading", *(scale.label(name) for name in names), "distance"]
-    rows: list[list[object]] = []
-    if "mean_paper" in found:
-        printed = [number(float(value) * scale.factor) for value in found["mean_paper"].to_numpy()]
-        rows.append(["printed in the paper", *printed, Number("–")])
-    for k in range(found.sizes["reading"]):
-        one = found.isel(reading=k)
-        cells = [number(float(value) * scale.factor) for value in one["mean"].to_numpy()]
-        distance = number(float(one["distance"]), 3) if "distance" in one else Number("–")
-        rows.append([one["reading"].item(), *cells, distance])
-    words = (
-        "Mean of f of the paper's own designs, by how its text is read; the distance is the root mean square of "
-        "ln(mean / printed mean)."
-    )
-    return [words, Table(header, rows, "Effect of ambiguities in the paper")]
-
-
-def claims(content: Content) -> list[object] | None:
-    """The paper's claims with our verdicts, the numbers of them first."""
-    found = content.get("claims")
-    if found is None:
-        return None
-    verdicts = [str(verdict) for verdict in found["verdict"].to_numpy()]
-    counts = [verdicts.count(verdict) for verdict in _MARKS]
-    held = (
-        f"Of the paper's {len(verdicts)} claims that were tested, {counts[0]} hold on this data, {counts[1]} do not, and "
-        f"{counts[2]} are undecided."
-    )
-    rows = []
-    for k in range(found.sizes["claim"]):
-        one = found.isel(claim=k)
-        verdict = str(one["verdict"].item())
-        mark, kind = _MARKS.get(verdict, ("", "open"))
-        words = "undecided" if kind == "open" else verdict
-        badge = {"words": f"{mark} {words}", "kind": kind}
-        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
-    header = ["claim", "verdict", "the numbers that decide"]
-    return [held, Table(header, rows, "Claims of the paper, tested on this data")]
 
 
 def identified_machine(content: Content) -> list[object] | None:
@@ -247,3 +200,11 @@ def _listed(numbers: np.ndarray, of: int) -> str:
         return f"all but {of - len(numbers)}"
     shown = ", ".join(str(n) for n in numbers[:LISTED])
     return shown if len(numbers) <= LISTED else f"{shown} and {len(numbers) - LISTED} more"
+
+
+PARTS = (
+    SectionOf(20, "identify", "Identified machine", "parts.html", identified_machine),
+    SectionOf(50, "statistics", "Statistics of the samples", "parts.html", statistics, of_samples=True, each=True),
+    SectionOf(70, "summary", "Summary", "summary.html", summary, of_samples=True, each=True),
+    SectionOf(110, "trust", "Data quality", "parts.html", trust, of_samples=True, each=True),
+)  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.verdict import Verdict
 from hpcclear.results import dataset
 from hpcclear.statistics.random.replicates import student
 from hpcclear.study.paper.printed import CLAIMS, case_names
@@ -25,12 +26,12 @@ LEVEL = 0.99
 SURE = 2.5758293035489004
 """Standard errors that decide: `LEVEL`, two-sided."""
 
-HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told"
-Finding = tuple[str, str]
+HOLDS, FAILS, OPEN = Verdict.HOLDS, Verdict.FAILS, Verdict.UNDECIDED
+Finding = tuple[Verdict, str]
 """Verdict, and the numbers behind it."""
 
 
-def verdict(supported: Iterable[bool], refuted: Iterable[bool]) -> str:
+def verdict(supported: Iterable[bool], refuted: Iterable[bool]) -> Verdict:
     """Verdict on a claim of several parts, each supported, refuted, or neither."""
     if any(refuted):
         return FAILS
@@ -330,8 +331,8 @@ def write(run: StudyRun, findings: Sequence[Finding]) -> None:
     """Write claims.nc."""
     data = {
         "text": np.array(CLAIMS),
-        "verdict": np.array([one for one, _ in findings]),
+        "verdict": np.array([one for one, _ in findings], np.int8),
         "figure": np.array([text for _, text in findings]),
     }
     coords = {"claim": np.arange(1, len(CLAIMS) + 1)}
-    run.write(dataset.dataset("claims", coords, data), "claims.nc")
+    run.write(dataset.dataset("claims", coords, data))

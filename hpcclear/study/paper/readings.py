@@ -117,7 +117,7 @@ def write(run: StudyRun, result: Result) -> None:
     data = {**result, "mean_paper": printed["mean"], "deviation_paper": printed["deviation"]}
     data["case"] = np.array([choice.case for choice in designs])
     data["distance"] = np.sqrt(np.mean(np.log(result["mean"] / printed["mean"]) ** 2, axis=1))
-    run.write(dataset.dataset("readings", coords, data), "readings.nc")
+    run.write(dataset.dataset("readings", coords, data))
 
 
 def _row(run: StudyRun, reading: Reading) -> dict[str, Array]:

@@ -1,0 +1,131 @@
+"""What modules of the report declare of the results that they show: figures, sections of the page, lines of the answer.
+
+Each stands beside its code, in a tuple `PARTS` of its module, and `declared` finds it there. What a file of a kind holds is
+declared in `hpcclear.results.kinds`.
+"""
+
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, partial
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import xarray as xr
+
+from hpcclear.report.html.content import Content
+from hpcclear.report.spread import Line
+from hpcclear.results.names import KINDS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Files = Mapping[str, xr.Dataset]
+"""Result files by their kinds."""
+
+
+class FigureOf(NamedTuple):
+    """A figure of one file, by the name that `hpcclear plot` gives it."""
+
+    kind: str
+    """Of the file; "map" for samples on a grid."""
+    name: str
+    draw: "Callable[..., Figure]"
+    """From the file, and the one `beside` it or None."""
+    caption: str | Callable[..., str]
+    """On the page, or what makes it from the same files."""
+    order: int = 0
+    """Place among the figures of the kind."""
+    beside: str = ""
+    """Kind of another file that it takes; "" for none."""
+    along: str = ""
+    """A dimension that the file must have; "" for none."""
+    apart: bool = False
+    """Whether it stands in another section than that of the figures."""
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Place among all figures."""
+        return KINDS["samples" if self.kind == "map" else self.kind].order, self.order
+
+    def of(self, files: Files) -> "Callable[[], Figure]":
+        """What draws it of these files, which its kind is among."""
+        return partial(self.draw, *self._taken(files))
+
+    def captioned(self, files: Files) -> str:
+        """Its caption for these files."""
+        return self.caption if isinstance(self.caption, str) else self.caption(*self._taken(files))
+
+    def _taken(self, files: Files) -> list[xr.Dataset | None]:
+        return [files[self.kind], *([files.get(self.beside)] if self.beside else [])]
+
+
+class SectionOf(NamedTuple):
+    """A section of the page."""
+
+    place: int
+    """Among all sections."""
+    name: str
+    title: str
+    """name and title: its anchor, and its heading."""
+    template: str
+    """File in ``templates`` that shows its content."""
+    make: Callable[..., object]
+    """From the results to its content, None where there is nothing to show; with `piecewise` also from the list of troubles."""
+    folded: bool = False
+    """Whether it opens on request only."""
+    of_samples: bool = False
+    """Whether it is on samples alone."""
+    each: bool = False
+    """Whether each of several samples has one by itself."""
+    piecewise: bool = False
+    """Whether its parts are tried one by one; else it is there as a whole or not at all."""
+
+    def content(self, results: Content, troubles: list[str]) -> object:
+        """Its content; None where there is nothing to show."""
+        return self.make(results, troubles) if self.piecewise else self.make(results)
+
+
+class Recommended(NamedTuple):
+    """A verified study, to be put in words."""
+
+    files: Files
+    ours: xr.Dataset
+    """Designs of the case that the answer is about, of kind ``verification``."""
+    best: xr.Dataset
+    """The recommended one of them."""
+
+    def of_best(self, kind: str) -> xr.Dataset | None:
+        """What a file with a row for each design says of the recommended one; None where it says nothing."""
+        found, name = self.files.get(kind), str(self.best["design"].item())
+        known = found is not None and name in found["design"].to_numpy()
+        return found.sel(design=name) if found is not None and known else None
+
+
+def _no_steps(of: Recommended) -> Iterable[str]:
+    return ()
+
+
+class LinesOf(NamedTuple):
+    """Lines of the answer of a study, and what it advises to do next."""
+
+    place: int
+    """Among all lines."""
+    kinds: tuple[str, ...]
+    """Files that they are made of."""
+    lines: Callable[[Recommended], Iterable[Line]]
+    steps: Callable[[Recommended], Iterable[str]] = _no_steps
+
+
+Part = TypeVar("Part", FigureOf, SectionOf, LinesOf)
+
+
+@cache
+def _all() -> tuple[object, ...]:
+    modules = pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}.")
+    return tuple(part for one in modules for part in getattr(import_module(one.name), "PARTS", ()))
+
+
+def declared(sort: type[Part]) -> list[Part]:
+    """All parts of a sort, in their order."""
+    return sorted((one for one in _all() if isinstance(one, sort)), key=lambda one: one.place)

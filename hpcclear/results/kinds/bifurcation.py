@@ -1,0 +1,14 @@
+"""One value for each revolution, against an entry of the scene."""
+
+from hpcclear.base.objectives import MEAN_GAP
+from hpcclear.results.rows import count, kind_of, number
+
+KIND = kind_of(
+    30, "One value for each revolution, against an entry of the scene", ("value", "crossing"),
+    design_dims=("value",), alone=True,
+    table={
+        "value": count(("value",), "number of the value"),
+        "crossing": count(("crossing",), "number of the revolution, the first after the transient"),
+        "observed": number(("value", "crossing"), "objective", MEAN_GAP.words, required=True),
+    },
+)

@@ -1,0 +1,27 @@
+"""Contributions of random inputs to the variance of designs."""
+
+from hpcclear.results.rows import count, flag, kind_of, number, text
+
+KIND = kind_of(
+    90, "Contributions to the scatter of designs", ("design", "input"),
+    table={
+        "design": text(("design",), "name of the design"),
+        "input": text(("input",), "random input"),
+        "contribution": number(("design", "input"), "1",
+            "share of the variance of the objective that an input causes, alone or together with correlated inputs",
+            required=True),
+        "contribution_error": number(("design", "input"), "1", "standard error of it", required=True),
+        "halved": number(("design", "input"), "1",
+            "relative reduction of the standard deviation if the scatter of an input is halved", required=True),
+        "halved_error": number(("design", "input"), "1", "standard error of it", required=True),
+        "halved_together": number(("design",), "1",
+            "relative reduction of the standard deviation if the scatter of the inputs to tighten first is halved at once"),
+        "halved_together_error": number(("design",), "1", "standard error of it"),
+        "halving_cost": number(("design", "input"), "1", "additional cost of halving the scatter of an input"),
+        "unexplained": number(("design",), "1", "share of the variance that no input or pair explains", required=True),
+        "unexplained_error": number(("design",), "1", "standard error of it"),
+        "group": count(("design", "input"), "number of the group of correlated inputs that share one contribution; 0 for none"),
+        "together": flag(("input",),
+            "whether the input is correlated with others and shares one contribution with them", "independent correlated"),
+    },
+)

@@ -1,0 +1,29 @@
+"""Surrogates, with all that a prediction takes."""
+
+from hpcclear.results.rows import count, fit, flag, kind_of, number, text
+
+KIND = kind_of(
+    50, "Kriging models of the objective", ("model", "point"),
+    design_dims=("model", "point"), limit_dims=("model",), absent="no surrogate (`hpcclear run`)",
+    table={
+        "model": text(("model",), "name of the model, one for each subinterval"),
+        "point": count(("point",), "number of the training point"),
+        "parameter": text(("parameter",), "design variable"),
+        "family": text(("model",), "model that the subintervals form together"),
+        "training_output": number(("model", "point"), "objective", "objective at the training point"),
+        "weight": number(("model", "point"), "1", "weight of the training point in a prediction"),
+        "length_scale": number(("model", "parameter"), "1", "correlation length, in the unit cube"),
+        "used": flag(("model", "parameter"), "whether the parameter is an input of the model", "not_an_input input"),
+        "surrogate": text(("model",), "kind of surrogate, if not Kriging"),
+        "cross_validated": number(("model", "point"), "objective",
+            "prediction at the training point by a model fitted without that point, if not Kriging"),
+        "kernel": text(("model",), "covariance function, if not the squared exponential"),
+        "signal_variance": number(("model",), "1", "variance of the process, in output_scale^2"),
+        "noise_variance": number(("model",), "1", "variance of the noise, in output_scale^2"),
+        "output_mean": number(("model",), "objective", "mean subtracted before the fit"),
+        "output_scale": number(("model",), "objective", "standard deviation used as divisor before the fit"),
+        "dropped": count(("model",), "number of failed samples left out of the fit"),
+        "accepted": flag(("model",), "whether the model passed on its test points", "refused accepted"),
+        **fit("model"),
+    },
+)
