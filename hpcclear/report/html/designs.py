@@ -78,6 +78,7 @@ def _variables(verified: xr.Dataset) -> str:
 
 
 def names_in(verified: xr.Dataset) -> list[str]:
+    """Names of the verified designs, in order."""
     return [str(name) for name in verified["design"].to_numpy()]
 
 
