@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import functools
 import math
 import pickle
 import subprocess
@@ -412,6 +413,13 @@ def test_damaged_text_loads_or_is_refused(
 # --- schema ------------------------------------------------------------------------------------
 
 
+@functools.cache
+def validator_of_scenes() -> Draft202012Validator:
+    """Made, and checked to be a schema, once."""
+    Draft202012Validator.check_schema(scene_schema())
+    return Draft202012Validator(scene_schema())
+
+
 @pytest.mark.parametrize(
     "path",
     [*JOBS, *(ROOT / "jobs" / "linkages").glob("*.toml"), *(ROOT / "hpcclear").glob("cli/*.toml"),
@@ -419,8 +427,7 @@ def test_damaged_text_loads_or_is_refused(
     ids=lambda path: f"{path.parent.stem}-{path.stem}",
 )  # fmt: skip
 def test_schema_accepts_what_is_shipped(path: Path) -> None:
-    validator = Draft202012Validator(scene_schema())
-    validator.check_schema(scene_schema())
+    validator = validator_of_scenes()
     assert list(validator.iter_errors(tomllib.loads(path.read_text()))) == []
     assert list(validator.iter_errors(load_scene(path).resolved())) == []
 
@@ -473,7 +480,7 @@ def test_what_a_linkage_varies_is_fitted_two_by_two(further: int, groups: list) 
 
 
 def test_schema_knows_the_word_that_switches_off() -> None:
-    validator = Draft202012Validator(scene_schema())
+    validator = validator_of_scenes()
     content = tomllib.loads(JOBS[0].read_text())
     content["effects"] |= {"friction": "none", "guide_friction": "none", "slider_load": "none"}
     assert list(validator.iter_errors(content)) == []
@@ -487,4 +494,4 @@ def test_schema_knows_the_word_that_switches_off() -> None:
 def test_schema_refuses_wrong_keys_and_values(name: str) -> None:
     path = next(path for path in BROKEN if path.stem == name)
     content = tomllib.loads(path.read_text())
-    assert list(Draft202012Validator(scene_schema()).iter_errors(content))
+    assert list(validator_of_scenes().iter_errors(content))
