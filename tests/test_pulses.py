@@ -9,7 +9,9 @@ from scipy.interpolate import PchipInterpolator
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.pieces import breaks, level, mean_of, periodic
+from hpcclear.dynamics import layout
 from hpcclear.dynamics.layout import curves as packing
+from hpcclear.dynamics.linkage.elements import enter_table, look_up
 from hpcclear.dynamics.planar.curves import angle_pieces
 
 TURN = 2 * np.pi
@@ -179,20 +181,15 @@ def test_means_are_those_of_the_curve_that_acts(interpolation):
         )
 
 
-def looked_up(table, curve, share):
-    """What the kernel reads, in plain Python."""
-    head = table[packing.HEAD * curve :][: packing.HEAD].astype(int)
-    k = int(
-        table[head[packing.GRID] + min(int(share * (head[packing.LAST] + 1)), head[packing.LAST])]
-    )
-    step = 1 << head[packing.HALVINGS]
-    while step > 1:
-        step >>= 1
-        further = min(k + step, head[packing.LAST_PIECE])
-        k = further if table[head[packing.STARTS] + further] <= share else k
-    c0, c1, c2, c3 = table[head[packing.CUBICS] + 4 * k :][:4]
-    s = share - table[head[packing.STARTS] + k]
-    return c0 + s * (c1 + s * (c2 + s * c3))
+def looked_up(table, curve, shares):
+    """What the kernel reads at places (n,), shares of a curve's length."""
+    lanes, head = np.zeros(layout.BANK), table[packing.HEAD * curve :][: packing.HEAD]
+    found = []
+    for share in shares:
+        enter_table(lanes, curve, share, 0.0, head[packing.REPEATS], head[packing.INTERVALS], 0, 1)
+        look_up(lanes, table, curve, 1)
+        found.append(lanes[layout.CURVES + curve])
+    return np.array(found)
 
 
 def test_any_table_is_found_by_the_kernel_s_search():
@@ -208,11 +205,18 @@ def test_any_table_is_found_by_the_kernel_s_search():
     rows = [((r[0][0], 0.0), *r[1:]) for r in rows]
     curves = [periodic(one, 1.0) for one in rows] + [level(one) for one in rows]
     table = packing.packed(curves, [breaks(curve, 1e-4) for curve in curves])
+    halvings = table[: packing.HEAD * layout.MAX_CURVES].reshape(-1, packing.HEAD)[
+        :, packing.HALVINGS
+    ]
+    assert 0 < np.count_nonzero(halvings) < len(curves)
     for number, curve in enumerate(curves):
-        near = np.concatenate([curve.starts, curve.starts + 1e-9, rng.uniform(0, 1, 200)])
-        for share in near[near < 1.0]:
-            expected = float(curve.at(share * curve.length))
-            assert looked_up(table, number, share) == pytest.approx(expected, abs=1e-6), number
+        edges = np.concatenate([curve.starts, np.arange(4096) / 4096])
+        near = np.concatenate(
+            [edges, edges + 1e-9, edges + 3e-16, edges - 3e-16, rng.uniform(0, 1, 200)]
+        )
+        near = near[(near >= 0.0) & (near < 1.0)]
+        expected = curve.at(near * curve.length)
+        np.testing.assert_allclose(looked_up(table, number, near), expected, rtol=0, atol=1e-9)
 
 
 def test_steps_end_where_no_cubic_follows():

@@ -144,3 +144,8 @@ class Problem:
         """Where steps end in each curve, shares of its length: at rows around which it bends (`base.pieces.breaks`)."""
         tolerance = FOLLOWED * math.sqrt(self.rtol)
         return tuple(breaks(curve, tolerance) for curve in self.curves)
+
+    @property
+    def stopping_curves(self) -> int:
+        """How many curves a stepper watches: all of them, if steps end at rows of any."""
+        return len(self.curves) if any(len(ends) for ends in self.stops) else 0

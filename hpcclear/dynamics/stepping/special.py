@@ -55,7 +55,7 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
     status = failure(lane, W, n, work, block.stages, settings)
     if status == OK and work[at.ACCEPT * W + lane] == 1.0:
         if rules.curves > 0:  # first: contacts are latched at the ends of steps that stay
-            stop_at_rows(rules, lane, W, work, tables)
+            stop_at_rows(rules, lane, W, work)
         if rules.latched and work[at.ACCEPT * W + lane] == 1.0:
             stop_at_impacts(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0:
