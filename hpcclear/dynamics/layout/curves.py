@@ -21,8 +21,9 @@ from hpcclear.dynamics import layout as at
     BREAKS,  # where steps end, ascending
     BREAK_COUNT,  # 0: nowhere
     REPEATS,  # 1, or 0 of one that stays level beyond both ends
-) = range(8)
-HEAD = 8
+    IN_PARAMETERS,  # 1 where the rows are parameters of the sample, and BREAKS says in which of their rows they stand
+) = range(9)
+HEAD = 9
 
 CELL = 9
 """Numbers of a cell: the row, a share of the length; the cubics before and behind it, by powers of the distance from it."""
@@ -35,8 +36,14 @@ FEW_INTERVALS = 4096
 """So many are tried at least before there are halvings."""
 
 
-def packed(curves: Sequence[Pieces], stops: Sequence[Array]) -> Array:
-    """All curves in one array; `stops`: where steps end, of each, shares of its length."""
+def packed(
+    curves: Sequence[Pieces], stops: Sequence[Array], bends: Sequence[Sequence[int]] = ()
+) -> Array:
+    """All curves in one array.
+
+    `stops`: where steps end, of each, shares of its length. `bends`: of tables that are not looked up here but end steps, and
+    follow the curves, the rows of the parameters where they bend.
+    """
     head = np.zeros((at.MAX_CURVES, HEAD))
     parts, free = [], head.size
     for k, (curve, ends) in enumerate(zip(curves, stops, strict=True)):
@@ -50,8 +57,12 @@ def packed(curves: Sequence[Pieces], stops: Sequence[Array]) -> Array:
             parts.append(part)
             free += len(part)
         head[k] = (
-            intervals or len(grid), places[0], len(cells) - 1, halvings, places[1], places[2], len(ends), curve.repeats,
+            intervals or len(grid), places[0], len(cells) - 1, halvings, places[1], places[2], len(ends), curve.repeats, 0,
         )  # fmt: skip
+    for k, rows in enumerate(bends, len(curves)):
+        head[k, [BREAKS, BREAK_COUNT, IN_PARAMETERS]] = free, len(rows), 1
+        parts.append(np.array(rows, float))
+        free += len(rows)
     return np.concatenate([head.ravel(), *parts])
 
 

@@ -34,6 +34,7 @@ from hpcclear.dynamics.linkage.parts import (
     Torque,
     TorqueDrive,
     split,
+    straight_of,
 )
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.rubbing import (
@@ -203,7 +204,7 @@ class _Generator:
     def _load(self, load: Force | Torque | Spring | Acting) -> None:
         kin, write, power = self.kinematics, self.writer, ZERO
         if isinstance(load, Acting):
-            power = load.act(Writing(kin, write, self.balance))
+            power = load.act(Writing(kin, write, self.balance, self.rows.places))
             self.load_power = self.load_power + power
             return
         if isinstance(load, Spring):
@@ -266,7 +267,8 @@ class _Generator:
         if drive.by_speed is not None:
             speed = self.kinematics.spin(self.forest.frames[drive.body])
             name = f"{drive.name}_by_speed"
-            torque = piecewise.term(write, name, len(drive.by_speed), speed)
+            row = self.rows.places.get(name)
+            torque = piecewise.term(write, name, len(drive.by_speed), speed, row)
             return Column("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
@@ -376,6 +378,12 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
+        for drive in self.mechanism.drives:
+            for name in straight_of(drive):  # the rate of a speed is known last
+                if name in self.rows.places:
+                    angle = self.number[Column("angle", self.forest.frames[drive.body])]
+                    row = self.rows.places[name] + at.MAX_CURVES
+                    write.line(f"work[{row} * W + i] = {write.text(found[angle])}")
         if on.energies or on.series or on.responses or on.objective or on.pins:
             for rub in self.late:
                 rub.measure()

@@ -216,18 +216,18 @@ def _work(power: Array, times: Array) -> Array:
 
 
 def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
-    """Forces of the pins (t, pins), or by the names of a template, which has columns of joints with clearance besides."""
+    """Forces of the pins (t, pins), and by the names of a template, which has columns of joints with clearance besides."""
     holds = found.holds
+    pins = pins_of(linkage_of(scene).mechanism)
+    forces = {
+        f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins]).T for axis in "xy"
+    }
     if scene.template is None:
-        pins = pins_of(linkage_of(scene).mechanism)
-        return {
-            f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins]).T
-            for axis in "xy"
-        }
+        return forces
     parts = {
         name: np.array([sign * holds[one] for one, sign in ones]).T
         for name, ones in scene.template.HOLDS.items()
     }
     none = at_places(scene, np.zeros((len(found.times), 0)))
     single = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
-    return dict.fromkeys(OF_CONTACTS, none) | single
+    return dict.fromkeys(OF_CONTACTS, none) | single | forces

@@ -77,7 +77,8 @@ def row_reach(work, c, i, W):
     """How near the end of a step a row is taken to be there: no nearer than places are rounded."""
     rate = abs(work[(at.RATE_NOW + at.PLACE_RATES + c) * W + i])
     time = work[at.BEGAN * W + i] + work[at.TIME * W + i]
-    return rate * (ROW_REACH * work[at.STEP * W + i] + ROUNDED * time) + 100.0 * ROUNDED
+    place = abs(work[(at.RATE_NOW + at.PLACES + c) * W + i])
+    return rate * (ROW_REACH * work[at.STEP * W + i] + ROUNDED * time) + ROUNDED * (100.0 + place)
 
 
 @lane_function

@@ -137,7 +137,7 @@ class Problem:
     @cached_property
     def tables(self) -> Array:
         """The tabulated curves as the kernel reads them, shape (n,) (`layout.curves.packed`)."""
-        return packed(self.curves, self.stops)
+        return packed(self.curves, self.stops, self.linkage.bends)
 
     @cached_property
     def stops(self) -> tuple[Array, ...]:
@@ -147,5 +147,7 @@ class Problem:
 
     @property
     def stopping_curves(self) -> int:
-        """How many curves a stepper watches: all of them, if steps end at rows of any."""
-        return len(self.curves) if any(len(ends) for ends in self.stops) else 0
+        """How many tables a stepper watches: all of them, if steps end at rows of any."""
+        bends = self.linkage.bends
+        ending = bends or any(len(ends) for ends in self.stops)
+        return len(self.curves) + len(bends) if ending else 0

@@ -8,7 +8,14 @@ import math
 
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.curves import BREAK_COUNT, BREAKS, HEAD, REPEATS
+from hpcclear.dynamics.layout.curves import (
+    BREAK_COUNT,
+    BREAKS,
+    HEAD,
+    IN_PARAMETERS,
+    PLACES,
+    REPEATS,
+)
 from hpcclear.dynamics.stepping.control import row_reach
 from hpcclear.dynamics.stepping.events import impact_fraction
 from hpcclear.dynamics.stepping.stops import cut
@@ -54,12 +61,19 @@ def stop_at_rows(rules, lane, W, work):
 
 
 @lane_event
-def row_before(tables, first, count, place):
-    """Number of the last of so many ascending rows at or before a place, -1 of none."""
-    low, high = -1, count
+def row_of(lane, W, par, tables, c, k):
+    """Where row k of table c stands: a share of its length, or what the sample's parameters say."""
+    row = tables[(int(tables[HEAD * c + BREAKS]) + k) & PLACES]
+    return par[int(row) * W + lane] if tables[HEAD * c + IN_PARAMETERS] == 1.0 else row
+
+
+@lane_event
+def row_before(lane, W, par, tables, c, place):
+    """Number of the last row at or before a place, -1 of none."""
+    low, high = -1, int(tables[HEAD * c + BREAK_COUNT])
     while high - low > 1:
         middle = (low + high) // 2
-        if tables[first + middle] <= place:
+        if row_of(lane, W, par, tables, c, middle) <= place:
             low = middle
         else:
             high = middle
@@ -67,34 +81,34 @@ def row_before(tables, first, count, place):
 
 
 @lane_event
-def row_at(tables, first, count, repeats, k):
-    """Where row k stands; those before the first and behind the last are a length off, or nowhere."""
+def row_at(lane, W, par, tables, c, k):
+    """The same; of rows before the first and behind the last, a length off or nowhere."""
+    count = int(tables[HEAD * c + BREAK_COUNT])
     if 0 <= k < count:
-        return tables[first + k]
-    if not repeats:
+        return row_of(lane, W, par, tables, c, k)
+    if tables[HEAD * c + REPEATS] == 0.0:
         return FAR if k > 0 else -FAR
-    return tables[first + k - count] + 1.0 if k > 0 else tables[first + k + count] - 1.0
+    further = 1.0 if k > 0 else -1.0
+    return row_of(lane, W, par, tables, c, k - int(further) * count) + further
 
 
 @lane_event
-def next_rows(lane, W, work, tables, c):
+def next_rows(lane, W, work, par, tables, c):
     """The rows around the end of this step: of one that it ends at, beyond it.
 
     The first row of a table that repeats is at 0, so that no place between two rows is a length off.
     """
-    head = HEAD * c
-    first, count = int(tables[head + BREAKS]), int(tables[head + BREAK_COUNT])
+    count = int(tables[HEAD * c + BREAK_COUNT])
     ahead, behind = FAR, -FAR
     if count > 0:
-        repeats = tables[head + REPEATS] == 1.0
         place = work[(at.RATE_NOW + at.PLACES + c) * W + lane]
         reach = row_reach(work, c, lane, W)
         onward = work[(at.RATE_NOW + at.PLACE_RATES + c) * W + lane] >= 0.0
         place += reach if onward else -reach
-        k = row_before(tables, first, count, place)
-        if repeats and place >= 1.0:
+        k = row_before(lane, W, par, tables, c, place)
+        if tables[HEAD * c + REPEATS] == 1.0 and place >= 1.0:
             k = count
-        behind = row_at(tables, first, count, repeats, k)
-        ahead = row_at(tables, first, count, repeats, k + 1)
+        behind = row_at(lane, W, par, tables, c, k)
+        ahead = row_at(lane, W, par, tables, c, k + 1)
     work[(at.NEXT_ROW + c) * W + lane] = ahead
     work[(at.LAST_ROW + c) * W + lane] = behind

@@ -66,7 +66,7 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
             for p in range(rules.begin, rules.end):
                 integrate_gap(lane, W, work, p)
             for c in range(rules.curves):
-                next_rows(lane, W, work, tables, c)
+                next_rows(lane, W, work, block.par, tables, c)
     return status
 
 

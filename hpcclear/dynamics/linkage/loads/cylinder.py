@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.balance import Pull
 from hpcclear.dynamics.linkage.expression import Term, Vector, named
 from hpcclear.dynamics.linkage.loads import piecewise
@@ -19,6 +20,11 @@ class Cylinder(Acting):
     force: float | piecewise.Rows
     damping: float = 0.0
     kind: ClassVar[str] = "cylinder"
+
+    @property
+    def straight(self) -> dict[str, piecewise.Rows]:
+        """The force, if it is a table."""
+        return {self.name: self.force} if isinstance(self.force, tuple) else {}
 
     def numbers(self) -> dict[str, Any]:
         """Its parameters."""
@@ -38,7 +44,10 @@ class Cylinder(Acting):
         write.line(f"{', '.join(made)} = along({', '.join(texts)})")
         nx, ny, length, rate = map(named, made)
         if isinstance(self.force, tuple):
-            push = piecewise.term(write, self.name, len(self.force), length)
+            row = on.places.get(self.name)
+            push = piecewise.term(write, self.name, len(self.force), length, row)
+            if row is not None:
+                write.line(f"work[{row + at.MAX_CURVES} * W + i] = {made[-1]}")
         else:
             push = write.parameter(f"{self.name}_force")
         push = write.let(f"push_{self.name}", push - write.parameter(f"{self.name}_damping") * rate)

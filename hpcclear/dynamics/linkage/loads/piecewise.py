@@ -1,4 +1,7 @@
-"""Tables that run straight from row to row and stay level beyond: a sum of hinges, which lanes evaluate without a branch."""
+"""Tables that run straight from row to row and stay level beyond: a sum of hinges, which lanes evaluate without a branch.
+
+Their rows are parameters, as they may differ from sample to sample; steps end at them (`stepping.rows`).
+"""
 
 from typing import Any
 
@@ -20,10 +23,17 @@ def numbers(name: str, rows: Rows) -> dict[str, Any]:
     return found
 
 
-def term(write: Writer, name: str, count: int, at: Term) -> Term:
-    """The value of a table of so many rows."""
+def starts(name: str, rows: Rows) -> list[str]:
+    """Names of the parameters where a table bends."""
+    return [f"{name}_start_{k}" for k in range(len(rows))]
+
+
+def term(write: Writer, name: str, count: int, where: Term, row: int | None) -> Term:
+    """The value of a table of so many rows at a place, which is left in a row of the lanes if there is one for it."""
     total = write.parameter(f"{name}_first")
-    place = write.text(write.let(f"at_{name}", at, whole=True))
+    place = write.text(write.let(f"at_{name}", where, whole=True))
+    if row is not None:
+        write.line(f"work[{row} * W + i] = {place}")
     for k in range(count):
         start, bend = (
             write.text(write.parameter(f"{name}_{entry}_{k}")) for entry in ("start", "bend")

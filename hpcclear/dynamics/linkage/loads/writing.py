@@ -1,5 +1,6 @@
 """What a load may use: kinematics, text and balance of the motion that it is written into."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.balance import Balance
@@ -13,3 +14,6 @@ class Writing(NamedTuple):
     kinematics: Kinematics
     writer: Writer
     balance: Balance
+    places: Mapping[
+        str, int
+    ]  # rows of the lanes for the places of straight tables; behind MAX_CURVES, for their rates
