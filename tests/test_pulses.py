@@ -167,6 +167,23 @@ def test_prescribed_motions_feel_them_too():
             assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-6), (kind, width)
 
 
+def test_prescribed_motions_feel_pulses_over_a_distance():
+    """The work of a cylinder from the shaft to the piston is a function of the distance, at every instant."""
+    motor = {"kind": "constant-speed", "body": "crank", "speed": "3000 rpm"}
+    for begin, width in ((0.13, 3.0), (0.151, 0.3), (0.1123, 0.01)):
+        rise = 0.5e-3 * width
+        rows = [[begin, 0.0], [begin + rise, 20.0 / rise], [begin + 2 * rise, 0.0]]
+        load = {"kind": "cylinder", "first": "slider.pin", "second": "ground.o", "force": rows}
+        found = simulate(engine(load, motor))
+        place = CRANK * np.cos(angle := found["crank_angle"].to_numpy())
+        place = place + np.sqrt(ROD**2 - (CRANK * np.sin(angle)) ** 2)
+        right = [straight(rows, place[0], one)[0] for one in place]
+        assert np.ptp(right) == pytest.approx(20.0)
+        np.testing.assert_allclose(
+            found["load_work"], right, rtol=0, atol=1e-5 * 20.0, err_msg=str(width)
+        )
+
+
 # ---- curves ----------------------------------------------------------------------------------------
 
 
