@@ -92,7 +92,8 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
     straight = [(load, rows) for load in mechanism.loads for rows in straight_of(load).values()]
     by_place = straight or len(tabled) > len(by_time)
     coarse = prescribed_motion(mechanism, times) if by_place else None
-    for load, rows in straight if coarse is not None else ():
+    for load, rows in straight:
+        assert coarse is not None
         distance = _distance(coarse, load.first, load.second)  # type: ignore[union-attr]
         found.append(_crossed(np.array(rows)[:, 0], *distance, times))
     for load in tabled:
