@@ -65,6 +65,44 @@ def test_a_whole_motion_is_the_dense_model_s():
     assert float(np.abs(response["energy_residual"]).max()) < 1e-7 * work
 
 
+def test_forces_of_pins_are_the_dense_model_s():
+    """Multipliers of its constraints: beside a joint with clearance, in a closed loop, with friction in the pins."""
+    turning = {
+        "kind": "revolute",
+        "friction": {"coefficient": 0.1, "radius": 5e-3, "ramp_speed": 0.01},
+    }
+    scene = rocker().with_({
+        "mechanism.bodies.bar": {"length": 0.2, "mass": 0.1, "inertia": 4e-4, "start_angle": -0.8},
+        "mechanism.bodies.block": {"mass": 0.4, "points": {"pin": [0.0, 0.0]}},
+        "mechanism.joints.o1": {**turning, "journal": "crank.a", "bearing": "ground.o"},
+        "mechanism.joints.o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+        "mechanism.joints.o3": {**turning, "journal": "coupler.b", "bearing": "rocker.b"},
+        "mechanism.joints.o5": {**turning, "journal": "bar.a", "bearing": "coupler.tip"},
+        "mechanism.joints.o6": {**ROCKER["mechanism"]["joints"]["o2"], "journal": "block.pin", "bearing": "bar.b"},
+        "mechanism.joints.way": {"kind": "slide", "point": "block.pin", "line": "ground.o"},
+    })  # fmt: skip
+    mechanism = linkage_of(scene).mechanism
+    contact = Contact(lambda rate: 1 + CHI * rate, lambda s: MU * min(max(s / RAMP, -1.0), 1.0))
+    dense = Dense(mechanism, [contact], GRAVITY, scene.numerics.alpha, scene.numerics.beta)
+    response = simulate(scene)
+    assert int(response.status) == 0
+    assert response["contact_force"].to_numpy().max() > 50.0
+    q, v = (
+        np.stack([response[f"body_{name}"].to_numpy() for name in names], -1).reshape(len(response.time), -1)
+        for names in (("x", "y", "angle"), ("vx", "vy", "spin"))
+    )  # fmt: skip
+    pins = [str(one) for one in response.pin.to_numpy()]
+    assert pins == ["o1", "o4", "o2", "o3", "o5"]
+    every = range(0, len(q), 17)
+    right = np.empty((len(every), 2, len(pins)))
+    for k, row in enumerate(every):
+        dense.accelerations(q[row], v[row], float(response.time[row]))
+        held = dense.seen["multipliers"]
+        right[k] = [[held[pin, axis] for pin in pins] for axis in "xy"]
+    found = np.stack([response[f"pin_force_{axis}"].to_numpy()[every] for axis in "xy"], 1)
+    np.testing.assert_allclose(found, right, rtol=0, atol=1e-6 * np.abs(right).max())
+
+
 def slider_crank_pair():
     """The paper's slider-crank, and the same by bodies and joints."""
     scene = load_scene(

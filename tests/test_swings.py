@@ -132,6 +132,50 @@ def test_a_body_that_may_turn_about_its_mass_centre_needs_an_inertia():
         linkage_of(scene.with_({"mechanism.bodies.rod.mass_center": 0.0}))
 
 
+def test_by_baumgarte_a_body_that_turns_needs_an_inertia_of_its_own():
+    """It would be turned by one of ours; a body at a constant speed, or that cannot turn, needs none."""
+    scene = swing(1.0, 1.0)
+    baumgarte = {"numerics.formulation": "baumgarte"}
+    with pytest.raises(InputError, match=r"bodies\.rod\.inertia.*baumgarte"):
+        linkage_of(scene.with_(baumgarte))
+    linkage_of(scene.with_({**baumgarte, "mechanism.bodies.rod.inertia": 1e-3}))
+    drive = {"kind": "constant-speed", "body": "rod", "speed": 6.0}
+    linkage_of(swing(1.0, 1.0, drive=drive).with_(baumgarte))
+
+
+def test_a_spring_that_the_follower_of_a_double_crank_winds_up_is_remarked():
+    """The follower goes round with the crank, which its spring to the ground does not."""
+    bars = {
+        name: {"length": length, "mass": 0.2, "inertia": 1e-4, "start_angle": start}
+        for name, length, start in (
+            ("crank", 0.1, 1.0),
+            ("coupler", 0.09, 0.3),
+            ("follower", 0.11, 1.2),
+        )
+    }
+    scene = load_scene({
+        "format_version": 2,
+        "mechanism": {
+            "kind": "planar",
+            "bodies": bars,
+            "ground": {"points": {"o": [0.0, 0.0], "p": [0.04, 0.0]}},
+            "joints": {
+                "o1": {"kind": "revolute", "journal": "crank.a", "bearing": "ground.o"},
+                "o2": {"kind": "revolute", "journal": "crank.b", "bearing": "coupler.a"},
+                "o3": {"kind": "revolute", "journal": "coupler.b", "bearing": "follower.b"},
+                "o4": {"kind": "revolute", "journal": "follower.a", "bearing": "ground.p"},
+            },
+            "drives": {"motor": {"kind": "constant-speed", "body": "crank", "speed": 6.0}},
+            "loads": {"held": {"kind": "torsion-spring", "body": "follower", "stiffness": 0.1}},
+        },
+        "numerics": NUMERICS,
+    })  # fmt: skip
+    found = simulate(scene)
+    assert "held is wound up by 2 turns" in found.attrs["cautions"]
+    both = {"mechanism.loads.held.other": "crank"}
+    assert "cautions" not in simulate(scene.with_(both)).attrs
+
+
 def many(count):
     """So many pendulums beside a crank."""
     rods = {

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Integers
 
 Rows = tuple[tuple[float, float], ...]
 
@@ -37,6 +37,10 @@ class Pieces(NamedTuple):
         """Mean over the length, exact."""
         h = np.diff(self.starts, append=1.0)
         return float((self.cubics * h[:, None] ** np.arange(1, 5) / np.arange(1, 5)).sum())
+
+    def moved(self, pieces: Integers, by: Array) -> Array:
+        """Cubics (m, 4) of some pieces (m,) by powers of the distance from places further on by so much (m,)."""
+        return _moved(self.cubics[pieces], by)
 
     def derivative(self) -> "Pieces":
         """The derivative by the place."""
@@ -120,8 +124,8 @@ def _cubics(x: Array, y: Array, interpolation: str) -> Array:
     )
 
 
-def _moved(cubics: Array, by: float) -> Array:
-    """The same cubics (n, 4) by powers of the distance from a place further on."""
+def _moved(cubics: Array, by: Array | float) -> Array:
+    """The same cubics (n, 4) by powers of the distance from places further on."""
     c0, c1, c2, c3 = cubics.T
     return np.column_stack(
         [

@@ -28,7 +28,7 @@ from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, period_of, refused_of
-from hpcclear.dynamics.planar.response import Seen, pins_of
+from hpcclear.dynamics.planar.response import Seen, pins_of, wound_up
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.planar.tables import mechanism_of
@@ -204,7 +204,7 @@ def _response(
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
         | _kept(scene)
-        | _reason(scene),
+        | _reason(scene, data),
         objective,
         labels,
         {**(_dimensions(scene) or {}), **counted},
@@ -222,7 +222,7 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
         found["mode"] = scene.mode_labels
     if scene.guides():
         found["guide"] = scene.guides()
-    if scene.template is None and not scene.modes:
+    if not scene.modes:
         found["pin"] = pins_of(linkage_of(scene).mechanism)
     return found or None
 
@@ -240,12 +240,12 @@ def _turns(scene: Scene) -> int:
     return turns_of(scene.linkage)
 
 
-def _reason(scene: Scene) -> dict[str, str | int]:
-    """Where a linkage that cannot turn locks, or what is to be known of one that turns, as an attribute."""
+def _reason(scene: Scene, data: dict[str, Any]) -> dict[str, str | int]:
+    """Where a linkage that cannot turn locks, or what is to be known of one that turns and of its series, as an attribute."""
     refusal = refused_of(scene)
     if refusal is not None:
         return {"ended": refusal[1].reason}
-    cautions = cautions_of(scene)
+    cautions = (*cautions_of(scene), *wound_up(linkage_of(scene).mechanism, data))
     return {"cautions": "\n".join(cautions)} if cautions else {}
 
 

@@ -26,7 +26,8 @@ def stored_bytes(scene: Scene) -> float:
     else:
         points = sum(len(body.points) for body in mechanism.bodies)
         columns = 12 + of_joints + 6 * len(mechanism.bodies) + 2 * points
-        columns += 2 * len(pins_of(mechanism)) + 2 * scene.modes
+        columns += 2 * scene.modes
+    columns += 0 if scene.modes else 2 * len(pins_of(mechanism))
     return 8.0 * columns * scene.output.instants_per_revolution * kept_revolutions(scene)
 
 

@@ -330,9 +330,11 @@ STRICTER = OF_LANE(
 STRICTER_WITHIN = OF_LANE("that within the range of stability")
 STRICTER_AT_EDGE = OF_LANE("and at the edge of it")
 CURVES = OF_LANE("values of tabulated curves at the stage", size=MAX_CURVES)
-AHEAD = OF_LANE("shares of their lengths to the next place where a step ends", size=MAX_CURVES)
-BEHIND = OF_LANE("and to the one before; both 0 where they are not known", size=MAX_CURVES)
-RESUMED = OF_LANE("step proposed before it was shortened to end at such a place, or 0", "s")
+NEXT_ROW = OF_LANE(
+    "above a curve's place: where a step ends, a share of its length", size=MAX_CURVES
+)
+LAST_ROW = OF_LANE("and below it; both 0 where they are not known", size=MAX_CURVES)
+RESUMED = OF_LANE("step proposed before it was shortened to end at such a row, or 0", "s")
 ACTIVE = OF_LANE("contact whose impact speed is kept (1), or flight (0)", "", EACH)
 INVERSE_IMPACT = OF_LANE("1 / d'_0", "s/m", EACH)
 PEAK = OF_LANE("largest contact force", "N", EACH)
@@ -480,11 +482,11 @@ class Rules(NamedTuple):
     largest: int  # the objective is made of the largest value of its rate
     begin: int  # places of open joints, from `begin` on
     end: int  # and before `end`
-    curves: int  # tabulated ones, at whose rows steps may end
+    curves: int  # tabulated ones, if steps end at rows of any
 
 
 def rules_of(effects: Effects, curves: int = 0) -> Rules:
-    """Those of a set of effects, and of so many tabulated curves."""
+    """Those of a set of effects, and of so many tabulated curves at whose rows steps end."""
     e = effects
     largest = None if e.objective is None else e.objective.largest
     flags = (e.latched, e.torque, e.responses, e.impacts, e.profile, largest)

@@ -1,8 +1,9 @@
 """What a load may use of the motion that it is written into (`hpcclear.scene.loads`)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import piecewise
 from hpcclear.dynamics.linkage.balance import Balance, Pull, Twist
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named
@@ -22,12 +23,12 @@ class Acting:
 
     def __init__(
         self, load: str, kinematics: Kinematics, writer: Writer, balance: Balance,
-        curve: Callable[[str], Term],
+        curve: Callable[[str], Term], places: Mapping[str, int],
     ) -> None:  # fmt: skip
         self._load, self._kinematics, self._writer, self._balance = (
             load, kinematics, writer, balance,
         )  # fmt: skip
-        self._curve = curve
+        self._curve, self._places = curve, places
 
     # ---- what it is made of ----------------------------------------------------------------------
     def parameter(self, entry: str) -> Term:
@@ -86,9 +87,16 @@ class Acting:
         """`slope` times what is above 0 of a term."""
         return piecewise.hinge(self._writer, name, beyond, ZERO, slope)
 
-    def piecewise(self, rows: tuple[Any, ...], place: Term) -> Term:
-        """The value of a table, whose parameters are ``base.pieces.hinges`` of the load's name."""
-        return piecewise.term(self._writer, self._load, len(rows), place)
+    def piecewise(self, rows: tuple[Any, ...], place: Term, rate: Term) -> Term:
+        """The value of a table of `Load.straight` at a place that changes at a rate; steps end at its rows.
+
+        Its parameters are ``base.pieces.hinges`` of the load's name.
+        """
+        row = self._places.get(self._load)
+        value = piecewise.term(self._writer, self._load, len(rows), place, row)
+        if row is not None:
+            self._writer.line(f"work[{row + at.MAX_CURVES} * W + i] = {self._writer.text(rate)}")
+        return value
 
     # ---- what acts -------------------------------------------------------------------------------
     def push(self, place: str, force: Vector) -> None:

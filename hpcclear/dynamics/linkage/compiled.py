@@ -10,6 +10,7 @@ from types import ModuleType
 
 from hpcclear.base.one_text import module_of
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout import curves
 from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.generator import Motion
 
@@ -51,9 +52,9 @@ def motion(effects, lanes, tables, W):
 BANK = 8
 """Lanes of an implicit step's motion."""
 
-_LOOK_UP = """    for i in range(W):
-{before}        work[{place_row} * W + i] = {place}
-        work[{rate_row} * W + i] = {rate}
+_LOOK_UP = """    repeats, intervals = tables[{head} + {repeats}], tables[{head} + {intervals}]
+    for i in range(W):
+{before}        enter_table(work, {curve}, {place}, {rate}, repeats, intervals, i, W)
     look_up(work, tables, {curve}, W)
 """
 
@@ -64,8 +65,9 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
     looked_up = "".join(
         _LOOK_UP.format(
             curve=row - at.CURVES,
-            place_row=at.RATE_NOW + at.PLACES + row - at.CURVES,
-            rate_row=at.RATE_NOW + at.PLACE_RATES + row - at.CURVES,
+            head=curves.HEAD * (row - at.CURVES),
+            repeats=curves.REPEATS,
+            intervals=curves.INTERVALS,
             before="".join(f"        {line}\n" for line in one.before),
             place=one.place,
             rate=one.rate,

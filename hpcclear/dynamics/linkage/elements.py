@@ -9,14 +9,13 @@ from hpcclear.base.bits import no_more
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.curves import (
-    CUBICS,
+    CELL,
+    CELLS,
     GRID,
     HALVINGS,
     HEAD,
-    LAST,
-    LAST_PIECE,
-    REPEATS,
-    STARTS,
+    LAST_CELL,
+    PLACES,
 )
 
 _TINY = 1e-300  # keeps the direction of a vector without length defined (and zero)
@@ -61,39 +60,50 @@ def held_inverse(pivot, scale):
 
 
 @lane_function
-def look_up(work, tables, curve, W):
-    """Values of a tabulated curve (`layout.curves`) at the places of all lanes, cubic between two rows; level beyond both ends
-    of one that does not repeat.
+def enter_table(work, curve, place, rate, repeats, intervals, i, W):
+    """Leave the place on a tabulated curve (`layout.curves`), its rate and its interval where `look_up` and steps find them."""
+    x = place - repeats * math.floor(place)
+    interval = no_more(x * intervals, intervals - 1.0)
+    work[(at.RATE_NOW + at.PLACES + curve) * W + i] = x
+    work[(at.RATE_NOW + at.PLACE_RATES + curve) * W + i] = rate
+    work[(at.CURVES + curve) * W + i] = interval if interval > 0.0 else 0.0  # what is no number too
 
-    A loop over the lanes for each of its parts, the halvings among them, so that each is vectorised.
+
+@lane_function
+def look_up(work, tables, curve, W):
+    """Values of a curve at the places of all lanes, cubic between two rows; level beyond both ends of one that does not repeat.
+
+    Lane by lane: a vector would gather its numbers one by one. What is the same for all rows stands before, in vectors.
     """
+    place, value = at.RATE_NOW + at.PLACES + curve, at.CURVES + curve
+    cells = int(tables[HEAD * curve + CELLS])
+    if tables[HEAD * curve + HALVINGS] > 0.0:
+        halve(work, tables, curve, W)
+    for i in range(W):
+        cell = (cells + CELL * int(work[value * W + i])) & PLACES
+        s = no_more(work[place * W + i], 1.0) - tables[cell]
+        c = cell + (5 if s >= 0.0 else 1)
+        work[value * W + i] = tables[c] + s * (
+            tables[c + 1] + s * (tables[c + 2] + s * tables[c + 3])
+        )
+
+
+@lane_function
+def halve(work, tables, curve, W):
+    """Go from the intervals that the places of all lanes are in to their cells, where that takes halvings."""
     head = HEAD * curve
     place, value = at.RATE_NOW + at.PLACES + curve, at.CURVES + curve
-    repeats, last = tables[head + REPEATS], tables[head + LAST]
-    grid, starts = int(tables[head + GRID]), int(tables[head + STARTS])
-    cubics, pieces = int(tables[head + CUBICS]), tables[head + LAST_PIECE]
+    grid, cells = int(tables[head + GRID]), int(tables[head + CELLS])
     for i in range(W):
-        x = work[place * W + i]
-        x = x - repeats * math.floor(x)
-        work[place * W + i] = x
-        interval = no_more(x * (last + 1.0), last)
-        interval = interval if interval > 0.0 else 0.0  # what is no number as well
-        work[value * W + i] = tables[grid + int(interval)]
+        work[value * W + i] = tables[(grid + int(work[value * W + i])) & PLACES]
     step = 1 << int(tables[head + HALVINGS])
     while step > 1:
         step = step >> 1
         for i in range(W):
             k = work[value * W + i]
-            further = no_more(k + step, pieces)
-            there = tables[starts + int(further)] <= no_more(work[place * W + i], 1.0)
-            work[value * W + i] = further if there else k
-    for i in range(W):
-        k = int(work[value * W + i])
-        s = no_more(work[place * W + i], 1.0) - tables[starts + k]
-        c = cubics + 4 * k
-        work[value * W + i] = tables[c] + s * (
-            tables[c + 1] + s * (tables[c + 2] + s * tables[c + 3])
-        )
+            further = no_more(k + step, tables[head + LAST_CELL])
+            start = tables[(cells + CELL * int(further)) & PLACES]
+            work[value * W + i] = further if start <= no_more(work[place * W + i], 1.0) else k
 
 
 def functions() -> dict[str, Callable[..., object]]:

@@ -33,6 +33,7 @@ from hpcclear.dynamics.linkage.parts import (
     Slide,
     TorqueDrive,
     split,
+    straight_of,
 )
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.rubbing import (
@@ -125,7 +126,10 @@ class _Generator:
         for k, contact in enumerate(self.mechanism.contacts):
             self._contact(k, contact)
         for load in self.mechanism.loads:
-            acting = Acting(load.name, self.kinematics, self.writer, self.balance, self._turned)
+            acting = Acting(
+                load.name, self.kinematics, self.writer, self.balance, self._turned,
+                self.rows.places,
+            )  # fmt: skip
             self.load_power = self.load_power + load.act(acting)
         free = [d for d in self.mechanism.drives if isinstance(d, TorqueDrive)]
         torques = [self._torque(d) for d in free if not isinstance(d, (RunUp, Release))]
@@ -220,7 +224,8 @@ class _Generator:
         if drive.by_speed is not None:
             speed = self.kinematics.spin(self.forest.frames[drive.body])
             name = f"{drive.name}_by_speed"
-            torque = piecewise.term(write, name, len(drive.by_speed), speed)
+            row = self.rows.places.get(name)
+            torque = piecewise.term(write, name, len(drive.by_speed), speed, row)
             return Column("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
@@ -330,6 +335,12 @@ class _Generator:
     # ---- what is written down besides ------------------------------------------------------------
     def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
         on, write = self.on, self.writer
+        for drive in self.mechanism.drives:
+            for name in straight_of(drive):  # the rate of a speed is known last
+                if name in self.rows.places:
+                    angle = self.number[Column("angle", self.forest.frames[drive.body])]
+                    row = self.rows.places[name] + at.MAX_CURVES
+                    write.line(f"work[{row} * W + i] = {write.text(found[angle])}")
         if on.energies or on.series or on.responses or on.objective or on.pins:
             for rub in self.late:
                 rub.measure()

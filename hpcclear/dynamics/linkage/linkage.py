@@ -16,7 +16,8 @@ from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import Revolute, curves_of
+from hpcclear.dynamics.linkage.parts import Revolute, curves_of, straight_of
+from hpcclear.dynamics.linkage.piecewise import starts
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest, forest
@@ -94,7 +95,11 @@ class Linkage:
     def _text(self, on: On) -> Motion:
         """A text, in the rows that those before it have taken."""
         if on not in self._texts:
-            rows = Rows(parameters=self._given, free=self._free, curves=self.curve_rows)
+            first = at.RATE_NOW + at.PLACES + len(self.curve_rows)
+            places = {name: first + k for k, name in enumerate(self.straight)}
+            rows = Rows(
+                parameters=self._given, free=self._free, curves=self.curve_rows, places=places
+            )
             rows = rows.behind(self._bristles)
             text = generate(self.mechanism, on, rows, cartesian=self.cartesian)
             self._texts[on] = text
@@ -140,12 +145,26 @@ class Linkage:
             for one in (*self.mechanism.drives, *self.mechanism.loads)
             for name in curves_of(one)
         ]
-        if len(tabled) > at.MAX_CURVES:
+        count = len(tabled) + len(self.straight)
+        if count > at.MAX_CURVES:
             raise InputError(
-                "mechanism.loads", len(tabled), f"more than {at.MAX_CURVES} tabulated curves",
+                "mechanism.loads", count, f"more than {at.MAX_CURVES} tabulated curves",
                 "Give some of them as constants",
             )  # fmt: skip
         return {name: at.CURVES + k for k, name in enumerate(tabled)}
+
+    @cached_property
+    def straight(self) -> dict[str, list[str]]:
+        """Tables that run straight from row to row, and the parameters that say where they bend."""
+        parts = (*self.mechanism.drives, *self.mechanism.loads)
+        return {
+            name: starts(name, rows) for one in parts for name, rows in straight_of(one).items()
+        }
+
+    @property
+    def bends(self) -> list[list[int]]:
+        """Rows of the parameters where these tables bend."""
+        return [[self._given[name] for name in names] for names in self.straight.values()]
 
     def module(self, effects: at.Effects) -> ModuleType:
         """The module of its motion with these effects."""

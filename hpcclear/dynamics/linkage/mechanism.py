@@ -348,9 +348,13 @@ def massless_angles(m: Mechanism) -> set[str]:
     return found
 
 
-def turning(m: Mechanism) -> set[str]:
-    """Names of bodies whose angle is neither prescribed nor that of the ground."""
-    held = {drive.body for drive in m.drives if drive.prescribed}
+def turning(m: Mechanism, held_by: tuple[type, ...] | None = None) -> set[str]:
+    """Names of bodies whose angle is neither prescribed, or prescribed by such drives, nor that of the ground."""
+    held = {
+        drive.body
+        for drive in m.drives
+        if (drive.prescribed if held_by is None else isinstance(drive, held_by))
+    }
     still: set[str] = set()
     for group in joined(m, (Slide, Fixed)):
         if GROUND in group or group & held:

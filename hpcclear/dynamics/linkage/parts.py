@@ -350,6 +350,11 @@ class TorqueDrive:
     prescribed: ClassVar[bool] = False
 
     @property
+    def straight(self) -> dict[str, tuple[Pair, ...]]:
+        """Its table over the speed, by the name that its parameters begin with."""
+        return {} if self.by_speed is None else {f"{self.name}_by_speed": self.by_speed}
+
+    @property
     def usual_speed(self) -> float:
         """About how fast it turns, rad/s: what is expected, or else what it starts with."""
         return self.initial_speed if self.expected_speed is None else self.expected_speed
@@ -427,6 +432,12 @@ def curves_of(part: Drive | Load) -> list[str]:
     if isinstance(part, (TableDrive, RunUp)):
         return [f"{part.name}.{one}" for one in part.curves]
     return [part.name] if getattr(part, "table", False) else []
+
+
+def straight_of(part: Drive | Load) -> dict[str, tuple[Pair, ...]]:
+    """Tables of a drive or load that run straight from row to row, over a speed or a distance."""
+    found: dict[str, tuple[Pair, ...]] = getattr(part, "straight", {})
+    return found
 
 
 def split(place: str) -> tuple[str, str]:

@@ -1,12 +1,27 @@
-"""Tables that run straight from row to row and stay level beyond: a sum of hinges, which lanes evaluate without a branch."""
+"""Tables that run straight from row to row and stay level beyond: a sum of hinges, which lanes evaluate without a branch.
+
+Their rows are parameters, as they may differ from sample to sample; steps end at them (`stepping.rows`).
+"""
+
+from typing import Any
 
 from hpcclear.dynamics.linkage.expression import Term, Writer, named
 
 
-def term(write: Writer, name: str, count: int, at: Term) -> Term:
-    """The value of a table of so many rows, whose parameters `base.pieces.hinges` gives."""
+def starts(name: str, rows: tuple[Any, ...]) -> list[str]:
+    """Names of the parameters where a table bends."""
+    return [f"{name}_start_{k}" for k in range(len(rows))]
+
+
+def term(write: Writer, name: str, count: int, where: Term, row: int | None) -> Term:
+    """The value of a table of so many rows at a place, which is left in a row of the lanes if there is one for it.
+
+    Its parameters are those of `base.pieces.hinges`.
+    """
     total = write.parameter(f"{name}_first")
-    place = write.let(f"at_{name}", at, whole=True)
+    place = write.let(f"at_{name}", where, whole=True)
+    if row is not None:
+        write.line(f"work[{row} * W + i] = {write.text(place)}")
     for k in range(count):
         start, bend = (write.parameter(f"{name}_{entry}_{k}") for entry in ("start", "bend"))
         total = total + hinge(write, f"{name}_{k}", place, start, bend)

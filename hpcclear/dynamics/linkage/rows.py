@@ -19,6 +19,9 @@ class Rows:
     parameters: Mapping[str, int] = field(default_factory=dict)
     free: int = 0
     curves: Mapping[str, int] = field(default_factory=dict)  # tabulated values, by drive or load
+    places: Mapping[str, int] = field(
+        default_factory=dict
+    )  # on straight tables; rates MAX_CURVES behind
 
     def behind(self, bristles: int) -> "Rows":
         """The same of a motion whose coordinates come after so many of bristles."""

@@ -11,7 +11,15 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Slide, TableDrive, seconds_of, split
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Slide,
+    TableDrive,
+    as_complex,
+    seconds_of,
+    split,
+    straight_of,
+)
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
 from hpcclear.dynamics.planar.path import rigid_acceleration
@@ -82,7 +90,13 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
     curves = curves_of(scene.linkage, scene.numerics.interpolation)
     tabled = [load for load in mechanism.loads if load.name in curves]
     by_time = {load.name for load in tabled if seconds_of(load)}
-    coarse = prescribed_motion(mechanism, times) if len(tabled) > len(by_time) else None
+    straight = [(load, rows) for load in mechanism.loads for rows in straight_of(load).values()]
+    by_place = straight or len(tabled) > len(by_time)
+    coarse = prescribed_motion(mechanism, times) if by_place else None
+    for load, rows in straight:
+        assert coarse is not None
+        distance = _distance(coarse, load.first, load.second)  # type: ignore[union-attr]
+        found.append(_crossed(np.array(rows)[:, 0], *distance, times))
     for load in tabled:
         curve = curves[load.name]
         stops = breaks(curve, BEND)
@@ -91,7 +105,9 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
             continue
         body = getattr(load, "angle_of", None) or mechanism.period.body
         turned = coarse.assembly.loops.forest.index("angle", body)
-        found.append(_crossed(stops, coarse.q[:, turned], coarse.v[:, turned], times, curve.length))
+        angle = coarse.q[:, turned]
+        levels = np.sort(_levels(stops, True, angle / curve.length)) * curve.length
+        found.append(_crossed(levels, angle, coarse.v[:, turned], times))
     every = np.unique(np.concatenate(found))
     return every[(every > times[0]) & (every < times[-1])]
 
@@ -104,10 +120,9 @@ def _levels(stops: Array, repeats: bool, shares: Array) -> Array:
     return (lengths[:, None] + stops).ravel()
 
 
-def _crossed(stops: Array, angle: Array, spin: Array, times: Array, length: float) -> Array:
-    """When an angle (t,), between instants (t,) the cubic through its values and rates, is at rows of a table."""
-    levels = np.sort(_levels(stops, True, angle / length)) * length
-    a, b = angle[:-1], angle[1:]
+def _crossed(levels: Array, place: Array, rate: Array, times: Array) -> Array:
+    """When a place (t,), between instants (t,) the cubic through its values and rates, is at ascending levels."""
+    a, b = place[:-1], place[1:]
     first = np.searchsorted(levels, np.minimum(a, b))
     count = np.searchsorted(levels, np.maximum(a, b), side="right") - first
     k = np.repeat(np.arange(len(a)), count)
@@ -117,7 +132,7 @@ def _crossed(stops: Array, angle: Array, spin: Array, times: Array, length: floa
     rising = b[k] > a[k]
     for _ in range(50):
         s = 0.5 * (low + high)
-        there = _between(a[k], h * spin[k], b[k], h * spin[k + 1], s)
+        there = _between(a[k], h * rate[k], b[k], h * rate[k + 1], s)
         beyond = (there > level) == rising
         low, high = np.where(beyond, low, s), np.where(beyond, s, high)
     return np.asarray(times[k] + h * s) if len(k) else np.zeros(0)
@@ -133,25 +148,45 @@ def _between(d0: Array, m0: Array, d1: Array, m1: Array, s: Array) -> Array:
     return np.asarray(d0 + s * (m0 + s * (c2 + s * c3)))
 
 
+def _motion_of(held: Prescribed, body: str) -> tuple[Array, Array, Array]:
+    """Mass centre and angle of a body (3, t), their velocities and accelerations."""
+    forest = held.assembly.loops.forest
+    columns = [forest.index(kind, body) for kind in ("x", "y", "angle")]
+    still = np.zeros(len(held.times))
+    q, v, a = (
+        np.array([still if column is None else motion[:, column] for column in columns])
+        for motion in (held.q, held.v, held.a)
+    )
+    q[2] += forest.offsets[body]
+    return q, v, a
+
+
+def _distance(held: Prescribed, first: str, second: str) -> tuple[Array, Array]:
+    """Distance of two places (t,), m, and its rate."""
+    apart, moving = np.zeros((2, len(held.times)), complex)
+    mechanism = held.assembly.loops.mechanism
+    for place, sign in ((first, 1.0), (second, -1.0)):
+        name, point = split(place)
+        if name == GROUND:
+            apart += sign * as_complex(mechanism.ground[point])
+            continue
+        q, v, _ = _motion_of(held, name)
+        body = mechanism.body(name)
+        arm = (as_complex(body.points[point]) - as_complex(body.center)) * np.exp(1j * q[2])
+        apart += sign * (as_complex(q[:2]) + arm)
+        moving += sign * (as_complex(v[:2]) + 1j * v[2] * arm)
+    return np.abs(apart), (apart.conj() * moving).real / np.maximum(np.abs(apart), 1e-300)
+
+
 def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
     """Acceleration of the followed point, x + iy, or of the guided body along its guide, (t,); NaN where none is followed."""
-    follow, mechanism, forest = (
-        linkage.follow,
-        held.assembly.loops.mechanism,
-        held.assembly.loops.forest,
-    )
+    follow, mechanism = linkage.follow, held.assembly.loops.mechanism
     if not follow:
         return np.full(len(held.times), np.nan)
     guides = [j for j in mechanism.joints if isinstance(j, Slide) and split(j.point)[0] == follow]
     place = follow if "." in follow else guides[0].point
-    body = split(place)[0]
-    columns = [forest.index(kind, body) for kind in ("x", "y", "angle")]
-    still = np.zeros(len(held.times))
-    q, v, rows = (
-        np.array([still if column is None else motion[:, column] for column in columns])
-        for motion in (held.q, held.v, held.a)
-    )
-    found = rigid_acceleration(mechanism, place, rows, q[2] + forest.offsets[body], v[2])
+    q, v, rows = _motion_of(held, split(place)[0])
+    found = rigid_acceleration(mechanism, place, rows, q[2], v[2])
     return found if "." in follow else (found * np.exp(-1j * guides[0].angle)).real
 
 
@@ -216,18 +251,18 @@ def _work(power: Array, times: Array) -> Array:
 
 
 def _reactions(scene: Scene, found: Prescribed) -> dict[str, Array]:
-    """Forces of the pins (t, pins), or by the names of a template, which has columns of joints with clearance besides."""
+    """Forces of the pins (t, pins), and by the names of a template, which has columns of joints with clearance besides."""
     holds = found.holds
+    pins = pins_of(linkage_of(scene).mechanism)
+    forces = {
+        f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins]).T for axis in "xy"
+    }
     if scene.template is None:
-        pins = pins_of(linkage_of(scene).mechanism)
-        return {
-            f"pin_force_{axis}": np.array([holds[f"{pin}_{axis}"] for pin in pins]).T
-            for axis in "xy"
-        }
+        return forces
     parts = {
         name: np.array([sign * holds[one] for one, sign in ones]).T
         for name, ones in scene.template.HOLDS.items()
     }
     none = at_places(scene, np.zeros((len(found.times), 0)))
     single = {name: part[:, 0] if part.shape[1] == 1 else part for name, part in parts.items()}
-    return dict.fromkeys(OF_CONTACTS, none) | single
+    return dict.fromkeys(OF_CONTACTS, none) | single | forces

@@ -14,8 +14,16 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import GROUND, Harmonic, Slide, TableDrive, TorqueDrive, split
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, turning
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    ConstantSpeed,
+    Harmonic,
+    Slide,
+    TableDrive,
+    TorqueDrive,
+    split,
+)
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar import bristles, swings
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
@@ -50,6 +58,8 @@ def linkage_of(scene: Scene) -> Linkage:
     mechanism = mechanism_of(shown.linkage)
     check_drives(mechanism)
     cartesian = scene.numerics.formulation == "baumgarte"
+    if cartesian:
+        check_inertias(mechanism)
     follow = scene.linkage.followed or guided(mechanism)
     _check_followed(scene, follow)
     bristles.check_room(scene, len(forest(mechanism, cartesian).coordinates))
@@ -109,6 +119,19 @@ def check_drives(mechanism: Mechanism) -> None:
                 f"mechanism.drives.{drive.name}.period", False,
                 f"prescribes an angle by time, but {main.name!r}, whose speed is free, defines the period",
                 "Set period = true here",
+            )  # fmt: skip
+
+
+def check_inertias(m: Mechanism) -> None:
+    """InputError where a body by itself would need an inertia that it does not have: its angle does not grow evenly."""
+    found = {body.name for body in m.bodies if body.inertia == 0.0} & turning(m, (ConstantSpeed,))
+    found -= {drive.body for drive in m.drives if getattr(drive, "inertia", 0.0)}
+    for body in m.bodies:
+        if body.name in found:
+            raise InputError(
+                f"mechanism.bodies.{body.name}.inertia", body.inertia,
+                'the formulation "baumgarte" turns each body by itself, and needs an inertia for that',
+                'Write the moment of inertia about its mass centre in kg m2, or numerics.formulation = "minimal"',
             )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
+    Acting,
     LooseSlide,
     LooseSlot,
     Revolute,
@@ -81,7 +82,7 @@ def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
         **mode_series(scene.modes, seen.q, seen.v, strain),
         **guide_series(mechanism, pose),
         **held,
-        **pin_series(scene, mechanism, seen.pins),
+        **({} if scene.modes else pin_series(mechanism, seen.pins)),
     }
 
 
@@ -90,12 +91,27 @@ def pins_of(mechanism: Mechanism) -> tuple[str, ...]:
     return tuple(joint.name for joint in mechanism.joints if type(joint) is Revolute)
 
 
-def pin_series(scene: Scene, mechanism: Mechanism, pins: Array) -> dict[str, Array]:
-    """Forces of the ideal pins on their journals' bodies (t, pins); none where a bar bends, which leaves them unknown."""
+def pin_series(mechanism: Mechanism, pins: Array) -> dict[str, Array]:
+    """Forces of the ideal pins on their journals' bodies (t, pins); where a bar bends they are not known."""
     count = len(pins_of(mechanism))
-    if scene.template is not None or scene.modes or not count:
-        return {}
-    return {f"pin_force_{axis}": pins[:, k, :count] for k, axis in enumerate("xy")}
+    return {f"pin_force_{axis}": pins[:, k, :count] for k, axis in enumerate("xy") if count}
+
+
+def wound_up(mechanism: Mechanism, series: Mapping[str, Any]) -> list[str]:
+    """A sentence for each load that goes by an angle and was turned by more than a revolution."""
+    names, found = [body.name for body in mechanism.bodies], []
+    for load in mechanism.loads:
+        if isinstance(load, Acting) and load.by_angle and "body_angle" in series:
+            angle = series["body_angle"][:, names.index(load.body)]  # type: ignore[attr-defined]
+            if (other := getattr(load, "other", None)) is not None:
+                angle = angle - series["body_angle"][:, names.index(other)]
+            turns = float(np.ptp(angle)) / at.TURN
+            if turns > 1.0:
+                found.append(
+                    f"the load {load.name} is wound up by {turns:.3g} turns: its torque goes by the whole angle of "
+                    f"{load.body}. Couple bodies that go round together if it is not meant to"  # type: ignore[attr-defined]
+                )
+    return found
 
 
 def at_places(scene: Scene, columns: Array) -> Array:

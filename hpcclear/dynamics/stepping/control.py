@@ -63,32 +63,22 @@ def shorten_to_rows(rules, work, W):
         c = curve & at.CURVE_MASK
         for i in range(W):
             rate = work[(at.RATE_OLD + at.PLACE_RATES + c) * W + i]
-            ahead, behind = work[(at.AHEAD + c) * W + i], work[(at.BEHIND + c) * W + i]
-            left = (ahead if rate > 0.0 else behind) / max(abs(rate), 1e-300)
-            h = work[at.STEP * W + i]
-            work[at.STEP * W + i] = left if (left > 0.0) & (left < h) else h
-    for i in range(W):
-        asked = work[at.NEXT_STEP * W + i]
-        work[at.RESUMED * W + i] = asked if work[at.STEP * W + i] < asked else 0.0
+            place = work[(at.RATE_OLD + at.PLACES + c) * W + i]
+            ahead, behind = work[(at.NEXT_ROW + c) * W + i], work[(at.LAST_ROW + c) * W + i]
+            left = ((ahead if rate > 0.0 else behind) - place) / (rate + 1e-300)
+            h, asked = work[at.STEP * W + i], work[at.NEXT_STEP * W + i]
+            h = left if (left > 0.0) & (left < h) else h
+            work[at.STEP * W + i] = h
+            work[at.RESUMED * W + i] = asked if h < asked else 0.0
 
 
 @lane_function
-def moved_on(work, c, i, W):
-    """By how much the place of table c has moved in a step: whole lengths are those that its rates say."""
-    moved = (
-        work[(at.RATE_NOW + at.PLACES + c) * W + i] - work[(at.RATE_OLD + at.PLACES + c) * W + i]
-    )
-    now = work[(at.RATE_NOW + at.PLACE_RATES + c) * W + i]
-    mean = 0.5 * (now + work[(at.RATE_OLD + at.PLACE_RATES + c) * W + i])
-    return moved + math.floor(work[at.STEP * W + i] * mean - moved + 0.5)
-
-
-@lane_function
-def row_reach(work, c, moved, i, W):
+def row_reach(work, c, i, W):
     """How near the end of a step a row is taken to be there: no nearer than places are rounded."""
     rate = abs(work[(at.RATE_NOW + at.PLACE_RATES + c) * W + i])
-    lengths = (work[at.BEGAN * W + i] + work[at.TIME * W + i]) * rate
-    return ROW_REACH * abs(moved) + ROUNDED * (lengths + 100.0)
+    time = work[at.BEGAN * W + i] + work[at.TIME * W + i]
+    place = abs(work[(at.RATE_NOW + at.PLACES + c) * W + i])
+    return rate * (ROW_REACH * work[at.STEP * W + i] + ROUNDED * time) + ROUNDED * (100.0 + place)
 
 
 @lane_function
@@ -97,28 +87,23 @@ def flag_rows(rules, work, W):
     for curve in range(rules.curves):
         c = curve & at.CURVE_MASK
         for i in range(W):
-            moved = moved_on(work, c, i, W)
-            reach = row_reach(work, c, moved, i, W)
-            on = 1.0 if moved >= work[(at.AHEAD + c) * W + i] - reach else 0.0
-            left = work[(at.BEHIND + c) * W + i] - reach
-            back = 1.0 if (moved < 0.0) & (-moved >= left) else 0.0
-            flag_accepted(work, max(on, back), i, W)
+            place = work[(at.RATE_NOW + at.PLACES + c) * W + i]
+            ahead = work[(at.NEXT_ROW + c) * W + i] - place
+            behind = place - work[(at.LAST_ROW + c) * W + i]
+            on = 1.0 if min(ahead, behind) <= row_reach(work, c, i, W) else 0.0
+            flag_accepted(work, on, i, W)
 
 
 @lane_function
 def commit_rows(rules, work, W):
-    """Places of tables, and how far the rows are at which steps end, after a step."""
+    """Places of tables and their rates after a step."""
     for curve in range(rules.curves):
         c = curve & at.CURVE_MASK
         for i in range(W):
             yes = work[at.ACCEPT * W + i] == 1.0
-            moved = moved_on(work, c, i, W)
-            keep(work, at.AHEAD + c, work[(at.AHEAD + c) * W + i] - moved, yes, i, W)
-            keep(work, at.BEHIND + c, work[(at.BEHIND + c) * W + i] + moved, yes, i, W)
-        for row in (at.PLACES + c, at.PLACE_RATES + c):
-            for i in range(W):
-                yes = work[at.ACCEPT * W + i] == 1.0
-                keep(work, at.RATE_OLD + row, work[(at.RATE_NOW + row) * W + i], yes, i, W)
+            place, rate = at.PLACES + c, at.PLACE_RATES + c
+            keep(work, at.RATE_OLD + place, work[(at.RATE_NOW + place) * W + i], yes, i, W)
+            keep(work, at.RATE_OLD + rate, work[(at.RATE_NOW + rate) * W + i], yes, i, W)
 
 
 @lane_function

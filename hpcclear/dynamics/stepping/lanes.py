@@ -93,7 +93,7 @@ class Lanes:
         effects = problem.effects._replace(sliding=sliding)
         self._observed = None if observed is None else observed._replace(sliding=sliding)
         measured = effects._replace(impacts=(observed or effects).impacts)
-        self._rules = at.rules_of(measured, len(problem.curves))
+        self._rules = at.rules_of(measured, problem.stopping_curves)
         measures = at.measures_of(observed or problem.effects)
         self._method = at.Method(
             problem.settings().rows,

@@ -137,10 +137,17 @@ class Problem:
     @cached_property
     def tables(self) -> Array:
         """The tabulated curves as the kernel reads them, shape (n,) (`layout.curves.packed`)."""
-        return packed(self.curves, self.stops)
+        return packed(self.curves, self.stops, self.linkage.bends)
 
     @cached_property
     def stops(self) -> tuple[Array, ...]:
         """Where steps end in each curve, shares of its length: at rows around which it bends (`base.pieces.breaks`)."""
         tolerance = FOLLOWED * math.sqrt(self.rtol)
         return tuple(breaks(curve, tolerance) for curve in self.curves)
+
+    @property
+    def stopping_curves(self) -> int:
+        """How many tables a stepper watches: all of them, if steps end at rows of any."""
+        bends = self.linkage.bends
+        ending = bends or any(len(ends) for ends in self.stops)
+        return len(self.curves) + len(bends) if ending else 0

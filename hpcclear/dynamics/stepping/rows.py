@@ -8,8 +8,15 @@ import math
 
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.curves import BREAK_COUNT, BREAKS, HEAD, REPEATS
-from hpcclear.dynamics.stepping.control import moved_on, row_reach
+from hpcclear.dynamics.layout.curves import (
+    BREAK_COUNT,
+    BREAKS,
+    HEAD,
+    IN_PARAMETERS,
+    PLACES,
+    REPEATS,
+)
+from hpcclear.dynamics.stepping.control import row_reach
 from hpcclear.dynamics.stepping.events import impact_fraction
 from hpcclear.dynamics.stepping.stops import cut
 
@@ -17,13 +24,25 @@ FAR = 1e300
 
 
 @lane_event
+def moved_on(lane, W, work, c):
+    """By how much the place of table c has moved in a step: whole lengths are those that its rates say."""
+    old, now = at.RATE_OLD * W + lane, at.RATE_NOW * W + lane
+    moved = work[now + (at.PLACES + c) * W] - work[old + (at.PLACES + c) * W]
+    mean = 0.5 * (work[now + (at.PLACE_RATES + c) * W] + work[old + (at.PLACE_RATES + c) * W])
+    return moved + math.floor(work[at.STEP * W + lane] * mean - moved + 0.5)
+
+
+@lane_event
 def before_row(lane, W, work, c):
     """Fraction of this step at which the place of table c comes to the next row; 2 if it does not, or at the end."""
-    moved = moved_on(work, c, lane, W)
+    ahead, behind = work[(at.NEXT_ROW + c) * W + lane], work[(at.LAST_ROW + c) * W + lane]
+    moved = moved_on(lane, W, work, c)
     way = 1.0 if moved > 0.0 else -1.0
-    left = work[((at.AHEAD if moved > 0.0 else at.BEHIND) + c) * W + lane]
-    reach = row_reach(work, c, moved, lane, W)
-    if abs(moved) <= left + reach or left <= reach:
+    left = way * (
+        (ahead if moved > 0.0 else behind) - work[(at.RATE_OLD + at.PLACES + c) * W + lane]
+    )
+    reach = row_reach(work, c, lane, W)
+    if ahead <= behind or abs(moved) <= left + reach or left <= reach:
         return 2.0
     h = way * work[at.STEP * W + lane]
     first = h * work[(at.RATE_OLD + at.PLACE_RATES + c) * W + lane]
@@ -32,7 +51,7 @@ def before_row(lane, W, work, c):
 
 
 @lane_event
-def stop_at_rows(rules, lane, W, work, tables):
+def stop_at_rows(rules, lane, W, work):
     """Shorten the step to the first row beyond which it goes."""
     first = 2.0
     for c in range(rules.curves):
@@ -42,12 +61,19 @@ def stop_at_rows(rules, lane, W, work, tables):
 
 
 @lane_event
-def row_before(tables, first, count, place):
-    """Number of the last of so many ascending rows at or before a place, -1 of none."""
-    low, high = -1, count
+def row_of(lane, W, par, tables, c, k):
+    """Where row k of table c stands: a share of its length, or what the sample's parameters say."""
+    row = tables[(int(tables[HEAD * c + BREAKS]) + k) & PLACES]
+    return par[int(row) * W + lane] if tables[HEAD * c + IN_PARAMETERS] == 1.0 else row
+
+
+@lane_event
+def row_before(lane, W, par, tables, c, place):
+    """Number of the last row at or before a place, -1 of none."""
+    low, high = -1, int(tables[HEAD * c + BREAK_COUNT])
     while high - low > 1:
         middle = (low + high) // 2
-        if tables[first + middle] <= place:
+        if row_of(lane, W, par, tables, c, middle) <= place:
             low = middle
         else:
             high = middle
@@ -55,51 +81,34 @@ def row_before(tables, first, count, place):
 
 
 @lane_event
-def row_at(tables, first, count, repeats, k):
-    """Where row k stands; those before the first and behind the last are a length off, or nowhere."""
+def row_at(lane, W, par, tables, c, k):
+    """The same; of rows before the first and behind the last, a length off or nowhere."""
+    count = int(tables[HEAD * c + BREAK_COUNT])
     if 0 <= k < count:
-        return tables[first + k]
-    if not repeats:
+        return row_of(lane, W, par, tables, c, k)
+    if tables[HEAD * c + REPEATS] == 0.0:
         return FAR if k > 0 else -FAR
-    return tables[first + k - count] + 1.0 if k > 0 else tables[first + k + count] - 1.0
+    further = 1.0 if k > 0 else -1.0
+    return row_of(lane, W, par, tables, c, k - int(further) * count) + further
 
 
 @lane_event
-def row_near(tables, first, count, repeats, place):
-    """Number of the row that is nearest to a place."""
-    if repeats:
-        place -= math.floor(place)
-    k = row_before(tables, first, count, place)
-    before = row_at(tables, first, count, repeats, k)
-    behind = row_at(tables, first, count, repeats, k + 1)
-    near = k if place - before < behind - place else k + 1
-    return (near + count) % count
+def next_rows(lane, W, work, par, tables, c):
+    """The rows around the end of this step: of one that it ends at, beyond it.
 
-
-@lane_event
-def next_rows(lane, W, work, tables, c):
-    """Distances to the rows around the end of this step, where it is at one or where they are not known."""
-    head = HEAD * c
-    first, count = int(tables[head + BREAKS]), int(tables[head + BREAK_COUNT])
-    repeats = tables[head + REPEATS] == 1.0
-    moved = moved_on(work, c, lane, W)
-    place = work[(at.RATE_NOW + at.PLACES + c) * W + lane]
-    ahead = work[(at.AHEAD + c) * W + lane] - moved
-    behind = work[(at.BEHIND + c) * W + lane] + moved
-    reach = row_reach(work, c, moved, lane, W)
-    if count == 0:
-        ahead, behind = FAR, FAR
-    elif ahead + behind <= 0.0:
-        k = row_before(tables, first, count, place)
-        ahead = row_at(tables, first, count, repeats, k + 1) - place
-        behind = place - row_at(tables, first, count, repeats, k)
-    elif moved >= 0.0 and ahead <= reach:
-        k = row_near(tables, first, count, repeats, place + ahead)
-        row, beyond = tables[first + k], row_at(tables, first, count, repeats, k + 1)
-        ahead, behind = beyond - row + ahead, -ahead
-    elif moved < 0.0 and behind <= reach:
-        k = row_near(tables, first, count, repeats, place - behind)
-        row, beyond = tables[first + k], row_at(tables, first, count, repeats, k - 1)
-        ahead, behind = -behind, row - beyond + behind
-    work[(at.AHEAD + c) * W + lane] = ahead + moved
-    work[(at.BEHIND + c) * W + lane] = behind - moved
+    The first row of a table that repeats is at 0, so that no place between two rows is a length off.
+    """
+    count = int(tables[HEAD * c + BREAK_COUNT])
+    ahead, behind = FAR, -FAR
+    if count > 0:
+        place = work[(at.RATE_NOW + at.PLACES + c) * W + lane]
+        reach = row_reach(work, c, lane, W)
+        onward = work[(at.RATE_NOW + at.PLACE_RATES + c) * W + lane] >= 0.0
+        place += reach if onward else -reach
+        k = row_before(lane, W, par, tables, c, place)
+        if tables[HEAD * c + REPEATS] == 1.0 and place >= 1.0:
+            k = count
+        behind = row_at(lane, W, par, tables, c, k)
+        ahead = row_at(lane, W, par, tables, c, k + 1)
+    work[(at.NEXT_ROW + c) * W + lane] = ahead
+    work[(at.LAST_ROW + c) * W + lane] = behind

@@ -55,7 +55,7 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
     status = failure(lane, W, n, work, block.stages, settings)
     if status == OK and work[at.ACCEPT * W + lane] == 1.0:
         if rules.curves > 0:  # first: contacts are latched at the ends of steps that stay
-            stop_at_rows(rules, lane, W, work, tables)
+            stop_at_rows(rules, lane, W, work)
         if rules.latched and work[at.ACCEPT * W + lane] == 1.0:
             stop_at_impacts(rules, lane, W, work, settings)
         if work[at.ACCEPT * W + lane] == 1.0:
@@ -66,7 +66,7 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
             for p in range(rules.begin, rules.end):
                 integrate_gap(lane, W, work, p)
             for c in range(rules.curves):
-                next_rows(lane, W, work, tables, c)
+                next_rows(lane, W, work, block.par, tables, c)
     return status
 
 

@@ -29,7 +29,7 @@ KIND = kind_of(
         "mode": text(("mode",), "bending mode: name of the bar and number of half waves"),
         "mode_amplitude": number(("time", "mode"), "m", "amplitude of the mode, its largest deflection"),
         "mode_velocity": number(("time", "mode"), "m/s", "rate of change of the amplitude"),
-        "pin": text(("pin",), "pin of a linkage without clearance"),
+        "pin": text(("pin",), "pin without clearance"),
         "pin_force_x": number(("time", "pin"), "N", "x force of the pin on its journal's body"),
         "pin_force_y": number(("time", "pin"), "N", "y force of the pin on its journal's body"),
         "point_x": number(("time", "point"), "m", "x position of the point"),

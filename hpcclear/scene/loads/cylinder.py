@@ -34,6 +34,11 @@ class CylinderLoad(Load):
     damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
     """Damping along the line between both points, N s/m."""
 
+    @property
+    def straight(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """The force, if it is a table."""
+        return {self.name: self.force} if isinstance(self.force, tuple) else {}
+
     def numbers(self) -> dict[str, Any]:
         """Its damping, and its force or where the table of it bends."""
         found = super().numbers()
@@ -46,7 +51,7 @@ class CylinderLoad(Load):
             along, *apart, *moving, results=("nx", "ny", "length", "rate")
         )
         if isinstance(self.force, tuple):
-            push = on.piecewise(self.force, length)
+            push = on.piecewise(self.force, length, rate)
         else:
             push = on.parameter("force")
         push = on.let(f"push_{self.name}", push - on.parameter("damping") * rate)

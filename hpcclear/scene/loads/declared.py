@@ -23,6 +23,11 @@ class Load(Table):
     by_angle: ClassVar[bool] = False
     """Whether it goes by the angle of a body, or between two, which must not go round with the revolutions."""
 
+    @property
+    def straight(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """Its tables that run straight from row to row (`Acting.piecewise`), by the names that their parameters begin with."""
+        return {}
+
     def numbers(self) -> dict[str, Any]:
         """Parameters of its terms, ``NAME_ENTRY``, SI; numbers or arrays of samples: its entries that are numbers."""
         entries = {entry: getattr(self, entry) for entry in type(self).model_fields}
