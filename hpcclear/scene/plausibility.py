@@ -75,9 +75,10 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
                 f"{key}.inertia = {own:g} kg m2 is {own / (bar.mass * length**2):.2g} times mass times length squared; "
                 "check the unit, or give a flywheel as flywheel_inertia of a drive"
             )
-    places = [one for body in (scene.linkage.ground, *scene.linkage.bodies) for one in body.points]
+    points = [scene.linkage.ground.points, *(body.points for _, body in bodies)]
+    places = [one for own in points for one in own]
     sizes = [*(length for _, _, length in bars), *(math.hypot(one.x, one.y) for one in places)]
-    heaviest = 5.0 * STEEL * (max(sizes) or math.inf) ** 3
+    heaviest = 5.0 * STEEL * (max(sizes, default=0.0) or math.inf) ** 3
     for key, body in bodies:
         if body.mass > heaviest:
             yield (
