@@ -46,4 +46,4 @@ def test_wanted_kinds_get_a_sentence(row, words):
     with pytest.raises(InputError, match="is not one of the known values") as error:
         load_scene(LINKAGE).with_({"mechanism.loads.wanted": row})
     assert words in error.value.remedy
-    assert re.search(r"Did you mean|Use one of: force, torque, spring", error.value.remedy)
+    assert re.search(r"Did you mean|Use one of: cylinder, drag, force", error.value.remedy)

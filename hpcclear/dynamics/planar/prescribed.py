@@ -95,7 +95,7 @@ def passings(scene: Scene, mechanism: Mechanism, times: Array) -> Array:
     coarse = prescribed_motion(mechanism, times) if by_place else None
     for load, rows in straight:
         assert coarse is not None
-        distance = _distance(coarse, load.first, load.second)  # type: ignore[union-attr]
+        distance = _distance(coarse, load.first, load.second)  # type: ignore[attr-defined]
         found.append(_crossed(np.array(rows)[:, 0], *distance, times))
     for load in tabled:
         curve = curves[load.name]

@@ -13,7 +13,6 @@ from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
-    Acting,
     LooseSlide,
     LooseSlot,
     Revolute,
@@ -101,7 +100,7 @@ def wound_up(mechanism: Mechanism, series: Mapping[str, Any]) -> list[str]:
     """A sentence for each load that goes by an angle and was turned by more than a revolution."""
     names, found = [body.name for body in mechanism.bodies], []
     for load in mechanism.loads:
-        if isinstance(load, Acting) and load.by_angle and "body_angle" in series:
+        if load.by_angle and "body_angle" in series:
             angle = series["body_angle"][:, names.index(load.body)]  # type: ignore[attr-defined]
             if (other := getattr(load, "other", None)) is not None:
                 angle = angle - series["body_angle"][:, names.index(other)]
