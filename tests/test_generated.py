@@ -12,12 +12,15 @@ from plain_lane import joints_of as joints_of_lane
 from scipy.integrate import solve_ivp
 from some_laws import effects_with
 
+from hpcclear.base.jit import FASTMATH
+from hpcclear.base.lowering.compiled import assembly_of, optimised_module
+from hpcclear.base.one_text import text_named
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
 from hpcclear.dynamics.linkage.compiled import module_with
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.parts import ConstantSpeed
-from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text
+from hpcclear.dynamics.linkage.rhs import KINDS, motion_text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 from assembly import executed_arithmetic
@@ -166,14 +169,12 @@ def test_whole_motions_are_the_dense_model_s_and_conserve_energy(mechanism, end)
 
 
 @pytest.mark.parametrize("mechanism", [four_bar("o2", "o3"), six_bar("o3", "o6")])
-def test_generated_motions_are_packed(mechanism, tmp_path, monkeypatch):
-    """Compiled anew: machine code that is loaded has no text."""
-    monkeypatch.setattr("hpcclear.base.cached.chosen_folder", lambda: str(tmp_path))
+def test_generated_motions_are_packed(mechanism):
     lane = Lane(mechanism, On(friction=True))
     joints, W = joints_of_lane(mechanism), 32
     effects = effects_with({"fixed", "coulomb"})
     text = motion_text(module_with(lane.text, joints), effects, W)
-    code = compiled_text.__wrapped__(text)
-    found = executed_arithmetic(code._library.get_asm_str())
+    code = optimised_module(getattr(text_named(text), text), KINDS, FASTMATH)
+    found = executed_arithmetic(assembly_of(code))
     assert found.packed.total() > 100
     assert found.packed_share >= 0.9

@@ -134,9 +134,9 @@ def look_up(work, tables, curve, W):
             there = tables[starts + int(further)] <= no_more(work[place * W + i], 1.0)
             work[value * W + i] = further if there else k
     for i in range(W):
-        k = int(work[value * W + i])
-        s = no_more(work[place * W + i], 1.0) - tables[starts + k]
-        c = cubics + 4 * k
+        row = int(work[value * W + i])
+        s = no_more(work[place * W + i], 1.0) - tables[starts + row]
+        c = cubics + 4 * row
         work[value * W + i] = tables[c] + s * (
             tables[c + 1] + s * (tables[c + 2] + s * tables[c + 3])
         )
