@@ -5,13 +5,12 @@ from collections import Counter
 from functools import cache
 from typing import NamedTuple
 
-from numba import njit
-
 from hpcclear.base.jit import FASTMATH
+from hpcclear.base.lowering.compiled import assembly_of, optimised_module
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics.layout import Effects
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.rhs import SIGNATURE
+from hpcclear.dynamics.linkage.rhs import KINDS
 from hpcclear.dynamics.stepping.problem import Problem
 
 # x86-64: vaddpd, vfmadd213sd, sqrtpd, vrndscalepd (floor) ...; "p" packed, "s" scalar, "d" double
@@ -110,11 +109,4 @@ def force_evaluation(problem: Problem, width: int) -> str:
 @cache
 def _compiled(linkage: Linkage, effects: Effects, width: int) -> str:
     text = one_text(linkage.module(effects).motion, f"motion_{width}", effects=effects, W=width)
-    compiled = njit(
-        SIGNATURE,
-        error_model="numpy",
-        fastmath=FASTMATH,
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-    )(text)
-    return str(compiled.inspect_asm(compiled.signatures[0]))
+    return assembly_of(optimised_module(text, KINDS, FASTMATH))

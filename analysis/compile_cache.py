@@ -4,7 +4,7 @@
     python analysis/compile_cache.py --only together --processes 4
 
 Every trial runs commands of the `hpcclear` beside this Python in processes of their own, and compares what they
-write with the bytes from an undamaged cache. Compilations are counted where Numba stores compiled code.
+write with the bytes from an undamaged cache. Compilations are counted where compiled code is stored.
 """
 
 import argparse
@@ -34,21 +34,21 @@ COMMANDS = {
 """Words before the name of the file that is written."""
 
 COUNTING = """
-import importlib.abc, importlib.machinery, os, sys, zlib
+import importlib.abc, importlib.machinery, os, sys
 
 class Loader(importlib.machinery.SourceFileLoader):
     def exec_module(self, module):
         super().exec_module(module)
-        usual = module.Cache.save_overload
-        def save_overload(cache, sig, data):
+        usual = module.write
+        def write(path, content):
             with open(os.environ["COMPILED"], "a") as log:
-                log.write(f"{cache._impl.filename_base} {zlib.crc32(str(sig).encode()):x} {os.getpid()}\\n")
-            usual(cache, sig, data)
-        module.Cache.save_overload = save_overload
+                log.write(f"{path.name} {os.getpid()}\\n")
+            usual(path, content)
+        module.write = write
 
 class Finder(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path=None, target=None):
-        if name != "numba.core.caching":
+        if name != "hpcclear.base.kept":
             return None
         found = importlib.machinery.PathFinder.find_spec(name, path)
         found.loader = Loader(name, found.origin)

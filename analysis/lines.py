@@ -61,7 +61,7 @@ FEATURES = {
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
     "the compiler's text, cache and widths":
-        "base/text/* base/one_text.py base/cached.py base/code_folder.py base/beside.py base/width.py base/bits.py "
+        "base/lowering/* base/text/* base/one_text.py base/cached.py base/code_folder.py base/width.py base/bits.py "
         "base/jit.py base/unrolled.py base/numbered.py ensemble/compiling.py base/hashing.py",
     "error against run time, plans of jobs":
         "accuracy/* cli/accuracy.py cli/plan.py report/figures/accuracy.py study/forecast.py study/tolerance.py "

@@ -17,12 +17,9 @@ from typing import Any
 from numba import config, njit
 from numba.core import environment
 from numba.core.caching import Cache, NullCache
-from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
-from numba.core.sigutils import normalize_signature
-from numba.core.typing.templates import Signature
 
 from hpcclear.base import kept
 from hpcclear.base.code_folder import chosen_folder, source_key
@@ -150,18 +147,6 @@ def cached(function: object, **options: object) -> Any:
     compiled.compile = MethodType(
         _compile, compiled
     )  # most functions of a program are never called
-    return compiled
-
-
-def c_function(signature: Signature, function: Any, **options: Any) -> CFunc:
-    """Compile a C function, or load it, as `numba.cfunc` does; callers take its ``address``."""
-    compiled = CFunc(
-        function,
-        normalize_signature(signature),
-        locals={},
-        options={"error_model": "numpy", **options},
-    )
-    _compile(compiled)
     return compiled
 
 

@@ -1,7 +1,7 @@
 """Vectors of eight numbers as values of compiled code, for eight samples in a batch.
 
 The compiler makes vectors of short loops only where it can show that no store meets a load, which it cannot once a row's
-place is a number that comes at run time; and Numba reads every one of eight copies that are written out instead, which took
+place is a number that comes at run time; and every one of eight copies that are written out is read instead, which took
 most of the time to compile. A vector is one value here, whatever rows it comes from. Where registers hold fewer numbers LLVM
 splits it.
 """

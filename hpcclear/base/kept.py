@@ -98,7 +98,7 @@ def alone(path: Path) -> Iterator[None]:
         unlock(path, descriptor)
 
 
-def lock(path: Path, wait: bool = True) -> int | None:
+def lock(path: Path) -> int | None:
     """Take the lock of a file that is to be made; return what `unlock` takes, None where it cannot be had.
 
     It ends with the process that holds it. The lock file goes first, then the lock: one who has waited looks for the
@@ -120,8 +120,6 @@ def lock(path: Path, wait: bool = True) -> int | None:
                 for left in path.parent.glob(f"{glob.escape(path.name)}.*.part"):
                     left.unlink(missing_ok=True)  # by one that was killed while writing
                 return descriptor
-            if not wait:
-                break
             waited = time.monotonic() - began
             if waited > SILENT and not said:
                 remark("Note: another process compiles the same code: waiting for it")
@@ -135,18 +133,6 @@ def lock(path: Path, wait: bool = True) -> int | None:
         raise
     os.close(descriptor)
     return None
-
-
-def is_locked(path: Path) -> bool:
-    """Whether a process makes a file at this moment."""
-    try:
-        with _lock_of(path).open("rb") as file:
-            host.lock_file(file.fileno())
-    except BlockingIOError:
-        return True
-    except OSError:  # no such file, or no locks
-        pass
-    return False
 
 
 def unlock(path: Path, descriptor: int | None) -> None:

@@ -1,9 +1,8 @@
 """One text of many functions: calls are written out where they stand, before anything is compiled.
 
-Numba compiles every function on its own, and again wherever it is inlined: a stepper of a hundred lane functions took 25 s,
-its text written out takes four. What is known beforehand (which effects are on, how many lanes) is put in, and branches that it
-decides are dropped, so the text holds what is on and nothing else. It is a file of plain Python beside Numba's cache, to be
-read; a second process imports it as it is.
+What is known beforehand (which effects are on, how many lanes) is put in, and branches that it
+decides are dropped, so the text holds what is on and nothing else. It is a file of plain Python beside the compiled code, to
+be read, which `hpcclear.base.lowering` compiles.
 
 Only functions that `lane_function` or `scalar_function` has marked are written out, each kind in a text of its own: the two
 are compiled with different rules of arithmetic.

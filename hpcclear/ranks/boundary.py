@@ -17,7 +17,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from hpcclear.base.cores import among_ranks
 from hpcclear.base.errors import (
     InputError,
     LimitError,
@@ -107,8 +106,6 @@ def boundary(
         stop = stack.enter_context(StopSwitch()) if stop is None else stop
         stop.outlook = RESUMES if resumes else ANEW
         ranks = Ranks(_joined(stop), stop)
-        if ranks.size > 1:
-            among_ranks()
         with _watch(ranks):
             if ranks.is_root:
                 ended: BaseException | None = None

@@ -1,12 +1,14 @@
 """Forces and accelerations at given states: the stepper's equations of motion, read instead of integrated by it."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import scalar_function
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.rhs import run_motion
 
@@ -22,7 +24,7 @@ def observe(
     revolution, and when that was; `tables`: as `Problem.tables`.
     """
     lanes = np.repeat(new_lane(par), width)
-    _observe(motion, width, lanes, tables, states, contacts, *times, out)
+    observing_code()(motion, width, lanes, tables, states, contacts, *times, out)
 
 
 def new_lane(par: Array) -> Array:
@@ -49,10 +51,14 @@ def _observe(motion, W, lanes, tables, states, contacts, times, began, out):
                 out[first + i, n + at.RATES + r] = lanes[(at.PINS + r) * W + i]
 
 
-def observing_code() -> None:
-    """Compile what `observe` calls, before there is anything to observe."""
-    row, table = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
-    _observe.compile((types.int64, types.int64, row, row, table, table, row, row, table))
+_ROW, _TABLE = Kind("array", (DOUBLE, 1)), Kind("array", (DOUBLE, 2))
+_KINDS = (Kind(WHOLE), Kind(WHOLE), _ROW, _ROW, _TABLE, _TABLE, _ROW, _ROW, _TABLE)
+
+
+@cache
+def observing_code() -> Compiled:
+    """The compiled `_observe`, which `observe` calls."""
+    return Compiled(_observe.py_func, _KINDS, ())
 
 
 @scalar_function

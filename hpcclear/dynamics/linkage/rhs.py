@@ -7,11 +7,10 @@ import inspect
 from functools import cache
 from types import ModuleType
 
-from numba import types
-
 from hpcclear.base.bits import call_at
-from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, interleaved, lane_function
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import DOUBLES
 from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
 
@@ -19,12 +18,10 @@ LONG = 200
 """Lines of a text from which half of its vectors stand batched: of all of them there are more instructions than the
 processor keeps decoded."""
 
-
-_NUMBERS = types.CPointer(types.float64)
-SIGNATURE = types.void(_NUMBERS, _NUMBERS)
+KINDS = (DOUBLES, DOUBLES)
 
 
-def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> object:
+def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Compiled:
     """The compiled ``motion`` of a module for W lanes; its ``address`` is what steppers take.
 
     A motion is a C function ``void motion(double *lanes, double *tables)``, whatever mechanism it describes and wherever
@@ -54,13 +51,13 @@ def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
 
 
 @cache
-def compiled_text(name: str) -> object:
-    """The compiled motion of a text by its name, which another process can import; its second word is the number of lanes."""
+def compiled_text(name: str) -> Compiled:
+    """The compiled motion of a text by its name; its second word is the number of lanes."""
     text = getattr(text_named(name), name)
     lanes = int(name.split("_")[1])
     long = inspect.getsource(text).count("\n") > LONG
     with interleaved(lanes // 2 if long else lanes):
-        return c_function(SIGNATURE, text, fastmath=FASTMATH)
+        return Compiled(text, KINDS, FASTMATH)
 
 
 @lane_function

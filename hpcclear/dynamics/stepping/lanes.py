@@ -4,10 +4,9 @@ import time
 from typing import Any
 
 import numpy as np
-from numba import typeof
 
 from hpcclear.base.arrays import Array, Booleans, Integers, aligned
-from hpcclear.base.beside import compiled_beside, note_compiled
+from hpcclear.base.lowering.values import kind_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
     COUNTERS,
@@ -24,8 +23,7 @@ from hpcclear.dynamics.layout.settings import (
     numbers_of,
 )
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
-from hpcclear.dynamics.linkage.observe import observe, observing_code
-from hpcclear.dynamics.linkage.rhs import compiled_text
+from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.stepping.explicit.stepper import Codes, make_stepper
 from hpcclear.dynamics.stepping.explicit.steps import explicit_code
 from hpcclear.dynamics.stepping.implicit.batch import batch_code
@@ -37,10 +35,6 @@ from hpcclear.dynamics.stepping.record import columns
 from hpcclear.dynamics.stepping.special import special_code
 
 NO_LIMIT = 1 << 40  # of block steps in a call
-SPECIAL = f"{special_code.__module__}:{special_code.__name__}"
-TEXT = f"{compiled_text.__module__}:{compiled_text.__name__}"
-OBSERVER = f"{observing_code.__module__}:{observing_code.__name__}"
-BATCH = f"{batch_code.__module__}:{batch_code.__name__}"
 
 
 class Lanes:
@@ -103,7 +97,6 @@ class Lanes:
             numbers_of(self._rules, width, n, len(measures)),
         )
         self._codes = Codes(0, 0, 0)
-        self._step = make_stepper(width, implicit=implicit)
         self._budget = 256
         self.counters = np.zeros(COUNTERS, np.int64)
         self._accept_queue(
@@ -117,31 +110,13 @@ class Lanes:
         """Lanes of its motions, 0 for none: of all lanes, and of eight stiff ones."""
         return self.width, 0 if self._memory is None else COLUMNS
 
-    @property
-    def motions(self) -> list[str]:
-        """Its motions as `hpcclear.base.beside` names what another process may compile."""
-        kinds = [effects for effects in (self._effects, self._observed) if effects is not None]
-        texts = [
-            self.problem.motion_text(effects, width)
-            for effects in kinds
-            for width in self._widths
-            if width
-        ]
-        return [f"{TEXT}:{text}" for text in texts]
-
     def _compile(self) -> None:
-        """Compile what is not on disk: the stepper here, what it calls for single lanes perhaps in another process."""
+        """Compile or load the stepper and what it calls."""
         problem, effects, widths = self.problem, self._effects, self._widths
         stiff = self._memory is not None
-        apart = [SPECIAL, *self.motions]
-        apart += [OBSERVER] if len(self.record) else []
-        with compiled_beside([BATCH] if stiff else apart):  # either is half of it
-            explicit = explicit_code(self.width, problem.tableau.stages).address
-            self._step.compile(tuple(typeof(one) for one in self._arguments(0)))
-            if stiff:  # implicit steps take as long as all of this together
-                special_code()
-                for width in widths:
-                    problem.motion(effects, width)
+        explicit = explicit_code(self.width, problem.tableau.stages).address
+        kinds = kind_of(self._arguments(0)).parts
+        self._step = make_stepper(self.width, kinds, implicit=stiff)
         implicit = batch_code().address if stiff else 0
         self._codes = Codes(special_code().address, explicit, implicit)
         for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
@@ -152,7 +127,6 @@ class Lanes:
                 address = problem.motion(self._observed, width).address if width else 0
                 self._method.numbers[row] = address
             self._observer = int(self._method.numbers[OBSERVING])
-        note_compiled(self.motions)
         if self._rules.profile:
             self._method.numbers[PROFILE] = profile_code(effects, self.width).address
         self._compiled = (

@@ -9,12 +9,12 @@ It is compiled for the joints and waves there are, and steppers call it by its a
 
 import math
 from functools import cache
-from typing import Any
 
-from numba import carray, types
+from numba import carray
 
-from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import DOUBLES
 from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
@@ -91,14 +91,13 @@ def profiles(places, bearing, journal, lanes, tables, W):
         add_surface(work, p, at.ANGLES + 4 * p + 2, first + 2 * bearing, journal, W)
 
 
-_NUMBERS = types.CPointer(types.float64)
-SIGNATURE = types.void(_NUMBERS, _NUMBERS)
+_KINDS = (DOUBLES, DOUBLES)
 
 
 @cache
-def profile_code(effects: at.Effects, W: int) -> Any:
+def profile_code(effects: at.Effects, W: int) -> Compiled:
     """The compiled `profiles` of these effects for W lanes; its ``address`` is what steppers take, as that of a motion."""
     places = tuple(at.places_of(effects))
     counts = {"bearing": effects.bearing_waves or 0, "journal": effects.journal_waves or 0}
     text = one_text(profiles, f"profiles_{W}", places=places, W=W, **counts)
-    return c_function(SIGNATURE, text, fastmath=FASTMATH)
+    return Compiled(text, _KINDS, FASTMATH)

@@ -4,13 +4,13 @@ One function for all steppers: it is compiled once, for any number of lanes, coo
 """
 
 from functools import cache
-from typing import Any
 
-from numba import carray, types
+from numba import carray
 
 from hpcclear.base.bits import call_at
-from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
@@ -116,14 +116,13 @@ def special(
     answer(of, rules_in(of), block, queue, entries, carray(tables, at.MAX_CURVES))
 
 
-_NUMBERS, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
-SIGNATURE = types.void(_COUNTS, *[_NUMBERS] * 9, *[_COUNTS] * 2)
+_KINDS = (COUNTS, *[DOUBLES] * 9, *[COUNTS] * 2)
 
 
 @cache
-def special_code() -> Any:
+def special_code() -> Compiled:
     """The compiled `special`; its ``address`` is what steppers take."""
-    return c_function(SIGNATURE, one_text(special, "special"), fastmath=FASTMATH)
+    return Compiled(one_text(special, "special"), _KINDS, FASTMATH)
 
 
 @lane_function

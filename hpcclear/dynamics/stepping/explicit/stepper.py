@@ -4,12 +4,14 @@ A lane whose sample ends takes the next one from the queue. The stepper returns 
 its whole state in the arrays it was given, and goes on from there bit for bit.
 """
 
+import ctypes
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hpcclear.base.bits import call_at
-from hpcclear.base.cached import cached
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import Kind
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import GAP_TOLERANCE, PROFILE
@@ -106,16 +108,16 @@ class Codes(NamedTuple):
 
 
 @cache
-def make_stepper(W: int, *, implicit: bool = False) -> Any:
+def make_stepper(W: int, kinds: tuple[Kind, ...], *, implicit: bool = False) -> Compiled:
     """Return the compiled stepper for W lanes, of any number of coordinates and any joints.
 
-    Its arguments: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`, `layout.Method`; an
-    array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the implicit method (see
-    `columns.new_columns`); and the budget: how many block steps to take at most. It returns True while lanes are running. A
-    response and an ensemble call the same machine code; ensembles want at least twice the vector length.
+    Its arguments, of these kinds: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`,
+    `layout.Method`; an array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the
+    implicit method (see `columns.new_columns`); and the budget: how many block steps to take at most. It returns 1 while lanes
+    are running. A response and an ensemble call the same machine code; ensembles want at least twice the vector length.
     """
     known: dict[str, object] = {"W": W}
     if not implicit:
         known["memory"] = None
     text = one_text(advance, f"stepper_{W}", **known)
-    return cached(text, fastmath=FASTMATH)
+    return Compiled(text, kinds, FASTMATH, ctypes.c_int64)

@@ -1,13 +1,13 @@
 """One explicit step of every lane: stages, integrals, error. Compiled for a number of lanes, and called by its address."""
 
 from functools import cache
-from typing import Any
 
-from numba import carray, types
+from numba import carray
 
 from hpcclear.base.bits import beyond
-from hpcclear.base.cached import c_function
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
@@ -166,12 +166,11 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
     take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
 
 
-_DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
-SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 4, _COUNTS)
+_KINDS = (COUNTS, *[DOUBLES] * 4, COUNTS)
 
 
 @cache
-def explicit_code(W: int, stages: int) -> Any:
+def explicit_code(W: int, stages: int) -> Compiled:
     """The compiled steps of W lanes by pairs of so many stages; their ``address`` is what steppers take."""
     text = one_text(explicit_steps, f"explicit_{W}_{stages}", W=W, stages=stages)
-    return c_function(SIGNATURE, text, fastmath=FASTMATH)
+    return Compiled(text, _KINDS, FASTMATH)

@@ -6,14 +6,14 @@ step would. A sample keeps its column of the eight for as long as it is stiff, a
 """
 
 from functools import cache
-from typing import Any
 
-from numba import carray, types
+from numba import carray
 
 from hpcclear.base.bits import call_at
-from hpcclear.base.cached import c_function
 from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
@@ -353,15 +353,14 @@ def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
             eight_steps(effects, moved, W, block, eights[e], carray(settings, SETTINGS))
 
 
-_DOUBLES, _COUNTS = types.CPointer(types.float64), types.CPointer(types.int64)
-SIGNATURE = types.void(_COUNTS, *[_DOUBLES] * 5, _COUNTS, _DOUBLES)
+_KINDS = (COUNTS, *[DOUBLES] * 5, COUNTS, DOUBLES)
 
 
 @cache
-def batch_code() -> Any:
+def batch_code() -> Compiled:
     """The compiled implicit steps of any lanes, joints and coordinates; steppers take their ``address``."""
     text = one_text(batch_steps, "batch")
-    return c_function(SIGNATURE, text, fastmath=FASTMATH)
+    return Compiled(text, _KINDS, FASTMATH)
 
 
 @lane_function

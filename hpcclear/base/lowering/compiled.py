@@ -1,0 +1,168 @@
+"""Lowered functions as machine code: optimised by LLVM, kept on disk, called by their addresses or from Python."""
+
+import ctypes
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba.core.registry import cpu_target
+
+from hpcclear.base import kept
+from hpcclear.base.cached import features_in_use
+from hpcclear.base.code_folder import chosen_folder, source_key
+from hpcclear.base.lowering.statements import Function
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind, flat, types_of
+
+
+def _target() -> Any:
+    """The processor that code is for, as Numba has it: with the features of `hpcclear.base.width` or of the user's settings."""
+    return cpu_target.target_context.codegen()._tm
+
+
+class _Code(NamedTuple):
+    """A function's optimised code, by its name in it, and the kind of its result."""
+
+    module: Any
+    name: str
+    result: Kind
+
+
+class _Program:
+    """The functions that one function is made of, each optimised on its own, then linked into those that call it.
+
+    What a function of its own is looked at before it is inlined: see `hpcclear.base.jit.apart`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.known: dict[Any, _Code] = {}
+
+    def code(
+        self, function: Any, kinds: Sequence[Kind], flags: Any, name: str, inlined: bool = False
+    ) -> _Code:
+        """Optimised code of a function for arguments of these kinds."""
+        called: dict[str, _Code] = {}
+
+        def call(other: Any, kinds: tuple[Kind, ...]) -> tuple[str, Kind]:
+            options = other.targetoptions
+            fast = options.get(
+                "fastmath", flags
+            )  # as with Numba: of its caller where it says nothing
+            key = other, kinds, frozenset(fast)
+            if key not in self.known:
+                own = f"{self.name}.{other.__name__}.{len(self.known)}"
+                self.known[key] = self.code(
+                    other, kinds, fast, own, options.get("forceinline", False)
+                )
+            found = self.known[key]
+            called[found.name] = found
+            return found.name, found.result
+
+        lowered = Function(function, kinds, name, flags, call)
+        if inlined:
+            lowered.function.attributes.add("alwaysinline")
+        module = _optimised(lowered.module, [one.module for one in called.values()])
+        if name != self.name:  # no more than its callers need of it
+            module.get_function(name).linkage = "linkonce_odr"
+        return _Code(module, name, lowered.result)
+
+
+def _optimised(written: ir.Module, called: Sequence[Any]) -> Any:
+    """A module after LLVM's passes: cheap ones, which bring what it calls into it, then all."""
+    target = _target()
+    module = llvm.parse_assembly(str(written))
+    module.data_layout = str(target.target_data)
+    module.triple = target.triple
+    module.verify()
+
+    def builder(level: int, vectors: bool, unrolled: bool) -> Any:
+        options = llvm.create_pipeline_tuning_options()
+        options.speed_level, options.loop_vectorization, options.loop_unrolling = (
+            level,
+            vectors,
+            unrolled,
+        )
+        options.slp_vectorization = False
+        return llvm.create_pass_builder(target, options)
+
+    first = builder(
+        3, True, False
+    )  # a loop over calls is short, and would be unrolled before they are inlined
+    for function in module.functions:
+        first.getFunctionPassManager().run(function, first)
+    for one in called:
+        module.link_in(one, preserve=True)
+    cheap = builder(0, False, True)
+    passes = cheap.getModulePassManager()
+    passes.add_loop_rotate_pass()
+    passes.add_instruction_combine_pass()
+    passes.add_jump_threading_pass()
+    passes.run(module, cheap)
+    full = builder(3, True, True)
+    full.getModulePassManager().run(module, full)
+    return module
+
+
+def optimised_module(function: Any, kinds: Sequence[Kind], flags: Any) -> Any:
+    """Return the optimised code of a function, which `str` shows; arguments as of `Compiled`."""
+    name = function.__name__
+    return _Program(name).code(function, kinds, flags, name).module
+
+
+def assembly_of(module: Any) -> str:
+    """Return the assembly of optimised code."""
+    return str(_target().emit_assembly(module))
+
+
+def _kept(path: Path, compiled: Callable[[], bytes]) -> bytes:
+    """What stands in a file of the cache, or is compiled by one process while others wait."""
+    content = kept.read(path)
+    if content is None:
+        with kept.alone(path):
+            content = kept.read(path)  # by whoever had the lock before
+            if content is None:
+                content = compiled()
+                kept.write(path, content)
+    return content
+
+
+class Compiled:
+    """A function of a text as machine code. `address` is what C functions are called by; Python calls the object.
+
+    Parameters
+    ----------
+    function : callable
+        From a text of its own, or marked by `scalar_function`.
+    kinds : sequence of Kind
+        Of its arguments.
+    flags : set of str
+        Rewrites allowed in its arithmetic.
+    result : ctypes type, optional
+        What it returns to Python; whether something is true it returns as a whole number.
+    """
+
+    def __init__(
+        self, function: Any, kinds: Sequence[Kind], flags: Any, result: Any = None
+    ) -> None:
+        plain = getattr(function, "py_func", function)
+        text = kept.digest(Path(plain.__code__.co_filename).read_bytes())
+        asked = repr(
+            (source_key(), text, plain.__qualname__, kinds, sorted(flags), features_in_use())
+        )
+        name = function.__name__
+        path = Path(chosen_folder()) / f"{name}.{kept.digest(asked.encode()).hex()[:32]}.code"
+        code = _kept(path, lambda: _target().emit_object(optimised_module(function, kinds, flags)))
+        engine = (
+            cpu_target.target_context.codegen()._engine._ee
+        )  # which keeps the machine code of this process
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        self.address = int(engine.get_function_address(name))
+        passed: dict[Any, Any] = {DOUBLE: ctypes.c_double, WHOLE: ctypes.c_int64}
+        numbers = [passed.get(one, ctypes.c_void_p) for kind in kinds for one in types_of(kind)]
+        self._call = ctypes.PYFUNCTYPE(result, *numbers)(self.address)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._call(*flat(arguments))

@@ -1,0 +1,112 @@
+"""What the lowering of a text computes with: numbers as LLVM's values, and arrays and tuples that are known by their parts."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from hpcclear.base.eight import EIGHT, eight
+
+DOUBLE, WHOLE, TRUTH = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
+VECTOR = ir.VectorType(DOUBLE, EIGHT)
+ORDER = [TRUTH, WHOLE, DOUBLE, VECTOR]
+"""Types of numbers, each of which holds those before."""
+
+NUMBA = {DOUBLE: types.float64, WHOLE: types.int64, TRUTH: types.boolean, VECTOR: eight}
+"""Numba's names of them, for `hpcclear.base.jit.emitted`."""
+
+
+class Array(NamedTuple):
+    """An array by its place in memory and its lengths, all of them LLVM's values; C order."""
+
+    data: Any
+    shape: tuple[Any, ...]
+
+
+def whole(number: int) -> ir.Constant:
+    """A whole number as a value."""
+    return ir.Constant(WHOLE, number)
+
+
+def wider(one: ir.Type | None, other: ir.Type) -> ir.Type:
+    """The type of numbers that holds those of two types."""
+    return other if one is None else max(one, other, key=ORDER.index)
+
+
+class Kind(NamedTuple):
+    """What an argument is, without its values: the same kinds have the same code."""
+
+    of: Any
+    """A type of numbers; "array" of `parts[0]` with `parts[1]` dimensions; a class of tuples; None."""
+    parts: tuple[Any, ...] = ()
+
+
+DOUBLES, COUNTS = Kind(DOUBLE.as_pointer()), Kind(WHOLE.as_pointer())
+"""Places of numbers in memory."""
+
+
+def kind_of(value: Any) -> Kind:
+    """The kind of a value: of LLVM, or as Python has it."""
+    if value is None:
+        return Kind(None)
+    if isinstance(value, Array):
+        return Kind("array", (value.data.type.pointee, len(value.shape)))
+    if isinstance(value, np.ndarray):
+        return Kind("array", (DOUBLE if value.dtype == np.float64 else WHOLE, value.ndim))
+    if isinstance(value, tuple):
+        return Kind(type(value), tuple(map(kind_of, value)))
+    if isinstance(value, ir.Value):
+        return Kind(value.type)
+    return Kind(DOUBLE if isinstance(value, float) else WHOLE)
+
+
+def types_of(kind: Kind) -> Iterator[ir.Type]:
+    """Types of the numbers and places that a value of a kind is passed as."""
+    if kind.of == "array":
+        yield kind.parts[0].as_pointer()
+        yield from [WHOLE] * kind.parts[1]
+    elif isinstance(kind.of, ir.Type):
+        yield kind.of
+    else:
+        for part in kind.parts:
+            yield from types_of(part)
+
+
+def flat(value: Any) -> Iterator[Any]:
+    """Numbers and places that a value is passed as; of an array of Python its address and lengths."""
+    if isinstance(value, np.ndarray):
+        assert value.flags.c_contiguous
+        yield value.ctypes.data
+        yield from value.shape
+    elif isinstance(value, tuple):
+        for part in value:
+            yield from flat(part)
+    elif value is not None:
+        yield value
+
+
+def gathered(kind: Kind, parts: Iterator[Any]) -> Any:
+    """The value of a kind from what it was passed as."""
+    if kind.of == "array":
+        return Array(next(parts), tuple(next(parts) for _ in range(kind.parts[1])))
+    if isinstance(kind.of, ir.Type):
+        return next(parts)
+    return (
+        None if kind.of is None else rebuilt(kind.of, [gathered(one, parts) for one in kind.parts])
+    )
+
+
+def rebuilt(maker: type[Any], items: Iterable[Any]) -> Any:
+    """A tuple of a class, named or not."""
+    return maker(*items) if hasattr(maker, "_fields") else tuple(items)
+
+
+def wider_kind(one: Kind, other: Kind) -> Kind:
+    """The kind that holds values of two kinds that differ in types of numbers at most."""
+    if isinstance(one.of, ir.Type):
+        return Kind(wider(one.of, other.of))
+    return (
+        one if one.of == "array" else Kind(one.of, tuple(map(wider_kind, one.parts, other.parts)))
+    )
