@@ -18,7 +18,7 @@ from contextvars import ContextVar
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
-from math import pi
+from math import isfinite, pi
 
 from hpcclear.scene.unit_names import (
     HEADS,
@@ -305,6 +305,14 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
     UnitError
         If the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
     """
+    number, unit = quantity(text, target, decided)
+    value = of_unit(number, unit, target)
+    note_turns(text.strip(), number, unit, target)
+    return value
+
+
+def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
+    """Number and unit of a text, as `to_si` reads it."""
     shown = target or "1"
     found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= _LONGEST else None
     number, unit = found.groups() if found else ("", "")
@@ -322,24 +330,43 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
         raise UnitError(
             "a number in quotes has no unit", f"Drop the quotes for a number in {shown}"
         )
-    value = of_unit(number, unit, target)
-    note_turns(text.strip(), number, unit, target)
-    return value
+    return number, unit
 
 
 def of_unit(number: str, unit: str, target: str) -> float:
     """A decimal number of a unit as the nearest float in `target`; raises UnitError."""
-    exact = Fraction(number) * factor(unit, target)
+    return _product(Fraction(number), factor(unit, target), target)
+
+
+def _product(number: Fraction | Decimal, size: Fraction, target: str = "") -> float:
+    upper, lower = number.as_integer_ratio()
     try:
-        value = float(exact)
+        value = upper * size.numerator / (lower * size.denominator)
     except OverflowError:
         remedy = f"Write a finite number in {target or '1'}"
         raise UnitError("the number is too large", remedy) from None
-    if exact and not value:
+    if upper and not value:
         raise UnitError(
             "the number is too small", f"Write 0, or a larger number in {target or '1'}"
         )
     return value
+
+
+def scaled(value: float, size: Fraction) -> float:
+    """The nearest float to the shortest decimal number of `value` times `size`; raises UnitError where there is none."""
+    return value if size == 1 or not isfinite(value) else _product(Decimal(repr(value)), size)
+
+
+def written(value: float, unit: str) -> float | str:
+    """A number of a unit as an entry of a scene, whose point nobody takes for a sign of thousands."""
+    text = repr(value).removesuffix(".0")
+    return (
+        f"{text}0 {unit}"
+        if may_be_thousands(text) and unit
+        else f"{text} {unit}"
+        if unit
+        else value
+    )
 
 
 def _digits(text: str) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import tomli_w
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.units import may_be_thousands, to_si
+from hpcclear.scene.units import to_si, written
 
 GROUND = "ground"
 MASS = 0.1
@@ -196,17 +196,11 @@ def text_of(content: dict[str, Any], source: str, notes: Sequence[str] = ()) -> 
     return "\n".join(f"# {line}" for line in lines) + "\n\n" + tomli_w.dumps(content)
 
 
-def _unambiguous(value: float) -> str:
-    """A number as a text whose point nobody takes for a sign of thousands."""
-    text = f"{value:.12g}"
-    return f"{text}0" if may_be_thousands(text) else text
-
-
 def _drives(speeds: Mapping[str, float]) -> dict[str, Any]:
     """A drive for each body; where one turn of the slowest is not enough for all to repeat, its turns until they do."""
     made: dict[str, Any] = {
         "motor" if len(speeds) == 1 else f"motor_{body}": {
-            "kind": "constant-speed", "body": body, "speed": f"{_unambiguous(speed)} rpm",
+            "kind": "constant-speed", "body": body, "speed": written(float(f"{speed:.12g}"), "rpm"),
         }
         for body, speed in speeds.items()
     }  # fmt: skip

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.scene.headings import Column
 from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, limit, scale_of
-from hpcclear.scene.sheets import Column, Sheet, read
-from hpcclear.scene.units import UnitError, of_unit, to_si
+from hpcclear.scene.sheets import Sheet, read
+from hpcclear.scene.units import UnitError, factor, to_si
 
 _COLUMNS = {
     "name": ("name", "point", "joint", "label", "punkt"),
@@ -79,16 +80,14 @@ def _name(sheet: Sheet, column: Column, row: int, points: Names) -> str:
 
 def _lengths(sheet: Sheet, column: Column | None, key: str, unit: str) -> list[float]:
     assert column is not None  # looked for before
-    try:
-        stated = float(to_si(f"1 {column.unit}", "m")) if column.unit else None
-    except UnitError as error:
-        raise InputError(key, column.heading, error.reason, error.remedy) from None
-    if stated is None and not unit:
+    if not sheet.states_unit(column) and not unit:
         raise InputError(
             key, column.heading, "nothing says its unit", f'Write "{column.name} [mm]", say'
         )
-    size = scale_of(stated, column.heading, unit, key)
-    return [round(size * value, 12) for value in sheet.numbers(column).tolist()]
+    values = sheet.si(column, "m", key, unit)
+    if unit and column.unit:
+        scale_of(to_si(f"1 {column.unit}", "m"), column.heading, unit, key)
+    return [round(value, 12) for value in values.tolist()]
 
 
 def _bodies(
@@ -123,8 +122,8 @@ def _bodies(
 def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
     if column is None or column.cells[row].strip() in ("", "-"):
         return None
-    value = sheet.number(column, row, "rad")
     try:
-        return of_unit(repr(value), column.unit or "deg", "rad")
+        size = factor(column.unit or "deg", "rad")
     except UnitError as error:
         raise InputError(sheet.path, column.heading, error.reason, error.remedy) from None
+    return sheet.number(column, row, "rad", size)
