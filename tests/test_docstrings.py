@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcclear.dynamics.laws import laws
+from hpcclear.laws import laws
 
 PACKAGE = Path(__file__).resolve().parent.parent / "hpcclear"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name != "__main__.py")

@@ -20,7 +20,6 @@ from some_laws import CONTACT, FRICTION, STIFFNESS, effects_with, row
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.one_text import one_text, text_of
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import (
@@ -31,6 +30,7 @@ from hpcclear.dynamics.linkage.parts import (
     TorqueDrive,
 )
 from hpcclear.dynamics.physics.angles import sincos
+from hpcclear.laws import laws
 
 pytestmark = pytest.mark.nightly
 

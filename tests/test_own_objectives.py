@@ -14,8 +14,9 @@ from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, OF_ALL, OF_JOINTS, OURS, RECORDED, Objective
 from hpcclear.base.outcome import FIELDS, OUTCOME
-from hpcclear.dynamics.laws.objectives import _RANGES, _ROWS, rate_in_lanes
+from hpcclear.dynamics.contacts.laws import rate_in_lanes
 from hpcclear.ensemble.identity import run_key
+from hpcclear.laws.objectives import _RANGES, _ROWS
 from hpcclear.results import dataset
 
 ROOT = Path(__file__).parents[1]

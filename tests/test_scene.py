@@ -19,12 +19,12 @@ from patience import crowded
 from pydantic import ValidationError
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.unit_names import UNITS
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
 from hpcclear.scene import units as scene_units
 from hpcclear.scene.domain import box
 from hpcclear.scene.fields import Table
 from hpcclear.scene.paths import flatten, replace
-from hpcclear.scene.unit_names import UNITS
 
 ROOT = Path(__file__).parent.parent
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))

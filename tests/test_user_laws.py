@@ -16,13 +16,14 @@ from oracle import SliderCrank
 from running import run
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.laws.constant import with_constants
-from hpcclear.dynamics.laws.formula import function_of
-from hpcclear.dynamics.laws.lanes import in_lanes, text_of
-from hpcclear.dynamics.laws.numbers import evaluate, force_of, sample_numbers
+from hpcclear.dynamics.contacts.laws import in_lanes
 from hpcclear.dynamics.physics import powers
 from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.laws import laws
+from hpcclear.laws.constant import with_constants
+from hpcclear.laws.formula import function_of
+from hpcclear.laws.numbers import evaluate, force_of, sample_numbers
+from hpcclear.laws.sources import text_of
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.laws import ENTRIES
 from hpcclear.scene.paths import quantities

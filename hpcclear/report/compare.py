@@ -12,11 +12,11 @@ import xarray as xr
 from hpcclear.base import markup
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.units import fits
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
 from hpcclear.scene.headings import Column
 from hpcclear.scene.sheets import AXES, Sheet, read_series
-from hpcclear.scene.units import fits
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 

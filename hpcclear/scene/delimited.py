@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.units import is_unit
+from hpcclear.base.units import is_unit
 
 LARGEST_FILE = 200_000_000
 """Bytes of a table, unpacked."""

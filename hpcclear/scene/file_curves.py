@@ -11,10 +11,10 @@ from pydantic import model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
 from hpcclear.scene.headings import Column, parsed_heading
 from hpcclear.scene.sheets import Sheet, plain_unit, read
-from hpcclear.scene.units import UnitError, factor, fits
 
 TURN = 2 * math.pi
 SEAM = 0.02

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import is_unit, may_be_thousands
 from hpcclear.scene import clock
 from hpcclear.scene.delimited import COMMA, POINT, Rows, cut_unit, is_number
-from hpcclear.scene.units import is_unit, may_be_thousands
 
 _HEADING = re.compile(
     r"(.*?)\s*(?:\[\s*([^\[\]]{0,40}?)\s*\]|\(\s*([^()]{0,40}?)\s*\)|\s[/,]\s*(\S.{0,39}))?\s*",

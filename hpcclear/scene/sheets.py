@@ -16,10 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
-from hpcclear.scene import clock, delimited
-from hpcclear.scene.delimited import decimal_of
-from hpcclear.scene.headings import NOTHING, Column, columns_of
-from hpcclear.scene.units import (
+from hpcclear.base.units import (
     UnitError,
     check_thousands,
     factor,
@@ -31,6 +28,9 @@ from hpcclear.scene.units import (
     to_si,
     written,
 )
+from hpcclear.scene import clock, delimited
+from hpcclear.scene.delimited import decimal_of
+from hpcclear.scene.headings import NOTHING, Column, columns_of
 from hpcclear.scene.workbook import cells_of
 
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import to_si
 from hpcclear.scene.importers.points import (
     GROUND,
     MOST_POINTS,
@@ -25,7 +26,6 @@ from hpcclear.scene.importers.points import (
     number,
     scale_of,
 )
-from hpcclear.scene.units import to_si
 
 _FOOT = 1200 / 3937  # of US surveys
 _UNITS = {

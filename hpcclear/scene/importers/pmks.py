@@ -14,6 +14,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import to_si
 from hpcclear.scene.importers.points import (
     GROUND,
     Drawing,
@@ -24,7 +25,6 @@ from hpcclear.scene.importers.points import (
     number,
     scale_of,
 )
-from hpcclear.scene.units import to_si
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 _LENGTHS = ("in", "cm", "m")

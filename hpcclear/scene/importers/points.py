@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import tomli_w
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.units import to_si, written
+from hpcclear.base.units import to_si, written
 
 GROUND = "ground"
 MASS = 0.1

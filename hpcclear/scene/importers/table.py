@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.units import UnitError, factor, to_si
 from hpcclear.scene.headings import Column
 from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, limit, scale_of
 from hpcclear.scene.sheets import Sheet, read
-from hpcclear.scene.units import UnitError, factor, to_si
 
 _COLUMNS = {
     "name": ("name", "point", "joint", "label", "punkt"),
