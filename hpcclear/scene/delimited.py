@@ -1,6 +1,6 @@
 """Rows of cells of a table in text: of any encoding, with any sign between cells, headings and remarks behind a #.
 
-Limits of all tables stand here; `workbook` has the rows of a workbook, `sheets` makes columns of both.
+The largest sizes of tables stand here; `workbook` has the rows of a workbook, `sheets` makes columns of both.
 """
 
 import codecs
@@ -104,7 +104,7 @@ def _decoded(path: Path, what: str, data: bytes) -> tuple[str, str]:
 
 
 def rows_of(path: Path, what: str, data: bytes) -> tuple[Rows, str, str]:
-    """Rows of a text that are not empty, the separator of their cells, and what it was read as in words."""
+    """Rows of a text that are not empty, the separator of their cells, and what it was read as in words; raises InputError."""
     text, encoding = _decoded(path, what, data)
     lines, comments, separator = Lines(), Lines(), ""
     number, counted = 1, 0

@@ -158,7 +158,13 @@ class Sheet:
         return np.array([self.number(column, row, unit, size) for row in range(len(self.lines))])
 
     def entries(self, column: Column) -> list[float | str]:
-        """The cells of a column as entries of a scene: numbers, or texts with the unit of its heading or their own."""
+        """The cells of a column as entries of a scene: numbers, or texts with the unit of its heading or their own.
+
+        Raises
+        ------
+        InputError
+            If a cell holds no number.
+        """
         if column.unit or not all(map(self._has_unit, column.cells)):
             return [
                 written(value, column.unit) for value in self.si(column, column.unit, "").tolist()
@@ -186,7 +192,7 @@ class Sheet:
     def axes(self) -> dict[str, Column]:
         """The columns of `AXES` by what they are: from their headings, in their order.
 
-        Besides, clock times with the dates of a column beside them. Where there is none of these, the first column, if its
+        Besides, clock times with the dates of a column beside them. Without any of these, the first column, if its
         unit or how its heading begins says what it is.
         """
         words = {word: kind for kind, words in _NAMES.items() for word in words}
