@@ -5,7 +5,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
 
 import tomli_w
 
@@ -102,17 +103,6 @@ def listed(words: Iterable[str]) -> str:
     return ", ".join(every[:_LISTED]) + more
 
 
-def number(text: str, key: str, what: str) -> float:
-    """A finite number of a file; raises InputError where `what` is none."""
-    try:
-        value = float(text) if len(text) <= LONGEST_NUMBER else math.nan
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(key, text[:40], f"{what} is no finite number", "Save the file again")
-    return value
-
-
 def limit(count: int, key: str) -> None:
     """Raise InputError for more points, or parts of another kind, than a linkage has."""
     if count > MOST_POINTS:
@@ -120,34 +110,68 @@ def limit(count: int, key: str) -> None:
         raise InputError(key, count, reason, "Save the mechanism alone")
 
 
-def scale_of(stated: float | None, words: str, unit: str, key: str) -> float:
-    """Return the unit of a file's lengths, m.
+class File(NamedTuple):
+    """A file that is imported, and what it is refused with."""
 
-    Parameters
-    ----------
-    stated : float or None
-        What the file states, m.
-    words : str
-        The same in words.
-    unit : str
-        What the user says.
+    path: Path
+    data: bytes
+    unit: str = ""
+    """Of lengths, as the user states it."""
+    again: str = "Save the file again"
+    """What to do where the file is incomplete."""
 
-    Raises
-    ------
-    InputError
-        If neither says a unit, or they contradict each other.
-    """
-    given = to_si(f"1 {unit}", "m") if unit else None
-    if stated is None and given is None:
-        raise InputError(
-            key, "length", "the file states no unit of lengths", "Add --unit, such as --unit mm"
-        )
-    if stated is not None and given is not None and not math.isclose(stated, given, rel_tol=1e-9):
-        raise InputError(
-            "--unit", unit, f"the file states {words}", "Leave --unit out, or correct the file"
-        )
-    assert given is not None or stated is not None
-    return float(stated if stated is not None else given or 0.0)
+    @property
+    def key(self) -> str:
+        """The file, in errors."""
+        return str(self.path)
+
+    def refuse(self, value: object, reason: str, remedy: str = "") -> NoReturn:
+        """Raise InputError about a part of the file."""
+        raise InputError(self.key, value, reason, remedy or self.again) from None
+
+    def number(self, text: str, what: str) -> float:
+        """A finite number; raises InputError where `what` is none."""
+        try:
+            value = float(text) if len(text) <= LONGEST_NUMBER else math.nan
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            self.refuse(text[:40], f"{what} is no finite number", "Save the file again")
+        return value
+
+    def limit(self, count: int) -> None:
+        """InputError for more points, or parts of another kind, than a linkage has."""
+        limit(count, self.key)
+
+    def scale(self, stated: float | None, words: str, where: str = "") -> float:
+        """Return the unit of the lengths, m.
+
+        Parameters
+        ----------
+        stated : float or None
+            What the file states, m.
+        words : str
+            The same in words.
+        where : str
+            Where it would, in errors.
+
+        Raises
+        ------
+        InputError
+            If neither the file nor the user says a unit, or they contradict each other.
+        """
+        given = to_si(f"1 {self.unit}", "m") if self.unit else stated
+        if given is None:
+            reason, remedy = "the file states no unit of lengths", "Add --unit, such as --unit mm"
+            raise InputError(f"{self.key}{where}", "length", reason, remedy)
+        if stated is not None and not math.isclose(stated, given, rel_tol=1e-9):
+            raise InputError(
+                "--unit",
+                self.unit,
+                f"the file states {words}",
+                "Leave --unit out, or correct the file",
+            )
+        return given if stated is None else stated
 
 
 def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
