@@ -27,7 +27,7 @@ FEATURES = {
         "identify/* */identified.py cli/identify.py",
     "laws, objectives, distributions, searches of a user":
         "plugins/* laws/checks.py laws/translate.py laws/formula.py "
-        "laws/constant.py scene/plugged.py scene/formula.py cli/laws.py statistics/search/foreign.py "
+        "laws/constant.py scene/plugged.py base/arithmetic.py cli/laws.py statistics/search/foreign.py "
         "statistics/search/asking.py",
     "wear and service lives":
         "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/wear.py cli/wear.py report/figures/wear.py "

@@ -19,7 +19,7 @@ from hpcclear.laws.formula import law_of
 from hpcclear.laws.numbers import _with_numpy, evaluate
 from hpcclear.laws.sources import text_of
 from hpcclear.scene import load_scene
-from hpcclear.scene.formula import names_in, value_of
+from hpcclear.base.arithmetic import names_in, value_of
 from hpcclear.scene.loading import scene_of_text
 
 COUNTS = [200, pytest.param(2000, marks=pytest.mark.nightly)]

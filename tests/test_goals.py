@@ -16,7 +16,7 @@ from hpcclear.report.beside import beside_original
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.formula import FormulaError, names_in, value_of
+from hpcclear.base.arithmetic import FormulaError, names_in, value_of
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.statistics.random.replicates import exceedance, quantile

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arithmetic import FormulaError, check_count, constant_of
+from hpcclear.base.arithmetic import MOST_POWER, FormulaError, check_count, constant_of
 
 LawError = FormulaError
 
@@ -27,8 +27,6 @@ WORDS = {
     "pow": "powers.power", "power": "powers.power",
 }  # fmt: skip
 """What a law may call, of Python, `math` or NumPy, and how that is written in the lanes."""
-
-MOST_POWER = 9.0
 
 
 def definition_of(function: Callable[..., object]) -> ast.FunctionDef:

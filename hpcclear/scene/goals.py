@@ -7,12 +7,12 @@ import numpy as np
 from pydantic import PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.arithmetic import FormulaError, names_in, value_of
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
-from hpcclear.scene.formula import FormulaError, names_in, value_of
 from hpcclear.scene.laws import check_objective
 from hpcclear.scene.plugged import PluginName
 
