@@ -5,7 +5,7 @@ each one that reads the law's numbers from its joint's rows. It is named by its 
 """
 
 from hpcclear.laws.constant import with_constants
-from hpcclear.laws.declared import ContactLaw, Law
+from hpcclear.laws.declared import VARYING, ContactLaw, Law
 from hpcclear.laws.translate import written
 
 HEAD = '''"""{title}, written by hpcclear.laws.sources."""
@@ -24,12 +24,7 @@ _GIVEN = {
         "impact_speed": "1.0 / (inverse + (1.0 - active))",  # in flight 1 m/s, of no consequence
         "inverse_impact_speed": "inverse",
     },
-    "friction": {
-        "speed": "speed",
-        "force": "force",
-        "deflection": "deflection",
-        "deflection_rate": "deflection_rate",
-    },
+    "friction": {name: name for name in VARYING["friction"]},
 }
 _SIGNATURES = {
     "contact": "par, row, depth, rate, inverse, active, i, W",

@@ -27,6 +27,8 @@ WORDS = {
     "pow": "powers.power", "power": "powers.power",
 }  # fmt: skip
 """What a law may call, of Python, `math` or NumPy, and how that is written in the lanes."""
+_SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+_ORDERS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 
 def definition_of(function: Callable[..., object]) -> ast.FunctionDef:
@@ -186,8 +188,7 @@ class _Writer:
             case ast.BinOp(
                 left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=right
             ):
-                sign = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}[type(op)]
-                return f"({self.text(left)} {sign} {self.text(right)})"
+                return f"({self.text(left)} {_SIGNS[type(op)]} {self.text(right)})"
             case ast.IfExp(test=test, body=yes, orelse=no):
                 return f"({self.text(yes)} if {self.text(test)} else {self.text(no)})"
             case ast.Compare(left=left, ops=ops, comparators=others):
@@ -202,19 +203,11 @@ class _Writer:
         raise LawError(f"{self.title} contains more than arithmetic: {ast.unparse(node)!r}")
 
     def compared(self, parts: list[ast.expr], ops: list[ast.cmpop]) -> str:
-        signs = {
-            ast.Lt: "<",
-            ast.LtE: "<=",
-            ast.Gt: ">",
-            ast.GtE: ">=",
-            ast.Eq: "==",
-            ast.NotEq: "!=",
-        }
-        if any(type(op) not in signs for op in ops):
+        if any(type(op) not in _ORDERS for op in ops):
             raise LawError(f"{self.title} compares in another way than by size")
         texts = [self.text(one) for one in parts]
         pairs = zip(texts[:-1], ops, texts[1:], strict=True)
-        found = [f"({a} {signs[type(op)]} {b})" for a, op, b in pairs]
+        found = [f"({a} {_ORDERS[type(op)]} {b})" for a, op, b in pairs]
         return found[0] if len(found) == 1 else f"({' & '.join(found)})"
 
     def number(self, value: object) -> str:

@@ -1,6 +1,5 @@
 """A simulated response against measured series: aligned in phase, with error norms for each quantity."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from hpcclear.base.units import fits
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
 from hpcclear.scene.headings import Column
-from hpcclear.scene.sheets import AXES, Sheet, read_series
+from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 
@@ -231,10 +230,6 @@ def _axis(sheet: Sheet) -> tuple[str, Column]:
     )  # fmt: skip
 
 
-def _plain(name: str) -> str:
-    return re.sub(r"[\s_.]+", " ", name).strip().lower()
-
-
 def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], Array]]:
     """Places (t,) of the instants along the axis, which rise, and what gives those of measured values."""
     if axis == "time":
@@ -251,7 +246,7 @@ def _series(
     """Name and series (t,) of the quantity that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
     found = motion.series(response)
-    match = {_plain(name): name for name in found}.get(_plain(wanted))
+    match = {plain_name(name): name for name in found}.get(plain_name(wanted))
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
         fitting = [

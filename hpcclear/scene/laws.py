@@ -304,15 +304,9 @@ class LawTable(Table):
 
 def _curve(data: Mapping[str, object]) -> Any:
     """Rows of the entry ``curve``, both columns rising from 0, or None; an error for validators."""
-    from pydantic_core import PydanticCustomError
-
     if data.get("curve") is None:
         return None
-    try:
-        rows = Law("m", "N").convert(data["curve"])
-    except PydanticCustomError as error:
-        context = error.context or {}
-        raise invalid(context["reason"], context["remedy"], "curve", data["curve"]) from None
+    rows = _converted(Law("m", "N"), data["curve"], "curve", data["curve"])
     rising = all(second[1] > first[1] for first, second in itertools.pairwise(rows))
     if (
         rows[0][0] < 0.0
@@ -363,7 +357,7 @@ def _value(parameter: Any, value: Any) -> Any:
     return _converted(quantity, value, parameter.name, value)
 
 
-def _converted(quantity: Quantity, value: Any, key: str, shown: Any) -> float:
+def _converted(quantity: Converted, value: Any, key: str, shown: Any) -> Any:
     from pydantic_core import PydanticCustomError
 
     try:

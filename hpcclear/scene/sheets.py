@@ -196,7 +196,7 @@ class Sheet:
         unit or how its heading begins says what it is.
         """
         words = {word: kind for kind, words in _NAMES.items() for word in words}
-        named = [(words.get(_plain(one.name), ""), one) for one in reversed(self.columns)]
+        named = [(words.get(plain_name(one.name), ""), one) for one in reversed(self.columns)]
         found = dict(one for one in named if one[0])
         found = {kind: found[kind] for kind in reversed(found)}
         clocks = [one for one in self.columns if self.is_clock(one)]
@@ -209,7 +209,7 @@ class Sheet:
                 found["time"] = last._replace(cells=tuple(both))
         first = self.columns[0]
         for kind, unit in AXES.items() if not found else ():
-            begins = not first.unit and _plain(first.name).startswith(_BEGIN[kind])
+            begins = not first.unit and plain_name(first.name).startswith(_BEGIN[kind])
             if begins or fits(first.unit, unit):
                 return {kind: first}
         return found
@@ -328,6 +328,6 @@ def plain_unit(unit: str, target: str) -> str:
     return _GAUGE.sub(r"\1", unit) if target == "Pa" else unit
 
 
-def _plain(name: str) -> str:
+def plain_name(name: str) -> str:
     """A heading in small letters, without signs between its words."""
     return re.sub(r"[\s_.]+", " ", name).strip().lower()

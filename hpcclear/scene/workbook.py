@@ -30,10 +30,12 @@ MOST_ROWS, MOST_COLUMNS = 2**20, 2**14
 """Of a sheet, as Excel has them."""
 MOST_PARTS, MOST_SHEETS = 10_000, 1000
 
-_DATES = {*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)}
-"""Built-in formats of dates and times (ECMA-376, 18.8.30)."""
-_TIMES = {18, 19, 20, 21, 22, 32, 33, 45, 46, 47, 55, 56}
-_PERCENT = {9, 10}
+_BUILT_IN = {
+    **dict.fromkeys((*range(14, 18), *range(27, 32), 34, 35, 36, *range(50, 55), 57, 58), "date"),
+    **dict.fromkeys((*range(18, 23), 32, 33, 45, 47, 55, 56), "time"),
+    46: "elapsed", 9: "percent", 10: "percent",
+}  # fmt: skip
+"""What numbers of built-in formats are (ECMA-376, 18.8.30)."""
 _UNREADABLE = (
     zipfile.BadZipFile, zlib.error, expat.ExpatError, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError,
     OSError,
@@ -435,20 +437,9 @@ def _letters(column: int) -> str:
 
 def _kind(number: str, own: Mapping[str, str]) -> str:
     """What numbers of a format are."""
-    id_ = int(number) if number.isdecimal() else 0
     code = own.get(number)
     if code is None:
-        if id_ == 46:
-            return "elapsed"
-        return (
-            "percent"
-            if id_ in _PERCENT
-            else "time"
-            if id_ in _TIMES
-            else "date"
-            if id_ in _DATES
-            else ""
-        )
+        return _BUILT_IN.get(int(number) if number.isdecimal() else 0, "")
     plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
     if re.search(r"\[(h+|m+|s+)\]", plain):
         return "elapsed"
