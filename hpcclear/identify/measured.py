@@ -61,7 +61,7 @@ def read_measured(
     Parameters
     ----------
     path : Path
-        Columns with a heading each: ``time [s]`` or ``crank_angle [deg]`` first, the signals by their names.
+        Columns with a heading each: ``time [s]`` or ``crank_angle [deg]``, or both, and the signals by their names.
     name, unit : str
         Signal and its SI unit.
     frequency : float

@@ -107,8 +107,8 @@ def compare(
     response : xarray.Dataset
         Kind ``response``; its averaged revolutions are used, continued periodically.
     path : path
-        CSV file. The first column is ``time`` or an angle of the crank, the others are quantities as exported tables name
-        them: ``contact_force crank_rod [kN]``. Units stand in brackets; without one, numbers are SI.
+        CSV file or workbook. A column is ``time`` or an angle of the crank (`hpcclear.scene.sheets.Sheet.axes`), the others are
+        quantities as exported tables name them: ``contact_force crank_rod [kN]``. Without a unit, numbers are SI.
     align : {"auto", "angle", "correlation", "none"}
         By the crank angle of the table (modulo one revolution), or shifted to the largest correlation of all columns
         together. "auto": by angle where there is one. "none": time and angle as they stand.
