@@ -44,7 +44,8 @@ FEATURES = {
         "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
-        "scene/sheets.py scene/delimited.py scene/headings.py scene/workbook.py scene/clock.py scene/file_curves.py scene/measured.py scene/table.py "
+        "scene/sheets.py scene/delimited.py scene/headings.py "
+        "scene/workbook.py scene/clock.py scene/file_curves.py scene/measured.py scene/table.py "
         "report/tables.py report/export.py cli/results.py",
     "comparison with measurements":
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from commands import SCENE
 
-from hpcclear.base.arithmetic import WORDS, FormulaError, read
+from hpcclear.base.arithmetic import WORDS, FormulaError, names_in, read, value_of
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import UnitError, to_si
 from hpcclear.laws.checks import check_shape, check_units
@@ -19,7 +19,6 @@ from hpcclear.laws.formula import law_of
 from hpcclear.laws.numbers import _with_numpy, evaluate
 from hpcclear.laws.sources import text_of
 from hpcclear.scene import load_scene
-from hpcclear.base.arithmetic import names_in, value_of
 from hpcclear.scene.loading import scene_of_text
 
 COUNTS = [200, pytest.param(2000, marks=pytest.mark.nightly)]

@@ -10,13 +10,13 @@ from margins import fewest
 from scipy import stats
 from scipy.stats import qmc
 
+from hpcclear.base.arithmetic import FormulaError, names_in, value_of
 from hpcclear.base.errors import InputError
 from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
 from hpcclear.report.html.page import write_report
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.base.arithmetic import FormulaError, names_in, value_of
 from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.statistics.random.replicates import exceedance, quantile

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import UnitError, to_si
 from hpcclear.scene.importers import dxf, linkage2, pmks, table
-from hpcclear.scene.importers.points import Drawing, File, scene_of, summary, text_of
+from hpcclear.scene.importers.file import File
+from hpcclear.scene.importers.points import Drawing, scene_of, summary, text_of
 
 __all__ = ["FORMATS", "Drawing", "drawing_of", "linkage_of", "scene_of", "summary", "text_of"]
 

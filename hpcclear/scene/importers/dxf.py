@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import to_si
-from hpcclear.scene.importers.points import GROUND, MOST_POINTS, Drawing, File, Names, Point, listed
+from hpcclear.scene.importers.file import GROUND, MOST_POINTS, File, Names, listed
+from hpcclear.scene.importers.points import Drawing, Point
 
 _FOOT = 1200 / 3937  # of US surveys
 _UNITS = {

@@ -12,14 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
-from hpcclear.scene.importers.points import (
-    GROUND,
-    Drawing,
-    File,
-    Names,
-    Point,
-    listed,
-)
+from hpcclear.scene.importers.file import GROUND, File, Names, listed
+from hpcclear.scene.importers.points import Drawing, Point
 
 _SIZES = {
     "millimeters": (24.5e-3 / 96.0, 1e-3), "mm": (24.5e-3 / 96.0, 1e-3), "inches": (25.4e-3 / 96.0, 25.4e-3),

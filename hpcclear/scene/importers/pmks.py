@@ -13,14 +13,8 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from hpcclear.base.units import to_si
-from hpcclear.scene.importers.points import (
-    GROUND,
-    Drawing,
-    File,
-    Names,
-    Point,
-    listed,
-)
+from hpcclear.scene.importers.file import GROUND, File, Names, listed
+from hpcclear.scene.importers.points import Drawing, Point
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 _LENGTHS = ("in", "cm", "m")
