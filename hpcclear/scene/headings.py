@@ -75,9 +75,11 @@ def columns_of(
         name, unit = parsed_heading(heading)
         if place < len(units) and units[place] is not None:
             unit = units[place] or unit
-        columns.append(Column(name, unit, heading, tuple(row[place] for row in cells)))
-    _check_headings(path, line, [one for one in columns if one.heading or any(one.cells)])
-    columns = [one for one in columns if one.heading or any(one.cells)]
+        column = Column(name, unit, heading, tuple(row[place] for row in cells))
+        if not heading and any(column.cells):
+            reason = "a column has no heading"
+            raise InputError(f"{path}, line {line}", "", reason, "Name it, or remove the column")
+        columns += [column] if heading else []
     comma = _has_commas(path, columns, [number for number, _ in body], separator)
     return tuple(columns), tuple(number for number, _ in body), comma
 
@@ -133,13 +135,6 @@ def _are_units(cells: list[str]) -> bool:
     bare = [re.sub(r"[\[\]()]", "", cell).strip() for cell in cells]
     filled = [cell for cell in bare if cell not in NOTHING]
     return bool(filled) and all(is_unit(cell) for cell in filled)
-
-
-def _check_headings(path: Path, line: int, columns: list[Column]) -> None:
-    where = f"{path}, line {line}"
-    for column in columns:
-        if not column.heading:
-            raise InputError(where, "", "a column has no heading", "Name it, or remove the column")
 
 
 def _has_commas(path: Path, columns: list[Column], lines: list[int], separator: str) -> bool:
