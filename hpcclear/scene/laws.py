@@ -10,10 +10,9 @@ from typing import Any, ClassVar, Self
 from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_validator
 from pydantic_core import CoreSchema
 
+from hpcclear.base.arithmetic import FormulaError
 from hpcclear.base.objectives import Objective
-from hpcclear.laws import checks, laws, names, objectives
-from hpcclear.laws.formula import law_of
-from hpcclear.laws.translate import LawError
+from hpcclear.laws import laws, names
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
 from hpcclear.scene.loads import Law
@@ -24,10 +23,14 @@ SPHERE = "sphere"
 """The geometry of contact that laws of this package have by themselves."""
 
 
-def check_objective(objective: Objective) -> None:
+def check_own_objective(objective: Objective) -> None:
     """An error for validators where an objective is at fault."""
+    from hpcclear.laws.objectives import (
+        check_objective,  # slow to load: for objectives of users alone
+    )
+
     with as_mended(""):
-        objectives.check_objective(objective)
+        check_objective(objective)
 
 
 @contextlib.contextmanager
@@ -35,7 +38,7 @@ def as_mended(key: str) -> Iterator[None]:
     """What is wrong with a law as an error of an entry."""
     try:
         yield
-    except LawError as error:
+    except FormulaError as error:
         raise invalid(error.reason, error.remedy, key) from None
 
 
@@ -185,8 +188,10 @@ class LawTable(Table):
             raise invalid(
                 f"is no {cls.kind} law", f"Make it a hpcclear.{what}, see docs/extending.md", "law"
             )
+        from hpcclear.laws.checks import check_parameters  # slow to load: for laws of users alone
+
         with as_mended("law"):
-            checks.check_parameters(law)
+            check_parameters(law)
         return law
 
     @classmethod
@@ -196,6 +201,9 @@ class LawTable(Table):
 
     @classmethod
     def _of_formula(cls, data: Mapping[str, object]) -> Any:
+        from hpcclear.laws.checks import check_parameters
+        from hpcclear.laws.formula import law_of
+
         entry = cls.formula
         text, units = data.get(entry), data.get("units") or {}
         if not isinstance(text, str):
@@ -209,7 +217,7 @@ class LawTable(Table):
         with as_mended(entry):
             law = law_of(cls.kind, text, units)
         with as_mended("units"):
-            checks.check_parameters(law)
+            check_parameters(law)
         return law
 
     @classmethod
@@ -260,8 +268,10 @@ class LawTable(Table):
         if wrong is not None:
             raise invalid(*wrong)
         if theirs:
+            from hpcclear.laws.checks import check
+
             with as_mended("law"):
-                checks.check(law, found)
+                check(law, found)
         return found
 
     @model_validator(mode="after")
