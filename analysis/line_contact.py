@@ -2,7 +2,7 @@
 
 The problem is a disc in a hole of an elastic plane without friction. Its pressure is a polynomial over sqrt(1 - x^2), for
 which the integral with the logarithm is known term by term, so that a few points give ten digits. Prints the coefficients
-that stand in `hpcclear/dynamics/laws/geometry/line.py` and their largest errors. The tests have a second solution by other
+that stand in `hpcclear/laws/geometry/line.py` and their largest errors. The tests have a second solution by other
 means.
 """
 

@@ -18,8 +18,8 @@ FEATURES = {
     "unknowns of a machine from measured signals":
         "identify/* */identified.py cli/identify.py",
     "laws, objectives, distributions, searches of a user":
-        "plugins/* dynamics/laws/checks.py dynamics/laws/translate.py dynamics/laws/formula.py "
-        "dynamics/laws/constant.py scene/plugged.py scene/formula.py cli/laws.py statistics/search/foreign.py "
+        "plugins/* laws/checks.py laws/translate.py laws/formula.py "
+        "laws/constant.py scene/plugged.py base/arithmetic.py cli/laws.py statistics/search/foreign.py "
         "statistics/search/asking.py",
     "wear and service lives":
         "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/wear.py cli/wear.py report/figures/wear.py "
@@ -36,7 +36,8 @@ FEATURES = {
         "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
-        "scene/sheets.py scene/workbook.py scene/clock.py scene/file_curves.py scene/measured.py scene/table.py "
+        "scene/sheets.py scene/delimited.py scene/headings.py "
+        "scene/workbook.py scene/clock.py scene/file_curves.py scene/measured.py scene/table.py "
         "report/tables.py report/export.py cli/results.py",
     "comparison with measurements":
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
@@ -45,7 +46,7 @@ FEATURES = {
         "scene/iso286.py scene/fits.py scene/fitted.py scene/costs.py scene/choices.py scene/materials.py "
         "report/html/designs.py",
     "oil films":
-        "dynamics/laws/film/* dynamics/physics/film.py dynamics/contacts/lubrication.py scene/film.py "
+        "laws/film/* laws/reynolds.py dynamics/contacts/lubrication.py scene/film.py "
         "report/bearings.py dynamics/lubrication/*",
     "bars that bend":
         "dynamics/linkage/bending.py scene/bending.py dynamics/planar/swings.py dynamics/bending.py",
@@ -53,7 +54,7 @@ FEATURES = {
         "dynamics/contacts/guide.py scene/guides.py scene/rubbing.py dynamics/linkage/rubbing.py "
         "dynamics/linkage/guides.py report/figures/guides.py scene/moving.py",
     "shapes of contact, roundness":
-        "dynamics/laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
+        "laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
     "impact and noise, loads on bearings":
         "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py "
         "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/noise.py report/html/loads.py "
@@ -84,7 +85,7 @@ FEATURES = {
         "statistics/search/improvement.py statistics/search/infill.py statistics/search/certainty.py study/refinement.py "
         "study/truth.py study/verification.py",
     "contact and friction laws, built in":
-        "dynamics/laws/normal/* dynamics/laws/friction/* dynamics/laws/hertz_contact.py scene/laws.py "
+        "laws/normal/* laws/friction/* laws/hertz_contact.py scene/laws.py "
         "dynamics/physics/contact.py",
     "linkages from drawings, points and other programs; templates":
         "scene/importers/* scene/points_of_linkage.py scene/slider_crank.py",
@@ -93,7 +94,7 @@ FEATURES = {
     "the page and its gallery":
         "report/html/* report/answer.py report/targets.py report/spread.py report/failures.py",
     "archives, citation, schema, other units":
-        "results/crate.py results/provenance.py scene/citation.py cli/cite.py scene/schema.py scene/unit_names.py "
+        "results/crate.py results/provenance.py scene/citation.py cli/cite.py scene/schema.py base/units.py base/unit_names.py "
         "scene/plausibility.py scene/former.py",
 }  # fmt: skip
 

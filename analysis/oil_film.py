@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hpcclear import load_scene, simulate
-from hpcclear.dynamics.laws.film import finite, long, short
+from hpcclear.laws.film import finite, long, short
 
 IMAGE = Path(__file__).parent.parent / "docs" / "images" / "oil_film.png"
 RATIO = 1.0  # length over diameter

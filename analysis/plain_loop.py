@@ -15,9 +15,9 @@ from scenes import scene
 from hpcclear.base.arrays import Array
 from hpcclear.base.jit import FASTMATH
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.stepping.explicit.tableau import TSITOURAS
+from hpcclear.laws import laws
 
 STATES = 10  # rod x, y, angle, slider x, their rates, integrals of both | |e| - c |
 # numbers of the laws that it has

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     import hpcclear.study as study
     from hpcclear.accuracy.plan import plan
     from hpcclear.base.objectives import Objective
-    from hpcclear.dynamics.laws.declared import ContactLaw, FrictionLaw, Parameter
     from hpcclear.dynamics.response import simulate
     from hpcclear.ensemble.api import evaluate
     from hpcclear.ensemble.functions import bifurcation, map, wear
+    from hpcclear.laws.declared import ContactLaw, FrictionLaw, Parameter
     from hpcclear.report.tables import to_table
     from hpcclear.results.grids import grid
     from hpcclear.scene import Scene, load_scene
@@ -62,10 +62,10 @@ __all__ = [
 ]
 
 _HOME = {
-    "ContactLaw": "dynamics.laws.declared",
-    "FrictionLaw": "dynamics.laws.declared",
+    "ContactLaw": "laws.declared",
+    "FrictionLaw": "laws.declared",
     "Objective": "base.objectives",
-    "Parameter": "dynamics.laws.declared",
+    "Parameter": "laws.declared",
     "Scene": "scene",
     "load_scene": "scene",
     "simulate": "dynamics.response",

@@ -1,8 +1,8 @@
 """Laws as effects name them, by the words that tests of the kernel use for them."""
 
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.laws.lanes import in_lanes
+from hpcclear.dynamics.contacts.laws import in_lanes
+from hpcclear.laws import laws
 
 CONTACT = {"fixed": "hunt-crossley", "latched": "lankarani-nikravesh"}
 FRICTION = ("coulomb", "ambrosio", "lugre")

@@ -8,9 +8,9 @@ import pytest
 
 from hpcclear.base.errors import InputError
 from hpcclear.identify.measured import read_measured
-from hpcclear.report.compare import read_columns
 from hpcclear.scene import load_scene
 from hpcclear.scene.clock import is_clock, seconds
+from hpcclear.scene.sheets import read_series
 from hpcclear.scene.table import read_points
 
 START = datetime.datetime(2026, 3, 14, 23, 59, 58, 250_000)
@@ -108,10 +108,11 @@ def test_tables_of_signals_take_clock_times(name, tmp_path):
     head, rows = TABLES[name]
     path = tmp_path / "m.csv"
     path.write_text("\n".join([head, *rows]) + "\n")
-    first, force = read_columns(path)
-    assert (first.name, first.unit, force.name) == ("time", "s", "force")
-    np.testing.assert_allclose(first.si("s"), STEPS, atol=1e-9)
-    np.testing.assert_allclose(force.values, np.arange(6) + 0.5)
+    table = read_series(path)
+    (axis,), (force,) = table.axes, table.signals
+    assert (axis, force.name) == ("time", "force")
+    np.testing.assert_allclose(table.si(table.axes[axis], "s", ""), STEPS, atol=1e-9)
+    np.testing.assert_allclose(table.si(force, "N", ""), np.arange(6) + 0.5)
     turned = [f"{row.rpartition(';')[0]};{72 * k}" for k, row in enumerate(rows)]
     path.write_text("\n".join([head.replace("force [N]", "angle [deg]"), *turned]) + "\n")
     made = load_scene(_linkage({"kind": "table", "body": "crank", "angle": {"file": str(path)}}))

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.report import overlay_figure
-from hpcclear.report.compare import compare, read_columns
+from hpcclear.report.compare import compare
 from hpcclear.results import dataset
 
 
@@ -89,7 +89,7 @@ def test_a_table_that_cannot_be_compared_is_refused(response, tmp_path, head, re
 def test_a_cell_that_is_no_number_is_named(tmp_path):
     (tmp_path / "m.csv").write_text("time [s],crank_moment\n0,1\n1,x\n2,3\n")
     with pytest.raises(InputError, match=r"line 3, column crank_moment = 'x'"):
-        read_columns(tmp_path / "m.csv")
+        compare(data.response(), tmp_path / "m.csv")
 
 
 def test_the_command_prints_norms_in_the_units_of_the_measurement_and_draws(response, tmp_path):

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.laws.checks import check
-from hpcclear.dynamics.laws.friction import ambrosio, coulomb
-from hpcclear.dynamics.laws.hertz_contact import (
+from hpcclear.dynamics.contacts.laws import in_lanes
+from hpcclear.laws import laws
+from hpcclear.laws.checks import check
+from hpcclear.laws.friction import ambrosio, coulomb
+from hpcclear.laws.hertz_contact import (
     contact_stiffness,
     elastic,
     latched_factor,
     reduced_compliance,
 )
-from hpcclear.dynamics.laws.lanes import in_lanes
 
 LATCHED = sorted(name for name, law in laws("contact").items() if law.latched)
 

@@ -7,8 +7,8 @@ import pytest
 
 from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws import laws, numbers
-from hpcclear.dynamics.laws.hertz_contact import dundurs
+from hpcclear.laws import laws, numbers
+from hpcclear.laws.hertz_contact import dundurs
 
 COMPRESSOR = Path(__file__).parents[1] / "jobs" / "compressor.toml"
 CLEARANCE = "joints.crank_rod.clearance"

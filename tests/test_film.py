@@ -10,9 +10,9 @@ import rotors
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.laws.film import finite
-from hpcclear.dynamics.physics import film
+from hpcclear.laws import laws
+from hpcclear.laws import reynolds as film
+from hpcclear.laws.film import finite
 
 
 def force_by(model, place, w, s2):

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import spsolve
 
 from hpcclear import simulate
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws.film import finite as bearing
+from hpcclear.laws.film import finite as bearing
 
 ANGLES = np.array([0.0, 0.4, 1.2, 1.7, 2.4, 3.0, 3.14])
 

@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 from commands import SCENE
 
-from hpcclear.base.arithmetic import WORDS, FormulaError, read
+from hpcclear.base.arithmetic import WORDS, FormulaError, names_in, read, value_of
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws.checks import check_shape, check_units
-from hpcclear.dynamics.laws.constant import with_constants
-from hpcclear.dynamics.laws.formula import law_of
-from hpcclear.dynamics.laws.lanes import text_of
-from hpcclear.dynamics.laws.numbers import _with_numpy, evaluate
+from hpcclear.base.units import UnitError, to_si
+from hpcclear.laws.checks import check_shape, check_units
+from hpcclear.laws.constant import with_constants
+from hpcclear.laws.formula import law_of
+from hpcclear.laws.numbers import _with_numpy, evaluate
+from hpcclear.laws.sources import text_of
 from hpcclear.scene import load_scene
-from hpcclear.scene.formula import names_in, value_of
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.units import UnitError, to_si
 
 COUNTS = [200, pytest.param(2000, marks=pytest.mark.nightly)]
 

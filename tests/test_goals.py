@@ -10,13 +10,13 @@ from margins import fewest
 from scipy import stats
 from scipy.stats import qmc
 
+from hpcclear.base.arithmetic import FormulaError, names_in, value_of
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.formula import FormulaError, names_in, value_of
 from hpcclear.statistics.random.replicates import exceedance, quantile
 from hpcclear.statistics.search.infill import proposals
 

@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from test_user_laws import FORMULA, NO_FRICTION, POWER, ROOT, file_with, oracle_of
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws import laws, numbers
-from hpcclear.dynamics.laws.hertz_contact import dundurs
+from hpcclear.laws import laws, numbers
+from hpcclear.laws.hertz_contact import dundurs
 from hpcclear.scene import load_scene
 from hpcclear.scene.switches import switches
 
@@ -115,7 +115,7 @@ def test_a_liner_is_a_foundation():
 @pytest.mark.parametrize("law", ["hertz", "hunt-crossley", "lankarani-nikravesh"])
 def test_a_geometry_holds_what_laws_have_to_hold(name, law):
     """Units, sign, growth with depth, stored energy: the checks of users' laws, on ours."""
-    from hpcclear.dynamics.laws.checks import check
+    from hpcclear.laws.checks import check
 
     made = laws("contact")[law].on(laws("geometry")[name])
     values = {

@@ -13,11 +13,11 @@ from hpcclear.base.bits import falling
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws.friction import lugre
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
 from hpcclear.dynamics.setup.start import start_states
+from hpcclear.laws.friction import lugre
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points

@@ -11,13 +11,13 @@ from commands import kill_once_it_saved, run
 from hpcclear import grid
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime
+from hpcclear.base.units import noting
 from hpcclear.cli import cli
 from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 from hpcclear.dynamics.evaluation.steady.mapping import mapped
 from hpcclear.ensemble.api import as_points
 from hpcclear.ensemble.maps import SHAPE, axis, cells
 from hpcclear.scene import load_scene
-from hpcclear.scene.units import noting
 
 FILE = Path(__file__).parent.parent / "jobs" / "hunt_crossley.toml"
 BASE = load_scene(FILE)

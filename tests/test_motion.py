@@ -10,12 +10,12 @@ from running import scene_with
 from some_laws import contact_law, row
 
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.response import violation
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
+from hpcclear.laws import laws
 
 CRANK = {"length": 0.05, "mass": 0.3, "inertia": 1.3e-4, "u": 0.02}
 ROD = {"length": 0.12, "mass": 0.21, "inertia": 2.5e-4, "u": 0.045}

@@ -8,14 +8,14 @@ import pytest
 from commands import SCENE
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.unit_names import OTHERS, REFUSED, UNITS
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.ensemble.maps import axis
 from hpcclear.identify.inputs import Unknown
 from hpcclear.scene import load_scene
 from hpcclear.scene.paths import PHYSICAL, _entries_of_kinds, of_kinds, quantities
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.table import read_points
-from hpcclear.scene.unit_names import OTHERS, REFUSED, UNITS
-from hpcclear.scene.units import UnitError, to_si
 from hpcclear.scene.variables import Variable
 
 JOBS = Path(__file__).parents[1] / "jobs"

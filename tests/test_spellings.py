@@ -5,9 +5,9 @@ import re
 
 import pytest
 
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.report.figures import labels
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.units import UnitError, to_si
 
 INCH, POUND, G = 0.0254, 0.45359237, 9.80665
 RPM = 2.0 * math.pi / 60.0

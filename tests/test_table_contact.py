@@ -7,8 +7,8 @@ from scipy.interpolate import PchipInterpolator
 
 from hpcclear import simulate
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws import laws, numbers
-from hpcclear.dynamics.laws.geometry.table import EXAMPLE, of_rows
+from hpcclear.laws import laws, numbers
+from hpcclear.laws.geometry.table import EXAMPLE, of_rows
 
 K, EXPONENT = 5e9, 1.5
 POWER = {"force_at": K * 1e-6**EXPONENT, "depth_at": 1e-6, "exponent": EXPONENT}

@@ -10,12 +10,12 @@ from commands import overrides, run
 from running import scene_with
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import UnitError, noting, to_si
 from hpcclear.ensemble.maps import axis
 from hpcclear.scene import load_scene
 from hpcclear.scene.numerics import Numerics
 from hpcclear.scene.paths import _entries, quantities
 from hpcclear.scene.table import read_points
-from hpcclear.scene.units import UnitError, noting, to_si
 
 JOBS = Path(__file__).parent.parent / "jobs"
 TURN = 2.0 * math.pi

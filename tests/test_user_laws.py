@@ -14,7 +14,7 @@ from oracle import SliderCrank
 from running import run
 
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.laws.lanes import in_lanes
+from hpcclear.dynamics.contacts.laws import in_lanes
 from hpcclear.dynamics.physics import powers
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.laws import ENTRIES

@@ -7,8 +7,18 @@ bounded length takes a bounded time, whatever stands in it. What is left holds n
 import ast
 import math
 import operator
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
+from functools import lru_cache
+from typing import Any
 
+import numpy as np
+
+from hpcclear.base.arrays import Array
+
+LONGEST = 200
+"""Characters of a formula of design variables."""
+MOST_POWER = 9.0
+"""Of a variable in such a formula, and in a law."""
 DEEPEST = 60
 """Levels of a formula: whatever visits it later calls itself a few times for each."""
 
@@ -150,6 +160,45 @@ class _Reader:
             case ast.UnaryOp(op=ast.Not(), operand=inner):
                 return ast.UnaryOp(ast.Not(), self.condition(inner))
         raise FormulaError(f"has {_shown(node)} for a condition", "Compare two numbers: d > 0")
+
+
+@lru_cache(maxsize=64)
+def _of_variables(text: str) -> ast.expr:
+    tree = read(text, LONGEST)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            power = number_of(node.right)
+            if power is None or not 0 <= power <= MOST_POWER:
+                reason = f"has a power that is not a number from 0 to {MOST_POWER:g}"
+                raise FormulaError(reason)
+    return tree
+
+
+def names_in(text: str) -> tuple[str, ...]:
+    """Variables of a formula such as "m2 + m3", in the order in which they come; raises FormulaError."""
+    nodes = [node for node in ast.walk(_of_variables(text)) if isinstance(node, ast.Name)]
+    nodes.sort(key=lambda one: (one.lineno, one.col_offset))
+    return tuple(dict.fromkeys(one.id for one in nodes))
+
+
+def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
+    """A formula that `names_in` let through, of variables that are numbers or arrays of one shape."""
+    operators = {**_SIGNS, ast.Pow: operator.pow}  # of arrays
+
+    def made(node: ast.expr) -> Any:
+        match node:
+            case ast.Name():
+                return variables[node.id]
+            case ast.Constant():
+                return node.value
+            case ast.UnaryOp():
+                return -made(node.operand)
+            case ast.BinOp():
+                return operators[type(node.op)](made(node.left), made(node.right))
+        raise FormulaError("was not checked")
+
+    with np.errstate(all="ignore"):  # what comes to no number is seen by who asked
+        return np.asarray(made(_of_variables(text)), dtype=np.float64)
 
 
 def number_of(node: ast.expr) -> float | None:

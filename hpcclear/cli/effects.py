@@ -12,6 +12,7 @@ from rich.table import Table
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.cli.printing import _load
 from hpcclear.cli.terminal import console, fitting, objective_of, table
 from hpcclear.ranks.stopping import Exit
@@ -28,7 +29,6 @@ from hpcclear.report.figures.labels import paired
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import parse
-from hpcclear.scene.units import UnitError, to_si
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished

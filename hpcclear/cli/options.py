@@ -215,7 +215,7 @@ def on_ranks(
     if time_limit is not None:
         stop.limit_time(time_limit)
     with boundary(stop, ahead, resumes=resumes) as ranks:
-        from hpcclear.scene.units import noting  # here, where the others load what they need
+        from hpcclear.base.units import noting  # here, where the others load what they need
 
         with noting(lambda text, read: say(f"Note: {text!r} is read as {read}")):
             yield ranks

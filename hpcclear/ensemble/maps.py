@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import UnitError, note, to_si
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.samples import sample_points, samples_of, saving
@@ -19,7 +20,6 @@ from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
-from hpcclear.scene.units import UnitError, note, to_si
 
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
 

@@ -9,9 +9,10 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import IMPACTS, ORDERS, Spectrum, harmonics
-from hpcclear.report.compare import Column, read_columns
 from hpcclear.scene import Scene
+from hpcclear.scene.headings import Column
 from hpcclear.scene.planar import turns_of
+from hpcclear.scene.sheets import Sheet, read_series
 
 FEWEST = 4
 """Whole revolutions that a table needs: their scatter is the measure of its noise."""
@@ -24,9 +25,6 @@ DRIFT = 0.03
 
 PAIRS = 180
 """Pairs of the curve of a measured pressure."""
-
-ANGLES = ("crank_angle", "crank angle", "angle", "phi")
-TIMES = ("time", "t")
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def read_measured(
     Parameters
     ----------
     path : Path
-        Columns with a heading each: ``time [s]`` or ``crank_angle [deg]`` first, the signals by their names.
+        Columns with a heading each: ``time [s]`` or ``crank_angle [deg]``, or both, and the signals by their names.
     name, unit : str
         Signal and its SI unit.
     frequency : float
@@ -76,16 +74,13 @@ def read_measured(
     InputError
         The table cannot be read, lacks the signal, or has too few revolutions.
     """
-    columns = read_columns(path)
-    plain = [one.name.strip().lower() for one in columns]
-    angle = next((one for one, word in zip(columns, plain, strict=True) if word in ANGLES), None)
-    time = next((one for one, word in zip(columns, plain, strict=True) if word in TIMES), None)
-    column = _column(columns, name, path)
-    values = column.si(unit)
-    seconds = None if time is None else time.si("s")
+    sheet = read_series(path)
+    angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
+    values = sheet.si(_column(sheet, name), unit, "heading")
+    seconds = None if time is None else sheet.si(time, "s", "heading")
     count = name.startswith(IMPACTS)
     if angle is not None:
-        place = np.unwrap(sense * angle.si("rad")) / (2.0 * np.pi * turns)
+        place = np.unwrap(sense * sheet.si(angle, "rad", "heading")) / (2.0 * np.pi * turns)
     elif seconds is not None:
         place = (seconds - seconds[0]) * _frequency(seconds, values, frequency)
     else:
@@ -148,18 +143,14 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
     return scene.with_({"effects.slider_load": pairs})
 
 
-def _column(columns: list[Column], name: str, path: Path) -> Column:
+def _column(sheet: Sheet, name: str) -> Column:
     """The column of a signal; a table of one signal may call it as it likes."""
-    for one in columns:
-        if one.name.strip() == name:
-            return one
-    axes = (*ANGLES, *TIMES)
-    rest = [one for one in columns if one.name.strip().lower() not in axes]
-    if len(rest) == 1:
-        return rest[0]
-    listed = ", ".join(one.heading for one in rest)
+    found = [one for one in sheet.signals if one.name.strip() == name] or sheet.signals
+    if len(found) == 1:
+        return found[0]
+    listed = ", ".join(one.heading for one in found)
     raise InputError(
-        "--signal", str(path), f"has no column {name!r}", f"Call one so. It has: {listed}"
+        "--signal", sheet.path, f"has no column {name!r}", f"Call one so. It has: {listed}"
     )
 
 

@@ -1,6 +1,5 @@
 """A simulated response against measured series: aligned in phase, with error norms for each quantity."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,11 @@ import xarray as xr
 from hpcclear.base import markup
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.units import fits
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
-from hpcclear.scene.sheets import read
-from hpcclear.scene.units import UnitError, factor
+from hpcclear.scene.headings import Column
+from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 
@@ -24,35 +24,8 @@ SHIFTS = 720
 
 NOT_ALIGNED = "not aligned"
 
-_AXES = {
-    "time": "time", "t": "time", "angle": "angle", "crank angle": "angle", "phi": "angle", "crankangle": "angle",
-}  # fmt: skip
-"""Names of the first column, and what it is."""
-
 MOST_POINTS = 4000
 """Measured points that the search for a shift uses."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """A measured column."""
-
-    heading: str
-    name: str
-    """Heading without its unit."""
-    unit: str
-    """As written; empty for none, which is read as SI."""
-    values: Array
-    """Shape (n,), in that unit."""
-
-    def si(self, unit: str) -> Array:
-        """Values (n,) in the SI unit `unit`; raises InputError where the column has a unit of another kind."""
-        if not self.unit:
-            return self.values
-        try:
-            return self.values * float(factor(self.unit, "" if unit == "1" else unit))
-        except UnitError as error:
-            raise InputError("heading", self.heading, error.reason, error.remedy) from None
 
 
 @dataclass(frozen=True)
@@ -134,8 +107,8 @@ def compare(
     response : xarray.Dataset
         Kind ``response``; its averaged revolutions are used, continued periodically.
     path : path
-        CSV file. The first column is ``time`` or an angle of the crank, the others are quantities as exported tables name
-        them: ``contact_force crank_rod [kN]``. Units stand in brackets; without one, numbers are SI.
+        CSV file or workbook. A column is ``time`` or an angle of the crank (`hpcclear.scene.sheets.Sheet.axes`), the others are
+        quantities as exported tables name them: ``contact_force crank_rod [kN]``. Without a unit, numbers are SI.
     align : {"auto", "angle", "correlation", "none"}
         By the crank angle of the table (modulo one revolution), or shifted to the largest correlation of all columns
         together. "auto": by angle where there is one. "none": time and angle as they stand.
@@ -147,9 +120,9 @@ def compare(
     InputError
         The table cannot be read, names what the response has not, or has units of another kind.
     """
-    columns = read_columns(Path(path))
-    axis, unit = _axis(columns[0])
-    given = columns[0].si(unit)
+    sheet = read_series(Path(path))
+    axis, along = _axis(sheet)
+    given = sheet.si(along, AXES[axis], "heading")
     inside = bearings.averaged(response)
     if inside.sum() < 3:
         reason = "no averaged revolution is stored in it"
@@ -157,9 +130,12 @@ def compare(
     shown = response.isel(time=np.flatnonzero(inside))
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
-    _check_names(names or {}, columns)
-    pairs = [(column, *_series(shown, column, names or {})) for column in columns[1:]]
-    measured = [column.si(str(one.attrs.get("units", "1"))) for column, _, one in pairs]
+    _check_names(names or {}, sheet.signals)
+    pairs = [(column, *_series(shown, column, names or {})) for column in sheet.signals]
+    measured = [
+        sheet.si(column, str(one.attrs.get("units", "1")).removesuffix("1"), "heading")
+        for column, _, one in pairs
+    ]
     simulated = [_periodic(place, one.to_numpy()) for _, _, one in pairs]
     how = ("angle" if axis == "angle" else "correlation") if align == "auto" else align
     if how == "angle" and axis != "angle":
@@ -185,7 +161,15 @@ def compare(
     )
     series_x = _measured_axis(shown, axis, given, at, every)
     return Comparison(
-        axis, columns[0].unit, given, shift, words, turns, revolution, series_x, quantities
+        axis,
+        "s" if sheet.is_clock(along) else along.unit,
+        given,
+        shift,
+        words,
+        turns,
+        revolution,
+        series_x,
+        quantities,
     )
 
 
@@ -214,7 +198,8 @@ def _every(place: Array, at: Array) -> Array:
     span = float(place[-1])
     rounds = np.arange(np.floor(at.min() / span), np.floor(at.max() / span) + 1.0)
     every = (place[None, :-1] + span * rounds[:, None]).ravel()
-    return every[(every >= at.min()) & (every <= at.max())]
+    rounding = 1e-9 * span
+    return every[(every >= at.min() - rounding) & (every <= at.max() + rounding)]
 
 
 def _measured_axis(response: xr.Dataset, axis: str, given: Array, at: Array, every: Array) -> Array:
@@ -226,49 +211,23 @@ def _measured_axis(response: xr.Dataset, axis: str, given: Array, at: Array, eve
     return x
 
 
-def read_columns(path: Path) -> list[Column]:
-    """Return the columns of numbers of a measured table, each with its unit; raises InputError where there is no series.
-
-    Clock times and dates become the first column "time [s]", seconds since the first row, where no column is time or angle.
-    """
-    sheet = read(path, "measured table")
-    columns = [
-        Column(one.heading, one.name, one.unit, sheet.numbers(one))
-        for one in sheet.columns
-        if not sheet.is_text(one)
-    ]
-    times = sheet.clock()
-    if times is not None and not any(_plain(one.name) in _AXES for one in columns):
-        columns.insert(0, Column(times.heading, "time", "s", sheet.seconds(times)))
-    if len(columns) < 2 or len(sheet.lines) < 3:
-        reason = "has no series: an axis, a quantity and three rows are needed"
-        raise InputError(
-            "measured table", str(path), reason, "Give time or angle first, then quantities"
-        )
-    return columns
-
-
 def _check_names(names: Mapping[str, str], columns: list[Column]) -> None:
     """InputError unless each named column is one of the table's, by its heading or without its unit."""
-    known = [name for one in columns[1:] for name in dict.fromkeys((one.name, one.heading))]
+    known = [name for one in columns for name in dict.fromkeys((one.name, one.heading))]
     for name, quantity in names.items():
         if name not in known:
             reason = f"the table has no column {name!r}"
             raise InputError("--name", f"{name}={quantity}", reason, nearest(name, known))
 
 
-def _axis(column: Column) -> tuple[str, str]:
-    """Kind and SI unit of the first column."""
-    if (kind := _AXES.get(_plain(column.name))) is not None:
-        return kind, "s" if kind == "time" else "rad"
-    remedy = 'Call it "time [s]" or "crank_angle [deg]"'
+def _axis(sheet: Sheet) -> tuple[str, Column]:
+    """Kind and column of what a table runs along: the first, where it has time and angle."""
+    for axis in sheet.axes.items():
+        return axis
     raise InputError(
-        "heading", column.heading, "the first column is neither time nor angle", remedy
-    )
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[\s_.]+", " ", name).strip().lower()
+        "heading", sheet.columns[0].heading, "the first column is neither time nor angle",
+        'Call it "time [s]" or "crank_angle [deg]"',
+    )  # fmt: skip
 
 
 def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], Array]]:
@@ -287,10 +246,12 @@ def _series(
     """Name and series (t,) of the quantity that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
     found = motion.series(response)
-    match = {_plain(name): name for name in found}.get(_plain(wanted))
+    match = {plain_name(name): name for name in found}.get(plain_name(wanted))
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
-        fitting = [name for name in found if _fits(column.unit, found[name].attrs["units"])]
+        fitting = [
+            name for name in found if column.unit and fits(column.unit, found[name].attrs["units"])
+        ]
         remedy = (
             f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, fitting or list(found))
         )
@@ -299,14 +260,6 @@ def _series(
             "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
         )
     return match, found[match]
-
-
-def _fits(unit: str, of: str) -> bool:
-    """Whether a unit as written in a heading is one of the quantities in another unit."""
-    try:
-        return bool(unit and factor(unit, of))
-    except UnitError:
-        return False
 
 
 def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:

@@ -15,10 +15,10 @@ import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
+from hpcclear.base.units import factor
 from hpcclear.report import spread
 from hpcclear.report.tables import Units, identifier, to_table
 from hpcclear.results import dataset, files
-from hpcclear.scene.units import factor
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -15,11 +15,11 @@ from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.objectives import Objective
 from hpcclear.base.outcome import FIELDS, Status
 from hpcclear.base.student import student
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.units import UnitError, to_si
 from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_interval, share_interval
 
 LEVELS = (0.5, 0.95, 0.99)

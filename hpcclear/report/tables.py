@@ -13,11 +13,11 @@ import numpy as np
 import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import factor, fits, is_unit
 from hpcclear.report.figures import labels
 from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
-from hpcclear.scene.units import factor, fits, is_unit
 
 if TYPE_CHECKING:
     from pandas import DataFrame

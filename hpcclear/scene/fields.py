@@ -17,7 +17,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from hpcclear.base.errors import nearest as nearest
-from hpcclear.scene.units import UnitError, to_si
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.scene.wanted import hint
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant

@@ -1,8 +1,8 @@
 """Curves from files: a measured pressure, force, torque or motion against the crank angle, as the pairs that a table has."""
 
 import math
-import re
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -11,9 +11,10 @@ from pydantic import model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
-from hpcclear.scene.sheets import Column, Sheet, parsed_heading, read
-from hpcclear.scene.units import UnitError, factor, to_si
+from hpcclear.scene.headings import Column, parsed_heading
+from hpcclear.scene.sheets import Sheet, plain_unit, read
 
 TURN = 2 * math.pi
 SEAM = 0.02
@@ -22,19 +23,8 @@ LARGEST_GAP = math.radians(20)
 """Angle that may be left out of a revolution, where steps are smaller."""
 FINEST = math.radians(0.1)
 """Step to which longer tables are resampled."""
-_GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
-"""Units of gauge pressures."""
 _VALUES = {"pressure": "Pa", "force": "N", "torque": "N*m"}
 _MOTIONS = {"angle": "rad", "speed": "rad/s"}
-_HINTS = {
-    "angle": ("angle", "deg", "phi", "φ", "crank", "winkel", "kw", "ca", "theta", "θ"),
-    "speed": ("speed", "drehzahl", "omega", "n"),
-    "time": ("time", "zeit", "t"),
-    "pressure": ("pressure", "druck", "p_", "p"),
-    "force": ("force", "kraft", "f"),
-    "torque": ("torque", "moment", "drehmoment", "m"),
-}
-"""How headings begin, in small letters, of columns whose unit says nothing."""
 
 
 class FileCurve(Table):
@@ -130,8 +120,8 @@ def pairs_of(
     """
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
     kind = _kind(curve, unit, key)
-    first, angles = _column(sheet, "angle", curve.angle, "rad", key, ())
-    second, values = _column(sheet, kind, getattr(curve, kind), _VALUES[kind], key, (first,), curve)
+    first, angles = _column(sheet, "angle", curve.angle, "rad", key)
+    second, values = _column(sheet, kind, getattr(curve, kind), _VALUES[kind], key, (first,))
     shown = f"{sheet.found}, {len(angles)} rows, {second.name} from {_span(values, second)}"
     if kind == "pressure":
         values = _forces(curve, second, values, unit, key)
@@ -152,7 +142,7 @@ def against_time(
     """The pairs of a curve against the time, s and `unit`, as `pairs_of` does; the motion of a drive begins at 0 s."""
     sheet = read(folder / curve.file, f"{key}.file", headed=False)
     kind = next(name for name, own in {**_VALUES, **_MOTIONS}.items() if own == unit)
-    first, times = _column(sheet, "time", curve.time, "s", key, ())
+    first, times = _column(sheet, "time", curve.time, "s", key)
     _, values = _column(sheet, kind, getattr(curve, kind), unit, key, (first,))
     start = times[0] if kind in _MOTIONS else 0.0
     made = np.column_stack([times - start, values]).tolist()
@@ -173,100 +163,49 @@ def _kind(curve: FileCurve, unit: str, key: str) -> str:
 
 def _span(values: Array, column: Column) -> str:
     try:
-        size = float(factor(_plain(column.unit, "Pa"), "Pa"))
+        size = float(factor(plain_unit(column.unit, "Pa"), "Pa"))
     except UnitError:
         return f"{values.min():.6g} to {values.max():.6g} in SI"
     return f"{values.min() / size:.6g} to {values.max() / size:.6g} {column.unit}"
 
 
 def _column(
-    sheet: Sheet, kind: str, given: str | None, target: str, key: str, taken: Sequence[Column], curve: FileCurve | None = None,
+    sheet: Sheet, kind: str, given: str | None, target: str, key: str, taken: Sequence[Column] = (),
 ) -> tuple[Column, Array]:  # fmt: skip
     """The column of a kind, and its numbers in SI, shape (n,)."""
-    name, unit = (None, "") if given is None else _named(given, target)
-    free = [one for one in sheet.columns if one not in taken]
-    times = sheet.clock() if kind == "time" else None
-    if (
-        times is not None
-        and name in (None, times.name, times.heading)
-        and not _of_unit(sheet, free, target)
-    ):
-        return times, sheet.seconds(times)
-    column = (
-        sheet.column(name, f"{key}.{kind}") if name else _likely(sheet, free, kind, target, key)
-    )
-    own = _plain(column.unit, target)
-    if unit and own and _size(unit, target, key, kind) != _size(own, target, key, kind):
+    key = f"{key}.{kind}"
+    name, unit = ("", "") if given is None else _named(given, target)
+    column = sheet.column(name, key) if name else sheet.likely(kind, target, key, taken)
+    if unit and column.unit and _size(unit, target, key) != _size(column.unit, target, key):
         raise InputError(
-            f"{key}.{kind}", given, f"the heading {column.heading!r} has the unit {column.unit}", "Remove one of the two"
+            key, given, f"the heading {column.heading!r} has the unit {column.unit}", "Remove one of the two"
         )  # fmt: skip
-    if curve is not None and own != column.unit and curve.ambient:
+    if not unit and not sheet.states_unit(column):
         raise InputError(
-            f"{key}.ambient", curve.ambient, f"the heading {column.heading!r} is of gauge pressures", 'Write ambient = "0 bar"'
-        )  # fmt: skip
-    unit = unit or own
-    if not unit:
-        raise InputError(
-            f"{key}.{kind}", given, f"nothing says the unit of the column {column.heading!r} of {sheet.path}",
+            key, given, f"nothing says the unit of the column {column.heading!r} of {sheet.path}",
             f'Write {kind} = "{ {"rad": "deg", "Pa": "bar", "s": "s", "N": "N"}.get(target, "Nm") }", say',
         )  # fmt: skip
-    size = _size(unit, target, key, kind)
-    return column, size * sheet.numbers(column)
+    return column, sheet.si(column, target, key, unit)
 
 
-def _plain(unit: str, target: str) -> str:
-    """A unit without the g of gauge pressures, where it is one."""
-    return _GAUGE.sub(r"\1", unit) if target == "Pa" else unit
-
-
-def _size(unit: str, target: str, key: str, kind: str) -> float:
+def _size(unit: str, target: str, key: str) -> Fraction:
     try:
-        return to_si(f"1 {unit}", target)
+        return factor(plain_unit(unit, target), target)
     except UnitError as error:
-        raise InputError(f"{key}.{kind}", unit, error.reason, error.remedy) from None
+        raise InputError(key, unit, error.reason, error.remedy) from None
 
 
-def _named(given: str, target: str) -> tuple[str | None, str]:
+def _named(given: str, target: str) -> tuple[str, str]:
     """Heading and unit of an entry such as "bar", "cylinder 1" or "cylinder 1 [bar]"."""
-    try:
-        factor(given, target)
-        return None, given
-    except UnitError:
-        name, unit = parsed_heading(given)
-        return name, unit
-
-
-def _of_unit(sheet: Sheet, columns: Sequence[Column], target: str) -> list[Column]:
-    """Columns of numbers whose unit is one of a quantity."""
-
-    def fits(column: Column) -> bool:
-        try:
-            return bool(column.unit) and factor(_plain(column.unit, target), target) is not None
-        except UnitError:
-            return False
-
-    return [one for one in columns if fits(one) and not sheet.is_text(one)]
-
-
-def _likely(sheet: Sheet, free: Sequence[Column], kind: str, target: str, key: str) -> Column:
-    """The column of a kind by its unit, by its heading, or because it is the only one left."""
-    free = [one for one in free if not sheet.is_text(one)]
-    by_unit = _of_unit(sheet, free, target)
-    by_name = [one for one in free if one.name.lower().startswith(_HINTS[kind])]
-    for found in (by_unit, by_name if not by_unit else [], free):
-        if len(found) == 1 or (found and kind in ("angle", "time") and found is free):
-            return found[0]
-        if len(found) > 1:
-            break
-    listed = ", ".join(one.heading for one in (by_unit or by_name or free)) or "none with numbers"
-    raise InputError(
-        f"{key}.{kind}", None, f"which column of {sheet.path} it is does not follow from its headings: {listed}",
-        f'Name it, as in {kind} = "heading"',
-    )  # fmt: skip
+    return ("", given) if fits(given, target) else parsed_heading(given)
 
 
 def _forces(curve: FileCurve, column: Column, values: Array, unit: str, key: str) -> Array:
-    gauge = _GAUGE.fullmatch(column.unit)
+    gauge = plain_unit(column.unit, "Pa") != column.unit
+    if gauge and curve.ambient:
+        raise InputError(
+            f"{key}.ambient", curve.ambient, f"the heading {column.heading!r} is of gauge pressures", 'Write ambient = "0 bar"'
+        )  # fmt: skip
     if curve.piston is None:
         raise InputError(
             f"{key}.bore",

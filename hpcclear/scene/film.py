@@ -2,8 +2,9 @@
 
 from typing import Annotated, Any
 
+from hpcclear.laws import laws
 from hpcclear.scene.fields import PositiveLength, Quantity, Table, invalid
-from hpcclear.scene.laws import LawName, our_laws
+from hpcclear.scene.laws import LawName
 
 
 class Film(Table):
@@ -21,8 +22,8 @@ class Film(Table):
 
     @property
     def law(self) -> Any:
-        """The model, as `hpcclear.dynamics.laws.declared.FilmLaw`."""
-        return our_laws("film")[self.model]
+        """The model, as `hpcclear.laws.declared.FilmLaw`."""
+        return laws("film")[self.model]
 
 
 def check_film(film: Film | None, clearance: float, radius: float) -> None:

@@ -7,9 +7,9 @@ from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
 from hpcclear.base import tolerances
+from hpcclear.base.units import note
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.iso286 import Limits, fit_of
-from hpcclear.scene.units import note
 
 _DIAMETER = Quantity("m", above=0)
 INSTEAD = {

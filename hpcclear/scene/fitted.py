@@ -5,11 +5,11 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.units import note
 from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
 from hpcclear.scene.named import paths_of
 from hpcclear.scene.paths import quantities, replace
-from hpcclear.scene.units import note
 
 
 def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, Any]:

@@ -7,13 +7,13 @@ import numpy as np
 from pydantic import PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
+from hpcclear.base.arithmetic import FormulaError, names_in, value_of
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective, Usual
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
-from hpcclear.scene.formula import FormulaError, names_in, value_of
-from hpcclear.scene.laws import check_objective
+from hpcclear.scene.laws import check_own_objective
 from hpcclear.scene.plugged import PluginName
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
@@ -29,7 +29,7 @@ class ObjectiveName(PluginName):
         if not isinstance(found, Objective):
             raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
         if not self.registry.is_ours(name):
-            check_objective(found)
+            check_own_objective(found)
         return name
 
 

@@ -1,11 +1,7 @@
-"""Tables of the scene that name a law: what entries they have, the law says.
-
-Laws are found by name in the registry of plug-ins; no higher layer is imported here.
-"""
+"""Tables of the scene that name a law: what entries they have, the law says."""
 
 import contextlib
 import dataclasses
-import importlib
 import itertools
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -14,26 +10,27 @@ from typing import Any, ClassVar, Self
 from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_validator
 from pydantic_core import CoreSchema
 
+from hpcclear.base.arithmetic import FormulaError
+from hpcclear.base.objectives import Objective
+from hpcclear.laws import laws, names
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
 from hpcclear.scene.piecewise import Piecewise
 from hpcclear.scene.plugged import as_invalid
 from hpcclear.scene.wanted import hint
 
-_HOME = "hpcclear.dynamics.laws"
-
 SPHERE = "sphere"
 """The geometry of contact that laws of this package have by themselves."""
 
 
-def _module(name: str) -> Any:
-    return importlib.import_module(f"{_HOME}.{name}")
-
-
-def check_objective(objective: object) -> None:
+def check_own_objective(objective: Objective) -> None:
     """An error for validators where an objective is at fault."""
+    from hpcclear.laws.objectives import (
+        check_objective,  # slow to load: for objectives of users alone
+    )
+
     with as_mended(""):
-        _module("objectives").check_objective(objective)
+        check_objective(objective)
 
 
 @contextlib.contextmanager
@@ -41,7 +38,7 @@ def as_mended(key: str) -> Iterator[None]:
     """What is wrong with a law as an error of an entry."""
     try:
         yield
-    except _module("translate").LawError as error:
+    except FormulaError as error:
         raise invalid(error.reason, error.remedy, key) from None
 
 
@@ -58,13 +55,6 @@ ENTRIES: dict[str, dict[str, Quantity]] = {}
 """Quantities of entries of users' laws that this process has read, by path and unit."""
 
 
-@cache
-def our_laws(kind: str) -> Mapping[str, Any]:
-    """The laws of a kind, "contact" or "friction", that come with this package, by name."""
-    found: Mapping[str, Any] = importlib.import_module(_HOME).laws(kind)
-    return found
-
-
 @dataclasses.dataclass(frozen=True)
 class LawName(Converted):
     """An entry that names one of our laws of a kind."""
@@ -73,15 +63,14 @@ class LawName(Converted):
 
     def convert(self, value: object) -> str:
         """The name, known to be there; raises PydanticCustomError."""
-        names = importlib.import_module(_HOME).names(self.kind)
-        if value not in names:
-            raise invalid("is not one of the known values", nearest(str(value), names))
+        if value not in (known := names(self.kind)):
+            raise invalid("is not one of the known values", nearest(str(value), known))
         return str(value)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {"type": "string", "enum": [*importlib.import_module(_HOME).names(self.kind)]}
+        return {"type": "string", "enum": [*names(self.kind)]}
 
 
 @cache
@@ -92,7 +81,7 @@ def _on(law: Any, geometry: Any) -> Any:
 def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
     """A law on the elastic part of a geometry of that name, made of `rows` if it has a table; an error for validators where
     there is none."""
-    found = our_laws("geometry")
+    found = laws("geometry")
     if name not in found:
         known = (SPHERE, *found)
         raise invalid("is not one of the known values", nearest(name, known), "geometry", name)
@@ -113,18 +102,18 @@ def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
 
 def _with_entries(kind: str) -> Iterator[Any]:
     """All of this package that has entries in a law's table: laws, and for contact the geometries."""
-    yield from our_laws(kind).values()
+    yield from laws(kind).values()
     if kind == "contact":
-        yield from our_laws("geometry").values()
+        yield from laws("geometry").values()
 
 
 def known_laws(kind: str) -> dict[str, Any]:
     """Our laws and those of installed packages, by name; geometries and films are ours alone."""
     if kind in ("geometry", "film"):
-        return dict(our_laws(kind))
+        return dict(laws(kind))
     registry = CONTACT_LAWS if kind == "contact" else FRICTION_LAWS
     others = {name: named(registry.get(name), name) for name in registry.names()}
-    return {**our_laws(kind), **others}
+    return {**laws(kind), **others}
 
 
 def quantity_of(parameter: Any) -> Quantity:
@@ -184,7 +173,7 @@ class LawTable(Table):
         shape = data.get("geometry")
         if isinstance(shape, str) and shape != SPHERE:
             return on_geometry(cls.find(name, {**data, "geometry": None}), shape, _curve(data))
-        known = our_laws(cls.kind)
+        known = laws(cls.kind)
         if name in known:
             return known[name]
         if name == "expression":
@@ -199,8 +188,10 @@ class LawTable(Table):
             raise invalid(
                 f"is no {cls.kind} law", f"Make it a hpcclear.{what}, see docs/extending.md", "law"
             )
+        from hpcclear.laws.checks import check_parameters  # slow to load: for laws of users alone
+
         with as_mended("law"):
-            _module("checks").check_parameters(law)
+            check_parameters(law)
         return law
 
     @classmethod
@@ -210,6 +201,9 @@ class LawTable(Table):
 
     @classmethod
     def _of_formula(cls, data: Mapping[str, object]) -> Any:
+        from hpcclear.laws.checks import check_parameters
+        from hpcclear.laws.formula import law_of
+
         entry = cls.formula
         text, units = data.get(entry), data.get("units") or {}
         if not isinstance(text, str):
@@ -221,9 +215,9 @@ class LawTable(Table):
         ):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
         with as_mended(entry):
-            law = _module("formula").law_of(cls.kind, text, units)
+            law = law_of(cls.kind, text, units)
         with as_mended("units"):
-            _module("checks").check_parameters(law)
+            check_parameters(law)
         return law
 
     @classmethod
@@ -255,7 +249,7 @@ class LawTable(Table):
     def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
         """Values of the law's parameters, defaults filled in."""
         found = {}
-        theirs = law.name not in our_laws(cls.kind)
+        theirs = law.name not in laws(cls.kind)
         for parameter in law.parameters:
             if parameter.name in cls._own():
                 reason = f"{law.name} has a parameter {parameter.name!r}, which is an entry of every law's table"
@@ -274,8 +268,10 @@ class LawTable(Table):
         if wrong is not None:
             raise invalid(*wrong)
         if theirs:
+            from hpcclear.laws.checks import check
+
             with as_mended("law"):
-                _module("checks").check(law, found)
+                check(law, found)
         return found
 
     @model_validator(mode="after")
@@ -286,7 +282,7 @@ class LawTable(Table):
 
     @property
     def declared(self) -> Any:
-        """The law, as `hpcclear.dynamics.laws.declared` has it."""
+        """The law, as `hpcclear.laws.declared` has it."""
         return self._law
 
     def values(self) -> dict[str, Any]:
@@ -303,13 +299,13 @@ class LawTable(Table):
     ) -> dict[str, Any]:
         """With the entries of all laws of this package."""
         made = handler.resolve_ref_schema(handler(schema))
-        laws = {one.name: one for one in _with_entries(cls.kind)}
-        for law in laws.values():
+        every = {one.name: one for one in _with_entries(cls.kind)}
+        for law in every.values():
             for p in law.parameters:
-                made["properties"].setdefault(p.name, _schema(p, law, laws))
+                made["properties"].setdefault(p.name, _schema(p, law, every))
         words = made["properties"]["law"].get("description")
         made["properties"]["law"] = {
-            "anyOf": [{"enum": [*our_laws(cls.kind)]}, {"type": "string", "pattern": PATTERN}],
+            "anyOf": [{"enum": [*laws(cls.kind)]}, {"type": "string", "pattern": PATTERN}],
             **({} if words is None else {"description": words}),
         }
         made["additionalProperties"] = True  # of users' laws
@@ -318,15 +314,9 @@ class LawTable(Table):
 
 def _curve(data: Mapping[str, object]) -> Any:
     """Rows of the entry ``curve``, both columns rising from 0, or None; an error for validators."""
-    from pydantic_core import PydanticCustomError
-
     if data.get("curve") is None:
         return None
-    try:
-        rows = Piecewise("m", "N").convert(data["curve"])
-    except PydanticCustomError as error:
-        context = error.context or {}
-        raise invalid(context["reason"], context["remedy"], "curve", data["curve"]) from None
+    rows = _converted(Piecewise("m", "N"), data["curve"], "curve", data["curve"])
     rising = all(second[1] > first[1] for first, second in itertools.pairwise(rows))
     if (
         rows[0][0] < 0.0
@@ -343,10 +333,10 @@ def _curve(data: Mapping[str, object]) -> Any:
     return rows
 
 
-def _schema(parameter: Any, law: Any, laws: Mapping[str, Any]) -> dict[str, Any]:
+def _schema(parameter: Any, law: Any, every: Mapping[str, Any]) -> dict[str, Any]:
     entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
     whose = [
-        name for name, one in laws.items() if parameter.name in {p.name for p in one.parameters}
+        name for name, one in every.items() if parameter.name in {p.name for p in one.parameters}
     ]
     if parameter.count > 1:
         many = parameter.count
@@ -377,7 +367,7 @@ def _value(parameter: Any, value: Any) -> Any:
     return _converted(quantity, value, parameter.name, value)
 
 
-def _converted(quantity: Quantity, value: Any, key: str, shown: Any) -> float:
+def _converted(quantity: Converted, value: Any, key: str, shown: Any) -> Any:
     from pydantic_core import PydanticCustomError
 
     try:

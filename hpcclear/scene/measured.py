@@ -94,16 +94,15 @@ def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> tuple[dict[s
 def _column(path: Path, column: str | None, key: str) -> tuple[list[float | str], str]:
     """The cells of a column: numbers, or text with the unit of its header."""
     sheet = read(path, f"{key}.file")
-    of_numbers = [one for one in sheet.columns if not sheet.is_text(one)] or sheet.columns
+    of_numbers = sheet.of_numbers or sheet.columns
     if column is None and len(of_numbers) > 1:
         remedy = (
             f"Name one as column = {sheet.columns[0].name!r}: it has {', '.join(sheet.names[:20])}"
         )
         raise InputError(f"{key}.column", None, f"{path} has {len(of_numbers)} columns", remedy)
     chosen = of_numbers[0] if column is None else sheet.column(column, f"{key}.column")
-    values = sheet.numbers(chosen).tolist()
-    shown = f"{sheet.found}, {len(values)} values of {chosen.heading}"
-    return [f"{value!r} {chosen.unit}" if chosen.unit else value for value in values], shown
+    values = sheet.entries(chosen)
+    return values, f"{sheet.found}, {len(values)} values of {chosen.heading}"
 
 
 def _curve(

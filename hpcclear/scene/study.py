@@ -6,11 +6,11 @@ from typing import Any
 
 from pydantic import model_validator
 
+from hpcclear.base.arithmetic import names_in
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
 from hpcclear.scene.cases import Case
 from hpcclear.scene.fields import invalid, nearest
-from hpcclear.scene.formula import names_in
 from hpcclear.scene.named import paths_of, texts_in
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.stages import (

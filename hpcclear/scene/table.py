@@ -1,36 +1,25 @@
 """A user's own table of designs."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene.fields import nearest
+from hpcclear.scene.headings import Column
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
 from hpcclear.scene.scene import Scene
-from hpcclear.scene.sheets import Column, Sheet, read
-from hpcclear.scene.units import UnitError, factor, note_turns, of_unit
+from hpcclear.scene.sheets import Sheet, read
 
 LABELS = (
-    "design",
-    "name",
-    "label",
-    "part",
-    "id",
-    "no",
-    "no.",
-    "nr",
-    "nr.",
-    "number",
-    "index",
-    "run",
-    "#",
-)
+    "design", "name", "label", "part", "id", "no", "no.", "nr", "nr.", "number", "index", "run", "#",
+)  # fmt: skip
 """Headings, in small letters, of columns that name the rows."""
 
 
@@ -74,47 +63,37 @@ def read_points(path: str | Path, scene: Scene) -> Points:
             "no column has numbers of this scene",
             "Name one such as m2 [g]",
         )
-    names, paths = tuple(c.name for c in columns), tuple(c.paths for c in columns)
+    names, paths = tuple(c.column.name for c in columns), tuple(c.paths for c in columns)
     driven = [path for column in paths for path in column]
     for path_ in driven:
         if driven.count(path_) > 1:
             raise InputError(
                 key, ", ".join(names), f"two columns drive {path_}", "Remove one of them"
             )
-    rows = range(len(sheet.lines))
-    values = np.array([[column.read(sheet, row) for column in columns] for row in rows])
-    named = tuple(" ".join(column.cells[row] for column in labels) for row in rows)
+    values = np.column_stack([column.read(sheet) for column in columns])
+    named = tuple(" ".join(cells) for cells in zip(*(one.cells for one in labels), strict=True))
     points = Points(names, values, paths, named if labels else ())
     check_points(scene, points, lambda row: f"{key}, line {sheet.lines[row]}")
     return points
 
 
-@dataclass(frozen=True)
-class _Driven:
-    """A column of numbers of the scene."""
+class _Driven(NamedTuple):
+    """A column of numbers of the scene, and the entries that it drives."""
 
-    name: str
     paths: tuple[str, ...]
-    unit: str  # as written, "" for SI
     column: Column
 
-    def read(self, sheet: Sheet, row: int) -> float:
-        """The cell in SI, within the bounds of every entry it drives."""
-        quantity = quantities()[self.paths[0]]
-        value = sheet.number(self.column, row, quantity.unit)
-        if self.unit:
-            value = of_unit(repr(value), self.unit, quantity.unit)
-        for path in self.paths:
-            if not quantities()[path].holds(value):
-                reason = f"must be {quantities()[path].bounds()}"
-                where = f"{sheet.path}, line {sheet.lines[row]}, column {self.name}"
+    def read(self, sheet: Sheet) -> Array:
+        """Its cells in SI, shape (n,), within the bounds of every entry it drives."""
+        every = [quantities()[path] for path in self.paths]
+        values = sheet.si(self.column, every[0].unit, sheet.path)
+        for quantity in every:
+            for row in np.flatnonzero(~np.asarray(quantity.holds(values)))[:1]:
                 raise InputError(
-                    where,
-                    self.column.cells[row],
-                    reason,
+                    sheet.place(self.column, row), self.column.cells[row], f"must be {quantity.bounds()}",
                     "Correct the value or the unit of its column",
-                )
-        return value
+                )  # fmt: skip
+        return values
 
 
 def _driven(column: Column, scene: Scene, key: str, sheet: Sheet) -> _Driven | None:
@@ -137,12 +116,4 @@ def _driven(column: Column, scene: Scene, key: str, sheet: Sheet) -> _Driven | N
         raise InputError(
             key, column.name, "is neither a variable nor a number of this scene", remedy
         )
-    unit, own = column.unit, quantities()[paths[0]].unit
-    if not unit or unit == own:
-        return _Driven(column.name, paths, "", column)
-    try:
-        factor(unit, own)
-        note_turns(f"1 {unit} in {column.heading}", "1", unit, own)
-    except UnitError as error:
-        raise InputError(key, column.heading, error.reason, error.remedy) from None
-    return _Driven(column.name, paths, unit, column)
+    return _Driven(paths, column)

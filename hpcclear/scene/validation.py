@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import noting
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import Table, invalid, nearest
@@ -16,7 +17,6 @@ from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replac
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables, plain
-from hpcclear.scene.units import noting
 from hpcclear.scene.variables import Variable
 from hpcclear.scene.wanted import hint
 

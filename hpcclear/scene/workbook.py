@@ -17,22 +17,25 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene import delimited
+from hpcclear.scene.delimited import LARGEST_FILE, LONGEST_CELL, Rows
 
-LARGEST = 50_000_000
+LARGEST = LARGEST_FILE // 4
 """Bytes of a workbook, which is packed."""
-UNPACKED = 250_000_000
+UNPACKED = LARGEST_FILE
 """Bytes of what is read of it, unpacked."""
-MOST_CELLS = 2_000_000
+MOST_CELLS = delimited.MOST_CELLS // 2
+"""Each takes three times as long as one of text."""
 MOST_ROWS, MOST_COLUMNS = 2**20, 2**14
 """Of a sheet, as Excel has them."""
 MOST_PARTS, MOST_SHEETS = 10_000, 1000
-LONGEST = 200
-"""Characters of a cell that are kept."""
 
-_DATES = {*range(14, 23), *range(27, 37), *range(45, 48), *range(50, 59)}
-"""Built-in formats of dates and times (ECMA-376, 18.8.30)."""
-_TIMES = {18, 19, 20, 21, 22, 32, 33, 45, 46, 47, 55, 56}
-_PERCENT = {9, 10}
+_BUILT_IN = {
+    **dict.fromkeys((*range(14, 18), *range(27, 32), 34, 35, 36, *range(50, 55), 57, 58), "date"),
+    **dict.fromkeys((*range(18, 23), 32, 33, 45, 47, 55, 56), "time"),
+    46: "elapsed", 9: "percent", 10: "percent",
+}  # fmt: skip
+"""What numbers of built-in formats are (ECMA-376, 18.8.30)."""
 _UNREADABLE = (
     zipfile.BadZipFile, zlib.error, expat.ExpatError, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError,
     OSError,
@@ -44,7 +47,7 @@ class _Enough(Exception):
     """The rest of a part is of no use."""
 
 
-def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> list[tuple[int, list[str]]]:
+def cells_of(path: Path, data: bytes, what: str, sheet: str | None) -> Rows:
     """Numbers and cells of the rows of a sheet that are not empty.
 
     Raises
@@ -205,7 +208,9 @@ class _Book:
         def start(tag: str, attributes: dict[str, str]) -> None:
             tag = _local(tag)
             if tag == "numFmt":
-                own[attributes.get("numFmtId", "")] = attributes.get("formatCode", "")[:LONGEST]
+                own[attributes.get("numFmtId", "")] = attributes.get("formatCode", "")[
+                    :LONGEST_CELL
+                ]
             elif tag in ("cellXfs", "cellStyleXfs"):
                 within[0] = tag
             elif tag == "xf" and within[0] == "cellXfs" and len(self.formats) < MOST_CELLS:
@@ -270,13 +275,13 @@ class _Text:
         self.aside |= tag == "rPh"
 
     def end(self, tag: str) -> str:
-        if tag == "t" and not self.aside and len(self.made) <= LONGEST:
-            self.made += "".join(self.parts)[: LONGEST + 1]
+        if tag == "t" and not self.aside and len(self.made) <= LONGEST_CELL:
+            self.made += "".join(self.parts)[: LONGEST_CELL + 1]
         self.aside &= tag != "rPh"
         return tag
 
     def take(self) -> str:
-        made, self.made = self.made.strip()[:LONGEST], ""
+        made, self.made = self.made.strip()[:LONGEST_CELL], ""
         return made
 
 
@@ -379,7 +384,7 @@ class _Page:
         if self.kind == "b":
             return "true" if raw == "1" else "false"
         if self.kind != "n" or not raw:
-            return raw[:LONGEST]
+            return raw[:LONGEST_CELL]
         style = formats[abs(int(self.style))] if formats else ""
         if not style:
             return raw if len(raw) < 16 else repr(float(raw))
@@ -432,20 +437,9 @@ def _letters(column: int) -> str:
 
 def _kind(number: str, own: Mapping[str, str]) -> str:
     """What numbers of a format are."""
-    id_ = int(number) if number.isdecimal() else 0
     code = own.get(number)
     if code is None:
-        if id_ == 46:
-            return "elapsed"
-        return (
-            "percent"
-            if id_ in _PERCENT
-            else "time"
-            if id_ in _TIMES
-            else "date"
-            if id_ in _DATES
-            else ""
-        )
+        return _BUILT_IN.get(int(number) if number.isdecimal() else 0, "")
     plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
     if re.search(r"\[(h+|m+|s+)\]", plain):
         return "elapsed"

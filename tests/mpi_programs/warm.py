@@ -27,8 +27,8 @@ from numba.core.registry import cpu_target
 
 import hpcclear
 from hpcclear import cli, scene
-from hpcclear.dynamics.laws import checks
 from hpcclear.ensemble import identity, samples
+from hpcclear.laws import checks
 from hpcclear.ranks import boundary
 
 HIGH = 500  # a descriptor above all in use

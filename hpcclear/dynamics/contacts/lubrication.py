@@ -4,8 +4,8 @@ import math
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import laws
-from hpcclear.dynamics.physics.film import film_thickness
+from hpcclear.laws import laws
+from hpcclear.laws.reynolds import film_thickness
 
 FORCES = {name: law.force for name, law in laws("film").items()}
 

@@ -11,6 +11,7 @@ import numpy as np
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.numbered import Rows
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
+from hpcclear.laws.declared import LAW_NUMBERS
 
 TURN = 6.283185307179586  # rad
 
@@ -24,7 +25,7 @@ class Effects(NamedTuple):
 
     joints: Any = None  # how many have clearance
     first: int = 0  # place of the first of them; the others follow
-    contact: Any = None  # the normal force's law and friction's, as `laws.lanes.InLanes`
+    contact: Any = None  # the normal force's law and friction's, as `contacts.laws.InLanes`
     friction: Any = None
     torque: int | None = None  # the body that gives the period is free, driven by a torque
     baumgarte: int | None = None  # Cartesian coordinates with multipliers instead of minimal ones
@@ -43,7 +44,9 @@ class Effects(NamedTuple):
     threshold: Any = None  # of the pressure, below which nothing wears
     profile: int | None = None  # where around these the sliding work is done
     films: Any = None  # names of laws of oil films, by places of joints
-    objective: Any = None  # the rate that the study's objective is made of, as `laws.lanes.InLanes`
+    objective: Any = (
+        None  # the rate that the study's objective is made of, as `contacts.laws.InLanes`
+    )
 
     @property
     def latched(self) -> Any:
@@ -117,8 +120,6 @@ HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest driv
 HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
-LAW_NUMBERS = 8
-"""Rows of a joint for the numbers of its law of contact, and as many for friction's: which is which, the law says."""
 OF_JOINT = Rows()  # within a joint's block
 CLEARANCE = OF_JOINT("radial clearance", "m")
 BEARING_RADIUS = OF_JOINT("radius of the bearing", "m")

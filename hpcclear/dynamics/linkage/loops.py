@@ -43,6 +43,17 @@ WORDS: dict[str, Callable[..., Any]] = elements.functions() | {
 """What texts call, for arrays."""
 
 
+def on_arrays(mechanism: Mechanism, source: str, **functions: Any) -> Callable[..., None]:
+    """The function of a text of terms, evaluated by Python or, for many instants or samples at once, by numpy.
+
+    `functions`: what its loads call besides.
+    """
+    names: dict[str, Any] = WORDS | words_of(mechanism) | functions
+    exec(source, names)
+    made: Callable[..., None] = names[source[len("def ") : source.index("(")]]
+    return made
+
+
 class State(NamedTuple):
     """Constraints at poses: errors (rows, ...), rates (rows, ...), Jacobians (..., rows, n)."""
 
@@ -91,9 +102,8 @@ class Loops:
         self.owners = tuple(owners)
         self._places = tuple(np.array(places, int).reshape(-1, 2).T)
         lines = "\n    ".join([*writer.lines, *texts, "pass"])
-        names: dict[str, Any] = WORDS | words_of(mechanism)
-        exec(f"def closed(work, par, error, rate, entries, i=0, W=1):\n    {lines}", names)
-        self._evaluate = names["closed"]
+        source = f"def closed(work, par, error, rate, entries, i=0, W=1):\n    {lines}"
+        self._evaluate = on_arrays(mechanism, source)
         self._rows = {name: writer.rows[name] for name in writer.read}
         self.take(values(mechanism, cartesian=not trees))
         self.length = length = float(typical_length(mechanism))

@@ -11,10 +11,9 @@ from hpcclear.dynamics.linkage.assembly import Assembly, placed
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
-from hpcclear.dynamics.linkage.loops import WORDS
+from hpcclear.dynamics.linkage.loops import on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide
-from hpcclear.dynamics.linkage.table_drive import words_of
 from hpcclear.dynamics.linkage.trees import Forest
 
 
@@ -64,10 +63,9 @@ class Poses:
             for axis, part in enumerate(apart):
                 lines.append(f"out[{first + 2 * k + axis}] = {writer.text(part)}")
         self.size = first + 2 * len(forest.mechanism.contacts)
-        names: dict[str, Any] = WORDS | words_of(forest.mechanism)
-        body_text = "\n    ".join([*writer.lines, *lines, "pass"])
-        exec(f"def poses(work, par, out, i=0, W=1):\n    {body_text}", names)
-        self._evaluate = names["poses"]
+        text = "\n    ".join([*writer.lines, *lines, "pass"])
+        source = f"def poses(work, par, out, i=0, W=1):\n    {text}"
+        self._evaluate = on_arrays(forest.mechanism, source)
         self.rows = {name: row for name, row in writer.rows.items() if name in writer.read}
 
     @staticmethod

@@ -7,7 +7,6 @@ coordinates (feedback off), all instants at once.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -18,14 +17,13 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, placed
 from hpcclear.dynamics.linkage.generator import On, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
-from hpcclear.dynamics.linkage.loops import WORDS, Loops
+from hpcclear.dynamics.linkage.loops import Loops, on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, seconds_of, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Node, Passage, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows
-from hpcclear.dynamics.linkage.table_drive import words_of
 
 DIVERGING = 1e-6
 """Force times distance from a change point, rad of the drive, over the largest force further off, from which on it has no
@@ -269,8 +267,6 @@ def _reactions(
     rows = Rows(0, n, 2 * n, rates, 3 * n, holds, curves=curves)
     on = On(gravity=gravity != 0.0, energies=True)
     text = generate(mechanism, on, rows, cartesian=True, hoist=False)
-    names: dict[str, Any] = {**WORDS, **words_of(mechanism), **text.functions}
-    exec(text.source, names)
     work = np.zeros((rates + at.RATES + len(curves), len(times)))
     work[:n], work[n : 2 * n], work[3 * n] = found[:, 0].T, found[:, 1].T, times
     for load in tabled:
@@ -279,7 +275,7 @@ def _reactions(
         place = times if seconds_of(load) else work[turned]
         work[curves[load.name]] = tabulated.get(load.name, np.ones_like)(place)
     par = row_of(text, values(mechanism, cartesian=True, gravity=gravity))
-    names["lane"](None, (), work, par, 0, 1)
+    on_arrays(mechanism, text.source, **text.functions)(None, (), work, par, 0, 1)
     from_row = {name: work[holds + r] for r, name in enumerate(text.constraints)}
     return Prescribed(
         assembly, times, found[:, 0], found[:, 1], work[2 * n : 3 * n].T.copy(), from_row,

@@ -2,7 +2,7 @@
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws.numbers import evaluate
+from hpcclear.laws.numbers import evaluate
 from hpcclear.scene import Scene
 
 SMOOTH = 1e-299

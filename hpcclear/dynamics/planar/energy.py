@@ -6,11 +6,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import numbers
-from hpcclear.dynamics.laws.constant import with_constants
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.laws import numbers
+from hpcclear.laws.constant import with_constants
 from hpcclear.scene import Scene
 
 

@@ -7,14 +7,14 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces, periodic
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws.hertz_contact import (
+from hpcclear.dynamics.linkage import parts
+from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
+from hpcclear.dynamics.planar.curves import angle_pieces, speed_pieces
+from hpcclear.laws.hertz_contact import (
     contact_stiffness,
     reduced_compliance,
     sphere_stiffness,
 )
-from hpcclear.dynamics.linkage import parts
-from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
-from hpcclear.dynamics.planar.curves import angle_pieces, speed_pieces
 from hpcclear.scene import Scene
 from hpcclear.scene.driving import (
     PlanarFree,

@@ -7,8 +7,8 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws import laws
 from hpcclear.dynamics.planar.problem import linkage_of
+from hpcclear.laws import laws
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Numbers
 

@@ -9,9 +9,6 @@ from hpcclear.base.outcome import WIDEST
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.contacts.declared import Shape
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
-from hpcclear.dynamics.laws import laws, numbers
-from hpcclear.dynamics.laws.constant import with_constants
-from hpcclear.dynamics.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.planar import bristles
 from hpcclear.dynamics.planar.prescribed import held_extremes
@@ -22,6 +19,9 @@ from hpcclear.dynamics.setup.further import (
     with_further_numbers,
     with_waves,
 )
+from hpcclear.laws import laws, numbers
+from hpcclear.laws.constant import with_constants
+from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.scene import Scene
 from hpcclear.scene.bearings import length_path
 from hpcclear.scene.points import Numbers, Points

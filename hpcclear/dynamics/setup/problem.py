@@ -5,8 +5,7 @@ from functools import lru_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.laws.lanes import in_lanes
-from hpcclear.dynamics.laws.objectives import rate_in_lanes
+from hpcclear.dynamics.contacts.laws import in_lanes, rate_in_lanes
 from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import RunUp, TableDrive, TorqueDrive

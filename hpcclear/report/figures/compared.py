@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hpcclear.base.units import factor
 from hpcclear.report.figures import labels, style
-from hpcclear.scene.units import factor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,6 +1,6 @@
 """Files of other programs that hold a linkage: one file here for each format.
 
-To add one: a module with `drawing_of(path, unit)`, which returns a `Drawing` or refuses with the cause, and its line
+To add one: a module with `drawing_of(file)`, which returns a `Drawing` or refuses with the cause, and its line
 in `FORMATS`.
 """
 
@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.scene.importers import dxf, linkage2, pmks, table
+from hpcclear.scene.importers.file import File
 from hpcclear.scene.importers.points import Drawing, scene_of, summary, text_of
-from hpcclear.scene.units import UnitError, to_si
 
 __all__ = ["FORMATS", "Drawing", "drawing_of", "linkage_of", "scene_of", "summary", "text_of"]
 
@@ -22,14 +23,26 @@ class Format(NamedTuple):
     """A kind of file."""
 
     name: str
-    drawing_of: Callable[[Path, str], Drawing]
+    drawing_of: Callable[[File], Drawing]
     begins: Callable[[bytes], bool]
     """Whether a file is of this kind, by its first bytes."""
+    again: str = "Save the drawing again"
+    """What to do where it is incomplete."""
 
 
 FORMATS = (
-    Format("PMKS+ project or link", pmks.drawing_of, pmks.begins),
-    Format("Linkage document (.linkage2)", linkage2.drawing_of, linkage2.begins),
+    Format(
+        "PMKS+ project or link",
+        pmks.drawing_of,
+        pmks.begins,
+        "Copy the whole link, or save the project again",
+    ),
+    Format(
+        "Linkage document (.linkage2)",
+        linkage2.drawing_of,
+        linkage2.begins,
+        "Save the document again",
+    ),
     Format("DXF drawing", dxf.drawing_of, dxf.begins),
     Format("table of points", table.drawing_of, lambda data: True),
 )
@@ -57,19 +70,19 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
             to_si(f"1 {unit}", "m")
         except UnitError as error:
             raise InputError("--unit", unit, error.reason, error.remedy) from None
-    begin = b""
+    data = b""
     try:
         if path.is_file():
-            with path.open("rb") as stream:
-                begin = stream.read(4096)
             if path.stat().st_size > LARGEST_FILE:
                 reason = f"is larger than {LARGEST_FILE} bytes"
                 raise InputError("file", str(path), reason, "Save the mechanism alone")
+            data = path.read_bytes()
     except OSError as error:
         raise InputError(
             "file", str(path), f"cannot be read ({error.strerror})", "Check the file"
         ) from None
-    return next(one for one in FORMATS if one.begins(begin)).drawing_of(path, unit)
+    found = next(one for one in FORMATS if one.begins(data[:4096]))
+    return found.drawing_of(File(path, data, unit, found.again))
 
 
 def linkage_of(path: Path, unit: str = "") -> dict[str, Any]:

@@ -11,21 +11,12 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import NamedTuple
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import (
-    GROUND,
-    MOST_POINTS,
-    Drawing,
-    Names,
-    Point,
-    listed,
-    number,
-    scale_of,
-)
-from hpcclear.scene.units import to_si
+from hpcclear.base.units import to_si
+from hpcclear.scene.importers.file import GROUND, MOST_POINTS, File, Names, listed
+from hpcclear.scene.importers.points import Drawing, Point
 
 _FOOT = 1200 / 3937  # of US surveys
 _UNITS = {
@@ -61,15 +52,13 @@ class _Entity(NamedTuple):
     def text(self, code: int, default: str = "") -> str:
         return next((value for one, value in self.pairs if one == code), default)
 
-    def places(self, code: int, key: str) -> list[Place]:
+    def places(self, code: int, file: File) -> list[Place]:
         """Places of a code of x, such as 10; y has the code that is 10 higher."""
         x, y = ([v for one, v in self.pairs if one == c] for c in (code, code + 10))
         if len(x) != len(y):
-            raise InputError(
-                key, self.kind, "has a place that cannot be read", "Save the drawing again"
-            )
+            file.refuse(self.kind, "has a place that cannot be read", "Save the drawing again")
         what = f"a place of {self.kind[:40]}"
-        return [(number(a, key, what), number(b, key, what)) for a, b in zip(x, y, strict=True)]
+        return [(file.number(a, what), file.number(b, what)) for a, b in zip(x, y, strict=True)]
 
 
 @dataclass
@@ -90,39 +79,41 @@ def begins(data: bytes) -> bool:
     )
 
 
-def drawing_of(path: Path, unit: str) -> Drawing:
+def drawing_of(file: File) -> Drawing:
     """Bodies and pins of a drawing; raises InputError where the file cannot be read in full."""
-    key = str(path)
-    header, entities = _read(path)
+    header, entities = _read(file)
     stated, size = _UNITS.get(header, ("", None))
     notes = []
-    if size is not None and unit and not math.isclose(size, to_si(f"1 {unit}", "m"), rel_tol=1e-9):
+    if (
+        size is not None
+        and file.unit
+        and not math.isclose(size, to_si(f"1 {file.unit}", "m"), rel_tol=1e-9)
+    ):
         notes.append(
-            f"The drawing states {stated} ($INSUNITS = {header}), and --unit {unit} is used: check the largest length"
+            f"The drawing states {stated} ($INSUNITS = {header}), and --unit {file.unit} is used: check the largest length"
         )
         size = None  # programs state the unit of their template, whatever was drawn
-    scale = scale_of(size, stated, unit, f"{key}, $INSUNITS = {header}")
-    bodies, left = _bodies(list(_joined(entities)), key)
+    scale = file.scale(size, stated, f", $INSUNITS = {header}")
+    bodies, left = _bodies(list(_joined(entities)), file)
     every = [place for body in bodies.values() for place in body.points]
     if not every:
-        raise InputError(
-            key,
-            path.name,
+        file.refuse(
+            file.path.name,
             "has no points, lines, circles or polylines",
             "Draw the sketch in the model space",
         )
     extent = _extent(every)
-    places, at = _distinct(every, extent, key)
+    places, at = _distinct(every, extent, file)
     lines = sum(len(body.lines) for body in bodies.values())
     if max(len(places), len(bodies)) > MOST_POINTS or lines > MOST_LINES:
         reason = f"has more than {MOST_POINTS} points or bodies, or {MOST_LINES} lines: no linkage has as many"
-        raise InputError(key, path.name, reason, "Save the sketch of the mechanism alone")
+        file.refuse(file.path.name, reason, "Save the sketch of the mechanism alone")
     owners: list[list[str]] = [[] for _ in places]
     for name, body in bodies.items():
         for k in {at[place] for place in body.points}:
             owners[k].append(name)
     points = [
-        _point(Point(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, key)
+        _point(Point(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, file)
         for k, (place, own) in enumerate(zip(places, owners, strict=True), 1)
     ]
     points = [
@@ -137,11 +128,11 @@ def _extent(places: Sequence[Place]) -> float:
     return max(math.dist(place, low) for place in places)
 
 
-def _read(path: Path) -> tuple[int, list[_Entity]]:
+def _read(file: File) -> tuple[int, list[_Entity]]:
     """$INSUNITS, and the entities of the model."""
-    data = path.read_bytes()
+    data = file.data
     if data.startswith(b"AutoCAD Binary DXF"):
-        raise InputError(str(path), path.name, "is a binary DXF drawing", "Save it as ASCII DXF")
+        file.refuse(file.path.name, "is a binary DXF drawing", "Save it as ASCII DXF")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -150,11 +141,11 @@ def _read(path: Path) -> tuple[int, list[_Entity]]:
     section, unit = "", 0
     found: list[_Entity] = []
     last = ""
-    for code, value in _pairs(lines, str(path)):
+    for code, value in _pairs(lines, file):
         if code == 2 and last == "SECTION":
             section = value
         elif section == "HEADER" and last == "$INSUNITS" and code == 70:
-            unit = int(number(value, str(path), "$INSUNITS"))
+            unit = int(file.number(value, "$INSUNITS"))
         elif section == "ENTITIES" and code == 0 and value != "ENDSEC":
             found.append(_Entity(value, []))
         elif section == "ENTITIES" and found:
@@ -164,13 +155,13 @@ def _read(path: Path) -> tuple[int, list[_Entity]]:
     return unit, found
 
 
-def _pairs(lines: Sequence[str], key: str) -> Iterator[tuple[int, str]]:
+def _pairs(lines: Sequence[str], file: File) -> Iterator[tuple[int, str]]:
     for at in range(0, len(lines) - 1, 2):
         try:
             yield int(lines[at]), lines[at + 1].strip()
         except ValueError:
             raise InputError(
-                f"{key}, line {at + 1}",
+                f"{file.key}, line {at + 1}",
                 lines[at][:40],
                 "is no group code",
                 "Save the drawing again as ASCII DXF",
@@ -193,7 +184,7 @@ def _joined(entities: Sequence[_Entity]) -> Iterator[_Entity]:
     yield from made
 
 
-def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], list[str]]:
+def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], list[str]]:
     """Bodies by name, the ground among them, and what was left out."""
     by_layer = any(one.text(8).lower() in _STILL for one in entities if one.kind in _READ)
     bodies, names = {GROUND: _Body()}, dict[str, str]()
@@ -201,11 +192,8 @@ def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], li
     for one in entities:
         layer = one.text(8, "0")
         if one.kind == "INSERT":
-            raise InputError(
-                key,
-                one.text(2)[:40],
-                "the drawing has a block",
-                "Explode blocks, and save it again",
+            file.refuse(
+                one.text(2)[:40], "the drawing has a block", "Explode blocks, and save it again"
             )
         if one.text(67).strip() == "1" or layer.lower() == "defpoints" or one.kind not in _READ:
             where = " of the paper space" if one.text(67).strip() == "1" else ""
@@ -214,8 +202,7 @@ def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], li
             ] += 1
             continue
         if one.text(230).startswith("-"):
-            raise InputError(
-                key,
+            file.refuse(
                 one.kind,
                 "is seen from behind (extrusion along -z)",
                 "Draw it in the plane of the sketch",
@@ -232,13 +219,14 @@ def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], li
         else:
             bars += 1
             name = f"bar{bars}"
-        left["bulge of a polyline, which is read as a straight line"] += _bulges(one, key)
-        _add(bodies.setdefault(name, _Body()), one, key)
+        left["bulge of a polyline, which is read as a straight line"] += _bulges(one, file)
+        _add(bodies.setdefault(name, _Body()), one, file)
     if not bodies[GROUND].points:
-        raise InputError(
-            key, "ground", "nothing says what stands still",
-            "Put it on a layer of the name ground, or draw a POINT at each pin of the ground"
-        )  # fmt: skip
+        file.refuse(
+            "ground",
+            "nothing says what stands still",
+            "Put it on a layer called ground, or draw a POINT at each pin of it",
+        )
     notes = []
     for words, texts in (("Not read", False), ("Left out", True)):
         counted = [
@@ -249,28 +237,28 @@ def _bodies(entities: Sequence[_Entity], key: str) -> tuple[dict[str, _Body], li
     return bodies, [*notes, *given.notes()]
 
 
-def _bulges(one: _Entity, key: str) -> int:
+def _bulges(one: _Entity, file: File) -> int:
     """How many sides of a polyline are arcs."""
-    return sum(number(value, key, "a bulge") != 0.0 for code, value in one.pairs if code == 42)
+    return sum(file.number(value, "a bulge") != 0.0 for code, value in one.pairs if code == 42)
 
 
-def _add(body: _Body, one: _Entity, key: str) -> None:
+def _add(body: _Body, one: _Entity, file: File) -> None:
     """Points and lines of an entity."""
-    places = one.places(10, key)
+    places = one.places(10, file)
     if one.kind == "LINE":
-        places += one.places(11, key)
+        places += one.places(11, file)
     if not places or (one.kind == "LINE" and len(places) != 2):
-        raise InputError(
-            key, one.kind, "has no place, or an end too many or too few", "Save the drawing again"
+        file.refuse(
+            one.kind, "has no place, or an end too many or too few", "Save the drawing again"
         )
-    if "POLYLINE" in one.kind and int(number(one.text(70) or "0", key, "a flag of a polyline")) & 1:
+    if "POLYLINE" in one.kind and int(file.number(one.text(70) or "0", "a flag of a polyline")) & 1:
         places = [*places, places[0]]
     body.points += places
     body.lines |= dict.fromkeys(itertools.pairwise(places))
 
 
 def _distinct(
-    places: Sequence[Place], size: float, key: str
+    places: Sequence[Place], size: float, file: File
 ) -> tuple[list[Place], dict[Place, int]]:
     """Each place once, and which of them each is; places that are neither one nor two are refused.
 
@@ -288,9 +276,7 @@ def _distinct(
         if _SAME * size < gap < _NEAR * size:
             near = made[k]
             reason = f"is {gap:.3g} beside {near[0]:g}, {near[1]:g}: neither one pin nor two points"
-            raise InputError(
-                key, f"{place[0]:g}, {place[1]:g}", reason, "Let the ends of lines snap"
-            )
+            file.refuse(f"{place[0]:g}, {place[1]:g}", reason, "Let the ends of lines snap")
         if gap > _SAME * size:
             k = len(made)
             made.append(place)
@@ -299,7 +285,7 @@ def _distinct(
     return made, at
 
 
-def _point(made: Point, bodies: Mapping[str, _Body], near: float, key: str) -> Point:
+def _point(made: Point, bodies: Mapping[str, _Body], near: float, file: File) -> Point:
     """A point of some bodies, in the drawing's unit; it slides where it lies inside a line of the ground."""
     place = made.x, made.y
     for carrier, body in bodies.items():
@@ -309,10 +295,12 @@ def _point(made: Point, bodies: Mapping[str, _Body], near: float, key: str) -> P
         if line is not None and carrier == GROUND:
             made = made._replace(slide=math.atan2(line[1][1] - line[0][1], line[1][0] - line[0][0]))
         elif line is not None:
-            raise InputError(
-                key, f"{place[0]:g}, {place[1]:g}", f"lies on a line of {carrier}, and may be a pin or in a slot",
-                f"Draw a POINT on {carrier} for a pin; write a slot into the scene"
-            )  # fmt: skip
+            reason = f"lies on a line of {carrier}, and may be a pin or in a slot"
+            file.refuse(
+                f"{place[0]:g}, {place[1]:g}",
+                reason,
+                f"Draw a POINT on {carrier} for a pin; write a slot into the scene",
+            )
     return made
 
 

@@ -10,20 +10,10 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from xml.etree import ElementTree
 
-from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import (
-    GROUND,
-    Drawing,
-    Names,
-    Point,
-    limit,
-    listed,
-    number,
-    scale_of,
-)
+from hpcclear.scene.importers.file import GROUND, File, Names, listed
+from hpcclear.scene.importers.points import Drawing, Point
 
 _SIZES = {
     "millimeters": (24.5e-3 / 96.0, 1e-3), "mm": (24.5e-3 / 96.0, 1e-3), "inches": (25.4e-3 / 96.0, 25.4e-3),
@@ -69,33 +59,33 @@ class _Connector:
         return self.row.get(key) == "true"
 
 
-def drawing_of(path: Path, unit: str) -> Drawing:
+def drawing_of(file: File) -> Drawing:
     """Pins, sliders, anchors and rotating inputs of a document; raises InputError where it cannot be read in full."""
-    root, key = _root(path), str(path)
+    root = _root(file)
     program = root.find("program")
     shown = "Millimeters" if program is None else program.get("units", "Millimeters")
     if shown.lower() not in _SIZES:
         reason = "is no unit of this program that is known"
-        raise InputError(key, shown[:40], reason, "Set millimetres or inches there")
+        file.refuse(shown[:40], reason, "Set millimetres or inches there")
     size, stated = _SIZES[shown.lower()]
-    scale_of(stated, shown, unit, key)
+    file.scale(stated, shown)
     names = Names("connector", "P"), Names("link", "link")
-    connectors = _connectors(root, key, names[0])
-    limit(len(connectors) // 2, key)
-    bodies = _links(root, connectors, key, names[1])
+    connectors = _connectors(root, file, names[0])
+    file.limit(len(connectors) // 2)
+    bodies = _links(root, connectors, file, names[1])
     points, speeds, unstated, lone = [], {}, [], Counter[str]()
     for one in connectors.values():
         if not one.links and not (one.has("anchor") and one.has("slider")):
             lone["connectors without a link"] += 1
             continue
-        point = _point(one, connectors, bodies, size, key)
+        point = _point(one, connectors, bodies, size, file)
         if point.bodies:
             points.append(point)
         if one.has("input"):
             if not one.row.get("rpm"):
                 unstated.append(one.name)
-            speeds[_driven(one, key)] = -number(
-                one.row.get("rpm") or _SPEED, key, f"the rpm of {one.name}"
+            speeds[_driven(one, file)] = -file.number(
+                one.row.get("rpm") or _SPEED, f"the rpm of {one.name}"
             )
     notes = [
         f"Lengths are those that the program shows, in {shown.lower()}: compare one",
@@ -122,31 +112,23 @@ def _left(root: ElementTree.Element, lone: Counter[str]) -> list[str]:
     return [f"Not read: {listed(counted)}"] if counted else []
 
 
-def _root(path: Path) -> ElementTree.Element:
-    data = path.read_bytes()
+def _root(file: File) -> ElementTree.Element:
+    data = file.data
     if b"<!" in data:  # no entities: they may expand without bound
-        raise InputError(
-            str(path),
-            path.name,
-            "has a declaration or comment, which the program does not write",
-            "Save it again",
+        file.refuse(
+            file.path.name, "has a declaration or comment, which the program does not write"
         )
     try:
         root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # or of an unknown encoding
-        raise InputError(
-            str(path), path.name, f"is no XML that can be read ({error})", "Save it again"
-        ) from None
+        file.refuse(file.path.name, f"is no XML that can be read ({error})")
     if root.tag != "linkage2":
-        raise InputError(
-            str(path),
-            root.tag,
-            "is the format of an old version of the program",
-            "Save it with version 3",
+        file.refuse(
+            root.tag, "is the format of an old version of the program", "Save it with version 3"
         )
     if root.find("ratios") is not None and len(root.find("ratios")):  # type: ignore[arg-type]
         reason, remedy = _REFUSED["gear"]
-        raise InputError(str(path), "ratios", f"the document has {reason}", remedy)
+        file.refuse("ratios", f"the document has {reason}", remedy)
     return root
 
 
@@ -155,16 +137,14 @@ def _is_drawing(row: ElementTree.Element) -> bool:
     return row.get("layer") == str(_DRAWING_LAYER) or row.get("measurementelement") == "true"
 
 
-def _refuse(row: ElementTree.Element, key: str) -> None:
+def _refuse(row: ElementTree.Element, file: File) -> None:
     """InputError where an element has what no scene can have."""
     for word, (what, remedy) in _REFUSED.items():
         if row.get(word, "false") not in ("false", ""):
-            raise InputError(
-                key, f"{row.tag} {row.get('id')}"[:40], f"the document has {what}", remedy
-            )
+            file.refuse(f"{row.tag} {row.get('id')}"[:40], f"the document has {what}", remedy)
 
 
-def _connectors(root: ElementTree.Element, key: str, names: Names) -> dict[str, _Connector]:
+def _connectors(root: ElementTree.Element, file: File, names: Names) -> dict[str, _Connector]:
     found: dict[str, _Connector] = {}
     for row in root.findall("connector"):
         if _is_drawing(row):
@@ -172,24 +152,19 @@ def _connectors(root: ElementTree.Element, key: str, names: Names) -> dict[str, 
         id_ = row.get("id", "")
         name = names.given(row.get("name") or "", f"P{id_}")
         if id_ in found:
-            raise InputError(
-                key, id_[:40], "two connectors have this id", "Save the document again"
-            )
-        _refuse(row, key)
-        x, y = (number(row.get(axis, ""), key, f"{axis} of {name}") for axis in ("x", "y"))
-        if number(row.get("slideradius") or "0", key, f"the slide radius of {name}") > 0.0:
-            raise InputError(
-                key,
-                name,
-                "a connector slides along an arc",
-                "Replace the arc by a bar to its centre",
+            file.refuse(id_[:40], "two connectors have this id")
+        _refuse(row, file)
+        x, y = (file.number(row.get(axis, ""), f"{axis} of {name}") for axis in ("x", "y"))
+        if file.number(row.get("slideradius") or "0", f"the slide radius of {name}") > 0.0:
+            file.refuse(
+                name, "a connector slides along an arc", "Replace the arc by a bar to its centre"
             )
         found[id_] = _Connector(row, name, x, y)
     return found
 
 
 def _links(
-    root: ElementTree.Element, connectors: Mapping[str, _Connector], key: str, names: Names
+    root: ElementTree.Element, connectors: Mapping[str, _Connector], file: File, names: Names
 ) -> dict[str, list[str]]:
     """Connectors of each body; a link with two anchors belongs to the ground."""
     bodies: dict[str, list[str]] = {GROUND: []}
@@ -197,14 +172,14 @@ def _links(
         own = list(dict.fromkeys(c.get("id", "") for c in row.findall("connector")))
         if _is_drawing(row):
             continue
-        _refuse(row, key)
+        _refuse(row, file)
         if any(c.get("id") in connectors for c in row.findall("fastenconnector")):
             what, remedy = _REFUSED["fastenconnector"]
-            raise InputError(key, f"link {row.get('id')}"[:40], f"the document has {what}", remedy)
+            file.refuse(f"link {row.get('id')}"[:40], f"the document has {what}", remedy)
         lost = next((c for c in own if c not in connectors), None)
         if lost is not None:
             reason = f"has the connector {lost[:40]}, which is not in the document or is of its drawing layer"
-            raise InputError(key, f"link {row.get('id')}"[:40], reason, "Save the document again")
+            file.refuse(f"link {row.get('id')}"[:40], reason)
         if len(own) < 2:
             continue  # the program's way to write a lone point
         if sum(connectors[c].has("anchor") for c in own) > 1:
@@ -226,7 +201,7 @@ def _point(
     connectors: Mapping[str, _Connector],
     bodies: Mapping[str, Sequence[str]],
     size: float,
-    key: str,
+    file: File,
 ) -> Point:
     made = Point(one.name, round(size * one.x, 12), round(size * one.y, 12), tuple(one.links))
     limits = [limit.get("id", "") for limit in one.row.findall("slidelimit")]
@@ -234,27 +209,22 @@ def _point(
         return made
     first, second = (connectors.get(limit) for limit in limits[:2])
     if first is None or second is None:
-        raise InputError(
-            key, one.name, "slides between connectors that are missing", "Save the document again"
-        )
+        file.refuse(one.name, "slides between connectors that are missing")
     if first.has("anchor") and second.has("anchor"):
         guide = GROUND
     else:
         guide = next((name for name, own in bodies.items() if {*limits[:2]} <= {*own}), "")
     if not guide:
-        raise InputError(
-            key, one.name, f"slides between {first.name} and {second.name}, which belong to no body together",
-            "Join both with a link"
-        )  # fmt: skip
+        reason = f"slides between {first.name} and {second.name}, which belong to no body together"
+        file.refuse(one.name, reason, "Join both with a link")
     return made._replace(slide=math.atan2(second.y - first.y, second.x - first.x), guide=guide)
 
 
-def _driven(one: _Connector, key: str) -> str:
+def _driven(one: _Connector, file: File) -> str:
     """The body that an input turns."""
     body = next((name for name in one.links if name != GROUND), None)
     if body is None or not one.has("anchor"):
-        raise InputError(
-            key,
+        file.refuse(
             one.name,
             "an input turns no link about an anchor",
             "Make the input an anchor of its crank",

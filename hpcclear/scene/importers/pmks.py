@@ -9,22 +9,12 @@ import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote
 
-from hpcclear.base.errors import InputError
-from hpcclear.scene.importers.points import (
-    GROUND,
-    Drawing,
-    Names,
-    Point,
-    limit,
-    listed,
-    number,
-    scale_of,
-)
-from hpcclear.scene.units import to_si
+from hpcclear.base.units import to_si
+from hpcclear.scene.importers.file import GROUND, File, Names, listed
+from hpcclear.scene.importers.points import Drawing, Point
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 _LENGTHS = ("in", "cm", "m")
@@ -36,7 +26,6 @@ _PRISMATIC, _INPUT, _GROUNDED, _WELDED = 1, 2, 4, 8
 _ROOTS, _MEMBERS = "YAMG0123", "Namg4567"
 """First characters of the rows of links, by what is drawn as a bar or disc with a stated or computed mass centre: links, and
 those that are welded to others and stand in the row of the whole."""
-_AGAIN = "Copy the whole link, or save the project again"
 
 
 class _Joint(NamedTuple):
@@ -75,107 +64,102 @@ def begins(data: bytes) -> bool:
     )
 
 
-def drawing_of(path: Path, unit: str) -> Drawing:
+def drawing_of(file: File) -> Drawing:
     """Joints, links, sliders and the rotating input of a project; raises InputError where the file cannot be read in full."""
-    key = str(path)
     try:
-        text = unquote(path.read_text(encoding="utf-8-sig").strip())
+        text = unquote(file.data.decode("utf-8-sig").strip())
     except UnicodeDecodeError:
-        raise InputError(key, path.name, "is no UTF-8 text", _AGAIN) from None
+        file.refuse(file.path.name, "is no UTF-8 text")
     if text.startswith("---"):
-        return _table(text, key, unit)
+        return _table(text, file)
     query = text.partition("?")[2] if "://" in text else text
     if query.startswith("data="):
-        raise InputError(
-            key,
-            path.name,
+        file.refuse(
+            file.path.name,
             "is a compressed link",
             "Export the mechanism there as CSV, and import that file",
         )
-    return _project(query, key, unit)
+    return _project(query, file)
 
 
-def _project(query: str, key: str, unit: str) -> Drawing:
+def _project(query: str, file: File) -> Drawing:
     if not query or "\n" in query or _DIGITS[(len(query) - 1) % 62] != query[-1]:
-        raise InputError(
-            key,
-            query[:20],
-            "is no complete project: its length is not what its last character says",
-            _AGAIN,
+        file.refuse(
+            query[:20], "is no complete project: its length is not what its last character says"
         )
     fields = query[:-1].split(".")
     if len(fields) < 7:
-        raise InputError(key, len(fields), "has fewer fields than a project", _AGAIN)
+        file.refuse(len(fields), "has fewer fields than a project")
     flags, _, integers, kinds, *rest = fields
-    first, second = _ends(rest, key)
-    limit(max(first, second - first) // 2, key)
-    joints = [_joint(row, key) for row in rest[:first]]
+    first, second = _ends(rest, file)
+    file.limit(max(first, second - first) // 2)
+    joints = [_joint(row, file) for row in rest[:first]]
     rows = rest[first + 1 : second]
     wrong = next((row for row in rows if row[0] not in _ROOTS + _MEMBERS), None)
     if wrong is not None:
         reason = f"begins with {wrong[0]!r}: no kind of link that is known"
-        raise InputError(key, wrong[:40], reason, "Export it with an older version, or as CSV")
-    links = [_link(row, key) for row in rows if row[0] in _ROOTS]
+        file.refuse(wrong[:40], reason, "Export it with an older version, or as CSV")
+    links = [_link(row, file) for row in rows if row[0] in _ROOTS]
     welded = {member for link in links for member in link.members}
     alone = [
-        one for row in rows if row[0] in _MEMBERS and (one := _link(row, key)).key not in welded
+        one for row in rows if row[0] in _MEMBERS and (one := _link(row, file)).key not in welded
     ]
     if alone:
         reason = "is part of a welded link that is not in the file"
-        raise InputError(key, alone[0].key, reason, _AGAIN)
-    speed = abs(_number(integers.split(",")[0], key)) * (
-        -1.0 if _number(flags, key, plain=True) & 1 else 1.0
+        file.refuse(alone[0].key, reason)
+    speed = abs(_number(integers.split(",")[0], file)) * (
+        -1.0 if _number(flags, file, plain=True) & 1 else 1.0
     )
     length = int(kinds[0]) if kinds[:1] in tuple("0123456789") else len(_LENGTHS)
     stated = _LENGTHS[length] if length < len(_LENGTHS) else ""
-    size = scale_of(to_si(f"1 {stated}", "m") if stated else None, stated, unit, key)
+    size = file.scale(to_si(f"1 {stated}", "m") if stated else None, stated)
     forces = [row for row in rest[second + 1 : -1] if row]
     notes = [f"Not read: {len(forces)} forces of the project"] if forces else []
-    return _drawing(*_split(joints, links), speed, size, key, notes)
+    return _drawing(*_split(joints, links), speed, size, file, notes)
 
 
-def _ends(rest: Sequence[str], key: str) -> tuple[int, int]:
+def _ends(rest: Sequence[str], file: File) -> tuple[int, int]:
     """Where the joints and the links end: at empty fields."""
     empty = [k for k, one in enumerate(rest) if one == ""]
     if len(empty) < 2:
-        raise InputError(key, len(rest), "has no joints or no links", _AGAIN)
+        file.refuse(len(rest), "has no joints or no links")
     return empty[0], empty[1]
 
 
-def _number(token: str, key: str, plain: bool = False) -> int:
+def _number(token: str, file: File, plain: bool = False) -> int:
     """An integer to the base 64; a leading 0 is a minus sign unless the number is plain."""
     if len(token) > _LONGEST_TOKEN:
-        raise InputError(key, token[:20], "is no number of a project", _AGAIN)
+        file.refuse(token[:20], "is no number of a project")
     value = 0
     for digit in token:
         place = _DIGITS.find(digit)
         if place < 0:
-            raise InputError(key, token[:20], "is no number of a project", _AGAIN)
+            file.refuse(token[:20], "is no number of a project")
         value = len(_DIGITS) * value + place
     return -value if token[:1] == "0" and not plain else value
 
 
-def _joint(row: str, key: str) -> _Joint:
+def _joint(row: str, file: File) -> _Joint:
     name, *tokens = row[1:].split(",")
     if len(tokens) < 4 or not row:
-        raise InputError(key, row[:40], "is no joint", _AGAIN)
-    x, y, angle = (_number(token, key) / 1e3 for token in tokens[1:4])
+        file.refuse(row[:40], "is no joint")
+    x, y, angle = (_number(token, file) / 1e3 for token in tokens[1:4])
     slot = tuple(tokens[4:7]) if tokens[4:5] not in ([], [""]) else ()
-    speed = _number(tokens[7], key) / 1e3 if tokens[7:8] not in ([], [""]) else 0.0
-    return _Joint(name, tokens[0], x, y, _number(row[0], key, plain=True), angle, slot, speed)
+    speed = _number(tokens[7], file) / 1e3 if tokens[7:8] not in ([], [""]) else 0.0
+    return _Joint(name, tokens[0], x, y, _number(row[0], file, plain=True), angle, slot, speed)
 
 
-def _link(row: str, key: str) -> _Link:
+def _link(row: str, file: File) -> _Link:
     name, *tokens = row[2:].split(",")
     if len(tokens) < 7:
-        raise InputError(key, row[:40], "is no link", _AGAIN)
+        file.refuse(row[:40], "is no link")
     joints = tokens[6:]
     end = joints.index("") if "" in joints else len(joints)
     members = tuple(one for one in joints[end + 1 :] if one)
     return _Link(name, tokens[0], row[1] == "P", tuple(joints[:end]), members)
 
 
-def _table(text: str, key: str, unit: str) -> Drawing:
+def _table(text: str, file: File) -> Drawing:
     """The CSV export of the successor: sections of joints (j), links (l) and welded links (c)."""
     rows: dict[str, list[list[str]]] = {}
     section = ""
@@ -187,21 +171,19 @@ def _table(text: str, key: str, unit: str) -> Drawing:
             elif row:
                 rows.setdefault(section, []).append(row)
     except csv.Error as error:
-        raise InputError(key, "table", f"cannot be read ({error})", _AGAIN) from None
-    limit(max(map(len, rows.values()), default=0) // 2, key)
-    joints = [_joint_of(row, key) for row in rows.get("j", [])[1:]]
+        file.refuse("table", f"cannot be read ({error})")
+    file.limit(max(map(len, rows.values()), default=0) // 2)
+    joints = [_joint_of(row, file) for row in rows.get("j", [])[1:]]
     links = [
-        _Link(row[0], row[1], False, _ids(row, 6, key))
+        _Link(row[0], row[1], False, _ids(row, 6, file))
         for row in rows.get("l", [])[1:]
-        if _ids(row, 6, key)
+        if _ids(row, 6, file)
     ]
     for row in rows.get("c", [])[1:]:
-        parts = _ids(row, 5, key)
+        parts = _ids(row, 5, file)
         members = [one for one in links if one.key in parts]
         if len(members) < len(parts):
-            raise InputError(
-                key, ",".join(row)[:40], "is welded of links that are not in the file", _AGAIN
-            )
+            file.refuse(",".join(row)[:40], "is welded of links that are not in the file")
         joined = tuple(dict.fromkeys(joint for one in members for joint in one.joints))
         links = [one for one in links if one not in members]
         links.append(
@@ -212,22 +194,22 @@ def _table(text: str, key: str, unit: str) -> Drawing:
     left = [f"{count} {words}" for kind, words in kinds if (count := len(rows.get(kind, [])[1:]))]
     if left:
         notes.append(f"Not read: {', '.join(left)}")
-    return _drawing(*_split(joints, links), 0.0, scale_of(None, "", unit, key), key, notes)
+    return _drawing(*_split(joints, links), 0.0, file.scale(None, ""), file, notes)
 
 
-def _ids(row: Sequence[str], place: int, key: str) -> tuple[str, ...]:
+def _ids(row: Sequence[str], place: int, file: File) -> tuple[str, ...]:
     """Ids of a cell, of joints or of links."""
     if len(row) <= place:
-        raise InputError(key, ",".join(row)[:40], "is no row of a link", _AGAIN)
+        file.refuse(",".join(row)[:40], "is no row of a link")
     return tuple(one for one in row[place].split("|") if one)
 
 
-def _joint_of(row: Sequence[str], key: str) -> _Joint:
+def _joint_of(row: Sequence[str], file: File) -> _Joint:
     """A joint of the table."""
     if len(row) < 9:
-        raise InputError(key, ",".join(row)[:40], "is no joint", _AGAIN)
+        file.refuse(",".join(row)[:40], "is no joint")
     x, y, angle = (
-        number(row[k], key, f"a place or angle of joint {row[1][:40]}") for k in (2, 3, 5)
+        file.number(row[k], f"a place or angle of joint {row[1][:40]}") for k in (2, 3, 5)
     )
     turned, welded = row[7] == "true", row[9:10] == ["true"]
     flags = (
@@ -236,7 +218,7 @@ def _joint_of(row: Sequence[str], key: str) -> _Joint:
         + _GROUNDED * (row[6] == "true")
         + _WELDED * welded
     )
-    speed = number(row[8] or "0", key, f"the speed of joint {row[1][:40]}") if turned else 0.0
+    speed = file.number(row[8] or "0", f"the speed of joint {row[1][:40]}") if turned else 0.0
     return _Joint(row[0], row[1], x, y, flags, math.radians(angle), speed=speed)
 
 
@@ -265,15 +247,15 @@ def _drawing(
     links: Sequence[_Link],
     speed: float,
     size: float,
-    key: str,
+    file: File,
     notes: list[str],
 ) -> Drawing:
     by_key = {one.key: one for one in joints}
     if len(by_key) < len(joints):
-        raise InputError(key, len(joints), "two joints have the same letter", _AGAIN)
+        file.refuse(len(joints), "two joints have the same letter")
     lost = next((k for link in links for k in link.joints if k not in by_key), None)
     if lost is not None:
-        raise InputError(key, lost[:40], "is a joint of a link, but not in the file", _AGAIN)
+        file.refuse(lost[:40], "is a joint of a link, but not in the file")
     names, given = Names("link", "link"), Names("joint", "P")
     bodies: dict[str, str] = {}
     own: dict[str, list[str]] = {one.key: [] for one in joints}
@@ -283,7 +265,7 @@ def _drawing(
             bodies |= dict.fromkeys(link.members, bodies[link.key])
             for k in dict.fromkeys(link.joints):
                 own[k].append(bodies[link.key])
-    lines = _lines(links, by_key, key)
+    lines = _lines(links, by_key, file)
     points: list[Point] = []
     speeds: dict[str, float] = {}
     alone = []
@@ -295,8 +277,7 @@ def _drawing(
         if one.flags & _INPUT:
             speeds[own[one.key][0]] = one.speed or speed
             if not one.flags & _GROUNDED or one.key in lines:
-                raise InputError(
-                    key,
+                file.refuse(
                     one.name[:40],
                     "the input is not on the ground",
                     "Drive a crank on the ground there",
@@ -308,11 +289,11 @@ def _drawing(
         pins = (GROUND, *own[one.key]) if one.flags & _GROUNDED else tuple(own[one.key])
         name = given.given(one.name, one.key)
         point = Point(name, round(size * one.x, 12), round(size * one.y, 12), pins)
-        points.append(_sliding(point, one, lines.get(one.key), by_key, bodies, key))
+        points.append(_sliding(point, one, lines.get(one.key), by_key, bodies, file))
     if alone:
         notes.append(f"Not read: joints without a link: {listed(alone)}")
     if not all(speeds.values()):
-        raise InputError(key, "input", "an input has the speed 0", "Give it a speed there")
+        file.refuse("input", "an input has the speed 0", "Give it a speed there")
     return Drawing(
         points,
         speeds,
@@ -320,7 +301,7 @@ def _drawing(
     )
 
 
-def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], key: str) -> dict[str, _Joint]:
+def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], file: File) -> dict[str, _Joint]:
     """The joint that has the line of each pin that slides."""
     found: dict[str, _Joint] = {}
     for link in links:
@@ -328,14 +309,10 @@ def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], key: str) -> di
             continue
         line = next((joints[k] for k in link.joints if joints[k].flags & _PRISMATIC), None)
         if line is None:
-            raise InputError(key, link.key, "a block has no line that it slides along", _AGAIN)
+            file.refuse(link.key, "a block has no line that it slides along")
         if line.flags & _INPUT:
-            raise InputError(
-                key,
-                line.name[:40],
-                "is driven along a line, like a hydraulic cylinder",
-                "Drive a crank there: cylinders are loads here",
-            )
+            reason = "is driven along a line, like a hydraulic cylinder"
+            file.refuse(line.name[:40], reason, "Drive a crank there: cylinders are loads here")
         found |= {k: line for k in link.joints if k != line.key}
     return found
 
@@ -346,7 +323,7 @@ def _sliding(
     line: _Joint | None,
     joints: Mapping[str, _Joint],
     bodies: Mapping[str, str],
-    key: str,
+    file: File,
 ) -> Point:
     """The point with its line, if it slides; a welded joint keeps its own link from turning."""
     if line is None:
@@ -355,7 +332,7 @@ def _sliding(
     if line.slot:
         ends = [joints.get(k) for k in line.slot[1:3]]
         if line.slot[0] not in bodies or len(ends) < 2 or None in ends:
-            raise InputError(key, line.name, "slides along a link that is not in the file", _AGAIN)
+            file.refuse(line.name, "slides along a link that is not in the file")
         first, second = ends
         assert first is not None
         assert second is not None

@@ -1,34 +1,25 @@
 """A linkage by its points, as drawing programs know it, and the tables of a scene that follow from them."""
 
 import math
-import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
 import tomli_w
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.units import may_be_thousands, to_si
+from hpcclear.base.units import written
+from hpcclear.scene.importers.file import GROUND, limit, listed
 
-GROUND = "ground"
 MASS = 0.1
 """kg of a body whose mass nobody has given."""
 SPEED = 60.0
 """rpm of a drive whose speed nobody has given."""
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
-"""Of a point or a body."""
-MOST_POINTS = 1000
-"""Of a linkage: points are compared in pairs, and a file of more holds something else."""
 MOST_TURNS = 64
 """Of a drive in a revolution."""
 FARTHEST = 1e5
 """m from the origin."""
-LONGEST_NUMBER = 100
-"""Characters."""
-_LISTED = 12
-"""Names in a line of the summary."""
 
 
 class Point(NamedTuple):
@@ -56,98 +47,6 @@ class Drawing(NamedTuple):
     """rpm of each driven body, counter-clockwise; none: the first body that turns about a pin of the ground, at `SPEED`."""
     notes: Sequence[str] = ()
     """What the file has and the scene does not, and what to check."""
-
-
-class Names:
-    """Names that a scene can have, each once, for those of a file.
-
-    Parameters
-    ----------
-    kind : str
-        What they name, in notes, such as "layer".
-    prefix : str
-        Before a name that does not begin with a letter.
-    """
-
-    def __init__(self, kind: str, prefix: str) -> None:
-        self.kind, self.prefix = kind, prefix
-        self._counts = Counter({GROUND: 1, "center": 1})
-        self._replaced: dict[str, str] = {}
-
-    def given(self, text: str, default: str = "") -> str:
-        """The name for one of the file, or for `default` where it has none: letters, digits and _, and not yet given."""
-        text = text.strip()
-        plain = re.sub(r"[^A-Za-z0-9_]+", "_", text or default).strip("_")[:30]
-        name = made = plain if NAME.fullmatch(plain) else f"{self.prefix}{plain}"
-        while self._counts[made]:
-            self._counts[name] += 1
-            made = f"{name}_{self._counts[name]}"
-        self._counts[made] += 1
-        if text and made != text:
-            self._replaced[text[:60]] = made
-        return made
-
-    def notes(self) -> list[str]:
-        """A sentence that says which names are replaced; none where all are kept."""
-        if not self._replaced:
-            return []
-        pairs = [f"{old!r} is {new}" for old, new in self._replaced.items()]
-        return [f"Names that a scene cannot have, by {self.kind}: {listed(pairs)}"]
-
-
-def listed(words: Iterable[str]) -> str:
-    """Words after each other, the first ones where they are many."""
-    every = list(words)
-    more = f" and {len(every) - _LISTED} more" if len(every) > _LISTED else ""
-    return ", ".join(every[:_LISTED]) + more
-
-
-def number(text: str, key: str, what: str) -> float:
-    """A finite number of a file; raises InputError where `what` is none."""
-    try:
-        value = float(text) if len(text) <= LONGEST_NUMBER else math.nan
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(key, text[:40], f"{what} is no finite number", "Save the file again")
-    return value
-
-
-def limit(count: int, key: str) -> None:
-    """Raise InputError for more points, or parts of another kind, than a linkage has."""
-    if count > MOST_POINTS:
-        reason = f"has more points or bodies than a linkage: at most {MOST_POINTS}"
-        raise InputError(key, count, reason, "Save the mechanism alone")
-
-
-def scale_of(stated: float | None, words: str, unit: str, key: str) -> float:
-    """Return the unit of a file's lengths, m.
-
-    Parameters
-    ----------
-    stated : float or None
-        What the file states, m.
-    words : str
-        The same in words.
-    unit : str
-        What the user says.
-
-    Raises
-    ------
-    InputError
-        If neither says a unit, or they contradict each other.
-    """
-    given = to_si(f"1 {unit}", "m") if unit else None
-    if stated is None and given is None:
-        raise InputError(
-            key, "length", "the file states no unit of lengths", "Add --unit, such as --unit mm"
-        )
-    if stated is not None and given is not None and not math.isclose(stated, given, rel_tol=1e-9):
-        raise InputError(
-            "--unit", unit, f"the file states {words}", "Leave --unit out, or correct the file"
-        )
-    assert given is not None or stated is not None
-    return float(stated if stated is not None else given or 0.0)
 
 
 def scene_of(drawing: Drawing, key: str) -> dict[str, Any]:
@@ -196,17 +95,11 @@ def text_of(content: dict[str, Any], source: str, notes: Sequence[str] = ()) -> 
     return "\n".join(f"# {line}" for line in lines) + "\n\n" + tomli_w.dumps(content)
 
 
-def _unambiguous(value: float) -> str:
-    """A number as a text whose point nobody takes for a sign of thousands."""
-    text = f"{value:.12g}"
-    return f"{text}0" if may_be_thousands(text) else text
-
-
 def _drives(speeds: Mapping[str, float]) -> dict[str, Any]:
     """A drive for each body; where one turn of the slowest is not enough for all to repeat, its turns until they do."""
     made: dict[str, Any] = {
         "motor" if len(speeds) == 1 else f"motor_{body}": {
-            "kind": "constant-speed", "body": body, "speed": f"{_unambiguous(speed)} rpm",
+            "kind": "constant-speed", "body": body, "speed": written(float(f"{speed:.12g}"), "rpm"),
         }
         for body, speed in speeds.items()
     }  # fmt: skip

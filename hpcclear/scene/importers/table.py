@@ -3,12 +3,13 @@
 import itertools
 import re
 from collections.abc import Sequence
-from pathlib import Path
 
 from hpcclear.base.errors import InputError, nearest
-from hpcclear.scene.importers.points import GROUND, Drawing, Names, Point, limit, scale_of
-from hpcclear.scene.sheets import Column, Sheet, read
-from hpcclear.scene.units import UnitError, of_unit, to_si
+from hpcclear.base.units import UnitError, factor, to_si
+from hpcclear.scene.headings import Column
+from hpcclear.scene.importers.file import GROUND, File, Names
+from hpcclear.scene.importers.points import Drawing, Point
+from hpcclear.scene.sheets import Sheet, read
 
 _COLUMNS = {
     "name": ("name", "point", "joint", "label", "punkt"),
@@ -22,20 +23,20 @@ _COLUMNS = {
 _GROUNDS = (GROUND, "frame", "base", "fixed", "0")
 
 
-def drawing_of(path: Path, unit: str) -> Drawing:
+def drawing_of(file: File) -> Drawing:
     """Points of a CSV file or workbook with the columns name, x, y (with their unit) and bodies.
 
     Points that bodies such as "crank coupler" share are pins; without bodies the points are a chain of bars between two
     that stand still. `slide` is the angle of a guide.
     """
-    sheet, key = read(path, "table of points"), str(path)
-    limit(len(sheet.lines), key)
-    columns = _columns(sheet, key)
-    x, y = (_lengths(sheet, columns.get(axis), key, unit) for axis in ("x", "y"))
+    sheet = read(file.path, "table of points")
+    file.limit(len(sheet.lines))
+    columns = _columns(sheet, file)
+    x, y = (_lengths(sheet, columns.get(axis), file) for axis in ("x", "y"))
     rows = range(len(sheet.lines))
     points, bodies = Names("point", "P"), Names("body", "body")
     names = [_name(sheet, columns["name"], row, points) for row in rows]
-    belonging = _bodies(columns.get("bodies"), names, key, bodies)
+    belonging = _bodies(columns.get("bodies"), names, file, bodies)
     slides = [_slide(sheet, columns.get("slide"), row) for row in rows]
     notes = [*points.notes(), *bodies.notes()]
     if "remark" in columns:
@@ -44,7 +45,7 @@ def drawing_of(path: Path, unit: str) -> Drawing:
     return Drawing(made, {}, notes)
 
 
-def _columns(sheet: Sheet, key: str) -> dict[str, Column]:
+def _columns(sheet: Sheet, file: File) -> dict[str, Column]:
     """Columns by what they are; InputError where one is not known, stands twice or is missing."""
     known = [word for words in _COLUMNS.values() for word in words]
     found: dict[str, Column] = {}
@@ -53,17 +54,17 @@ def _columns(sheet: Sheet, key: str) -> dict[str, Column]:
         kind = next((kind for kind, words in _COLUMNS.items() if word in words), None)
         if kind is None:
             reason = "is no column of a table of points"
-            raise InputError(
-                key, column.heading, reason, f"{nearest(word, known)}. Known: {', '.join(_COLUMNS)}"
+            file.refuse(
+                column.heading, reason, f"{nearest(word, known)}. Known: {', '.join(_COLUMNS)}"
             )
         if kind in found:
             reason = f"stands beside {found[kind].heading}, which is the same"
-            raise InputError(key, column.heading, reason, "Keep one of them")
+            file.refuse(column.heading, reason, "Keep one of them")
         found[kind] = column
     for needed in ("name", "x", "y"):
         if needed not in found:
             remedy = "Write the headings name, x [mm], y [mm] and bodies"
-            raise InputError(key, ", ".join(sheet.names)[:200], f"has no column {needed}", remedy)
+            file.refuse(", ".join(sheet.names)[:200], f"has no column {needed}", remedy)
     return found
 
 
@@ -77,31 +78,24 @@ def _name(sheet: Sheet, column: Column, row: int, points: Names) -> str:
     return points.given(text)
 
 
-def _lengths(sheet: Sheet, column: Column | None, key: str, unit: str) -> list[float]:
+def _lengths(sheet: Sheet, column: Column | None, file: File) -> list[float]:
     assert column is not None  # looked for before
-    try:
-        stated = float(to_si(f"1 {column.unit}", "m")) if column.unit else None
-    except UnitError as error:
-        raise InputError(key, column.heading, error.reason, error.remedy) from None
-    if stated is None and not unit:
-        raise InputError(
-            key, column.heading, "nothing says its unit", f'Write "{column.name} [mm]", say'
-        )
-    size = scale_of(stated, column.heading, unit, key)
-    return [round(size * value, 12) for value in sheet.numbers(column).tolist()]
+    if not sheet.states_unit(column) and not file.unit:
+        file.refuse(column.heading, "nothing says its unit", f'Write "{column.name} [mm]", say')
+    values = sheet.si(column, "m", file.key, file.unit)
+    if file.unit and column.unit:
+        file.scale(to_si(f"1 {column.unit}", "m"), column.heading)
+    return [round(value, 12) for value in values.tolist()]
 
 
 def _bodies(
-    column: Column | None, names: Sequence[str], key: str, given: Names
+    column: Column | None, names: Sequence[str], file: File, given: Names
 ) -> list[tuple[str, ...]]:
     """Bodies of each point; of a file without them bars from each point to the next, the first and the last on the ground."""
     if column is None:
         if len(names) < 4:
-            raise InputError(
-                key,
-                len(names),
-                "a closed chain of bars has at least 4 points",
-                "Add a column bodies",
+            file.refuse(
+                len(names), "a closed chain of bars has at least 4 points", "Add a column bodies"
             )
         bars = [GROUND, *(f"bar{k}" for k in range(1, len(names))), GROUND]
         return list(itertools.pairwise(bars))
@@ -110,9 +104,7 @@ def _bodies(
     for row, cell in enumerate(column.cells):
         words = re.findall(r"[^\s,;+/&|-]+", cell.lower())
         if not words:
-            raise InputError(
-                key, cell, f"{names[row]} belongs to no body", 'Write, say, "crank coupler"'
-            )
+            file.refuse(cell, f"{names[row]} belongs to no body", 'Write, say, "crank coupler"')
         for word in words:
             if word not in known:
                 known[word] = given.given(word)
@@ -123,8 +115,8 @@ def _bodies(
 def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
     if column is None or column.cells[row].strip() in ("", "-"):
         return None
-    value = sheet.number(column, row, "rad")
     try:
-        return of_unit(repr(value), column.unit or "deg", "rad")
+        size = factor(column.unit or "deg", "rad")
     except UnitError as error:
         raise InputError(sheet.path, column.heading, error.reason, error.remedy) from None
+    return sheet.number(column, row, "rad", size)

@@ -1,0 +1,433 @@
+"""Strings with a unit ("0.3 mm", "5000 rpm") to numbers in SI.
+
+The grammar is deliberately small: a decimal number, then unit names with powers (whole, or as in N/mm^1.4 and N/m^(7/5)),
+products, quotients and brackets. Scene files come from anywhere, and a general expression parser would evaluate whatever
+stands in them. `unit_names` has the names.
+
+An angle is a dimension of its own here; plain dimensional analysis takes a turn a second for 6.28 Hz. Three quantities have a
+unit of 1/s, and each entry declares its own: "rad/s" an angular speed, "Hz" a frequency in cycles, "1/s" a rate that counts
+nothing. A turn is a cycle. An angular speed in 1/min means revolutions, as on nameplates, and that reading is noted (`noting`).
+"""
+
+import itertools
+import re
+import unicodedata
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from functools import lru_cache
+from math import isfinite, pi
+
+from hpcclear.base.unit_names import (
+    HEADS,
+    OTHERS,
+    REFUSED,
+    SPELLINGS,
+    TAILS,
+    TURNS_BY_TIME,
+    UNITS,
+    Dimensions,
+    Unit,
+)
+
+_NUMBER = r"[+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:[eE][+-]?\d{1,3})?"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[A-Za-zμ%‰°\"]{1,20})\.?(?![A-Za-z])"
+    r"(?:(?:\^|\*\*)(?:\((?P<ratio>-?\d{1,3}/[1-9]\d{0,2})\)|\(?(?P<decimal>-?\d\.\d{1,6})\)?)(?!\d)"
+    r"|(?:\^|\*\*)?\(?(?P<power>-?\d)\)?(?!\d))?|(?P<sign>\*\*?|[/()]))\s*"
+)
+_CRANK_ANGLE = re.compile(r"(deg|°)\s*(CA|KW|crank|[ab][TB]DC|[AB]TDC)\b")
+_FOREIGN = str.maketrans(
+    {**dict.fromkeys("·⋅∙•‧・×", "*"), **dict.fromkeys("−–‐‑", "-"), "º": "°", "″": '"', "⁻": "-"}
+    | dict.fromkeys("\u200b\u2060\ufeff")
+)
+"""Signs that word processors put in place of those of a keyboard; of no width: dropped."""
+_DIGITS = re.compile(r"[+-]?[.,]?[0-9](?:[0-9.,'\u2019\s]*[0-9])?")
+_GROUPS = re.compile(
+    r"([+-]?[1-9][0-9]{0,2}(?:([.,'\u2019\s])[0-9]{3})(?:\2[0-9]{3})*)(?:[.,]([0-9]+))?"
+)
+_POWER_OF_TEN = re.compile(r"\s*[xX*·×⋅]\s*10")
+_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
+_LONGEST = 80
+"""Characters of a quantity or unit, so that nothing takes long over it."""
+_TURN = Fraction(2 * pi)
+
+
+class UnitError(ValueError):
+    """A string that is no quantity of the expected unit; `remedy` says what to write."""
+
+    def __init__(self, reason: str, remedy: str) -> None:
+        self.reason = reason
+        self.remedy = remedy
+        super().__init__(reason, remedy)
+
+
+class _NoUnit(ValueError):
+    """A text that is not made of names, powers and signs."""
+
+
+def _named(name: str) -> list[tuple[str, Unit]]:
+    """Units that a name stands for, two of "Nm"; raises ValueError."""
+    name = SPELLINGS.get(name, name)
+    if name in REFUSED:
+        raise UnitError(f"{name!r} may mean more than one unit", REFUSED[name])
+    for known in (UNITS, OTHERS):
+        if name in known:
+            return [(name, known[name])]
+    for cut in range(1, len(name)):
+        if name[:cut] in HEADS and name[cut:] in TAILS:
+            return [(part, UNITS[part]) for part in (name[:cut], name[cut:])]
+    raise ValueError(f"{name!r} is not a known unit")
+
+
+def _tidy(text: str) -> str:
+    """A unit in the characters of a keyboard: "N·m²" as "N*m2"; raises _NoUnit where it is too long for one."""
+    if len(text) > _LONGEST:
+        raise _NoUnit
+    plain = unicodedata.normalize("NFKC", text.translate(_FOREIGN)).translate(_FOREIGN)
+    plain = re.sub(r"(?<=\w)\s+per\s+(?=\w)", "/", plain.strip().replace("''", '"'))
+    plain = _CRANK_ANGLE.sub(
+        "deg", plain if plain in TURNS_BY_TIME else SPELLINGS.get(plain, plain)
+    )
+    # a dot or hyphen between two names is a product: "N.m", "ft-lbf"
+    return re.sub(r"(?<=[A-Za-z\d])[.-](?=[A-Za-z])", "*", plain)
+
+
+def _factors(text: str) -> list[tuple[str, Fraction, int]]:
+    """Names, powers, and 1 or -1 for above or below the line, of a unit in the characters of a keyboard; raises _NoUnit."""
+    tokens, at = list[re.Match[str]](), 0
+    text = re.sub(r"^1\s*(?=/)", "", text)
+    while at < len(text):
+        found = _TOKEN.match(text, at)
+        if found is None:
+            raise _NoUnit
+        tokens.append(found)
+        at = found.end()
+    factors, sides, side, awaited = list[tuple[str, Fraction, int]](), [1], 1, True
+    for token in tokens:
+        sign = token["sign"]
+        if sign is None:
+            power = Fraction(token["ratio"] or token["decimal"] or token["power"] or 1)
+            factors.append((token["name"], power, sides[-1] * side))
+            side, awaited = 1, False
+        elif sign == "(":
+            sides.append(sides[-1] * side)
+            side, awaited = 1, True
+        elif sign == ")" and len(sides) > 1 and not awaited:
+            sides.pop()
+        elif sign in ("*", "/") and (not awaited or (sign == "/" and token is tokens[0])):
+            side, awaited = (-1 if sign == "/" else 1), True
+        else:
+            raise _NoUnit
+    if awaited or len(sides) > 1:
+        raise _NoUnit
+    return factors
+
+
+def _raised(size: Fraction, power: Fraction) -> Fraction:
+    """A size to a power: exact of whole ones, else to so many digits that the nearest float is the same."""
+    if power.denominator == 1:
+        return size ** int(power)
+    with localcontext(prec=50):
+        base, exponent = (Decimal(one.numerator) / one.denominator for one in (size, power))
+        return Fraction(base**exponent)
+
+
+def dimensions(unit: str) -> tuple[Fraction, Dimensions]:
+    """Factor of a unit to metre, gram, second and radian, and its exponents of these; raises ValueError."""
+    return _parsed(unit)[:2] if unit else (Fraction(1), {})
+
+
+def parts(unit: str) -> list[tuple[str, Unit, Fraction]]:
+    """Names, units and powers of which a unit is the product; raises ValueError."""
+    factors, found = _factors(_tidy(unit)), []
+    for name, power, side in factors:
+        *before, last = _named(name)
+        found += [(part, one, Fraction(side)) for part, one in before]
+        found.append((*last, power * side))
+    seconds = sum(own.get("second", 0) * power for _, (_, own), power in found)
+    if any(name in TURNS_BY_TIME for name, _, _ in factors) and seconds >= 0:
+        raise ValueError(f"{unit!r} is not a known unit")
+    return found
+
+
+@lru_cache(maxsize=256)
+def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
+    """Factor to base units, dimensions, and those of each unit named; ValueError says why there are none."""
+    scale, powers, names = Fraction(1), dict[str, Fraction](), dict[str, Dimensions]()
+    for name, (size, own), power in parts(unit):
+        scale *= _raised(size, power)
+        names[name] = own
+        for base, exponent in own.items():
+            powers[base] = powers.get(base, Fraction(0)) + exponent * power
+    return scale, {base: power for base, power in powers.items() if power}, names
+
+
+def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
+    """The unit with the letters of its names small or capital as in units that are known: those that fit."""
+    try:
+        factors = _factors(_tidy(unit))
+    except _NoUnit:
+        return []
+    known = {name: name for name in UNITS}
+    known |= {head + tail: f"{head}*{tail}" for head, tail in itertools.product(HEADS, TAILS)}
+    choices = [
+        (
+            name,
+            *(known[one] for one in known if one.isascii() and one.casefold() == name.casefold()),
+        )
+        for name, _, _ in factors
+    ]
+    found = []
+    for names in itertools.islice(itertools.product(*choices), 64):
+        text = ""
+        for name, (_, power, side) in zip(names, factors, strict=True):
+            sign = ("1/" if not text else "/") if side < 0 else ("*" if text else "")
+            shown = f"^{power}" if power.denominator == 1 else f"^({power})"
+            text += sign + name + (shown if power != 1 else "")
+        if text not in found and fits(text):
+            found.append(text)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _fitting(unit: str, target: str) -> Fraction | None:
+    """What one `unit` is in `target`; None where they are of different quantities. Raises ValueError."""
+    scale, base, names = _parsed(unit)
+    own, wanted = dimensions(target)
+    angle, expected_angle = (one.get("radian", 0) for one in (base, wanted))
+    alike = {**base, "radian": 0} == {**wanted, "radian": 0}
+    hertz = {"second": -1} in names.values()
+    if not alike or (hertz and target in ("1/s", "rad/s")):  # a rate counts no cycles
+        return None
+    if angle == expected_angle and (target or names.keys() <= {"%", "‰", "dimensionless"}):
+        return scale / own
+    if target == "Hz" and angle == 1:
+        return scale / _TURN
+    if target == "rad/s" and all(one == {"second": 1} for one in names.values()):
+        return scale * _TURN
+    return None
+
+
+def fits(unit: str, target: str) -> bool:
+    """Whether a unit is one of the quantity of `target`."""
+    try:
+        return _fitting(unit, target) is not None
+    except ValueError:
+        return False
+
+
+def factor(unit: str, target: str) -> Fraction:
+    """What one `unit` is in `target`, the unit of an entry; raises UnitError when they are of different quantities."""
+    what = f"a quantity in {target}" if target else "a number without a unit"
+    reason = f"the unit {unit!r} does not fit: this is {what}"
+    try:
+        found = _fitting(unit, target)
+        if found is not None:
+            return found
+    except UnitError:
+        raise
+    except _NoUnit:
+        reason = f"{unit!r} cannot be read as a unit"
+    except ValueError as error:
+        reason = str(error)
+    raise UnitError(reason, _remedy(unit, target))
+
+
+def _remedy(unit: str, target: str) -> str:
+    """What to write in place of a unit that does not fit."""
+    if not target:
+        return "Write a plain number"
+    if target == "rad/s" and "hz" in unit.casefold():  # readings differ by 2 pi
+        return "Hz is ambiguous for an angular speed: write rpm, rad/s or turn/s"
+    with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", SPELLINGS.get(unit, unit))
+    near = _respelled(unit, lambda text: text != unit and fits(text, target))
+    if not near and with_force != unit and fits(with_force, target):
+        near = [with_force]
+    if near:
+        return f"Did you mean {' or '.join(map(repr, near[:3]))}?"
+    return f"Write it in {target}, or as a plain number in {target}"
+
+
+_NOTED: ContextVar[Callable[[str, str], None] | None] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def noting(take: Callable[[str, str], None]) -> Iterator[None]:
+    """Within it, `take` gets each text that leaves its unit open, and a sentence that says how it is read."""
+    token = _NOTED.set(take)
+    try:
+        yield
+    finally:
+        _NOTED.reset(token)
+
+
+def note(text: str, read: str) -> None:
+    """Note how a text of an entry is read, where that is not plain from the text."""
+    take = _NOTED.get()
+    if take is not None:
+        take(text.strip(), read)
+
+
+def note_turns(text: str, number: str, unit: str, target: str) -> None:
+    """Note how `text` is read, where `number` of `unit`, which fits the target, is an angular speed in turns by time alone."""
+    if target == "rad/s" and "radian" not in _parsed(unit)[1]:
+        turns = float(60 * Fraction(number) * factor(unit, target) / _TURN)
+        note(text, f"{turns:.6g} rpm, revolutions per minute; for radians write rad/s")
+
+
+_EXAMPLES = {
+    "m": '"0.3 mm"',
+    "rad/s": '"5000 rpm"',
+    "Pa": '"206.8 GPa"',
+    "rad": '"30 deg"',
+    "Hz": '"20 Hz"',
+}
+
+
+def to_si(text: str, target: str, decided: bool = False) -> float:
+    """Read a quantity such as ``"0.3 mm"`` as a float in `target`.
+
+    Parameters
+    ----------
+    text : str
+        A decimal number and a unit.
+    target : str
+        The SI unit expected, ``""`` for a number without one.
+    decided : bool
+        Whether it is known that a point stands before decimals, also in "3.000".
+
+    Raises
+    ------
+    UnitError
+        If the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
+    """
+    number, unit = quantity(text, target, decided)
+    value = of_unit(number, unit, target)
+    note_turns(text.strip(), number, unit, target)
+    return value
+
+
+def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
+    """Number and unit of a text, as `to_si` reads it."""
+    shown = target or "1"
+    found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= _LONGEST else None
+    number, unit = found.groups() if found else ("", "")
+    if not decided:
+        check_thousands(text)
+    if found is None or (unit is not None and not _is_written(text, unit)):
+        hint = f", such as {_EXAMPLES[target]}" if target in _EXAMPLES else ""
+        raise UnitError(
+            f"the text is not a number with a unit of {shown}",
+            mended(text)
+            or f"Write a number in {shown}"
+            + (f", or a string with a unit{hint}" if target else ""),
+        )
+    if unit is None:
+        raise UnitError(
+            "a number in quotes has no unit", f"Drop the quotes for a number in {shown}"
+        )
+    return number, unit
+
+
+def of_unit(number: str, unit: str, target: str) -> float:
+    """A decimal number of a unit as the nearest float in `target`; raises UnitError."""
+    return _product(Fraction(number), factor(unit, target), target)
+
+
+def _product(number: Fraction | Decimal, size: Fraction, target: str = "") -> float:
+    upper, lower = number.as_integer_ratio()
+    try:
+        value = upper * size.numerator / (lower * size.denominator)
+    except OverflowError:
+        remedy = f"Write a finite number in {target or '1'}"
+        raise UnitError("the number is too large", remedy) from None
+    if upper and not value:
+        raise UnitError(
+            "the number is too small", f"Write 0, or a larger number in {target or '1'}"
+        )
+    return value
+
+
+def scaled(value: float, size: Fraction) -> float:
+    """The nearest float to the shortest decimal number of `value` times `size`; raises UnitError where there is none."""
+    return value if size == 1 or not isfinite(value) else _product(Decimal(repr(value)), size)
+
+
+def written(value: float, unit: str) -> float | str:
+    """A number of a unit as an entry of a scene, whose point nobody takes for a sign of thousands."""
+    text = repr(value).removesuffix(".0")
+    return (
+        f"{text}0 {unit}"
+        if may_be_thousands(text) and unit
+        else f"{text} {unit}"
+        if unit
+        else value
+    )
+
+
+def _digits(text: str) -> tuple[str, str]:
+    """The number that a text begins with, with whatever stands between its digits, and the rest of the text."""
+    text = text.strip()[:_LONGEST].replace("\u2212", "-")
+    found = _DIGITS.match(text)
+    return (found[0], text[found.end() :]) if found else ("", text)
+
+
+def may_be_thousands(number: str) -> bool:
+    """Whether three digits after the only comma or point of a number may be decimals or thousands."""
+    return _THOUSANDS.fullmatch(number) is not None
+
+
+def check_thousands(text: str) -> None:
+    """Raise UnitError where the number of a text may be read in two ways."""
+    number, rest = _digits(text)
+    if (
+        not _THOUSANDS.fullmatch(number)
+        or re.match(r"[eE][+-]?\d", rest)
+        or _POWER_OF_TEN.match(rest)
+    ):
+        return
+    decimal, whole = number.replace(",", "."), re.sub("[.,]", "", number)
+    short = decimal.rstrip("0").rstrip(".")
+    short = f"{decimal}0" if short == decimal else short
+    reason = f"may be {decimal}{rest} or {whole}{rest}"
+    raise UnitError(reason, f"Write {short}{rest} or {whole}{rest}")
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit, of whatever quantity."""
+    try:
+        return bool(_parsed(text))
+    except ValueError:
+        return False
+
+
+def _is_written(text: str, unit: str) -> bool:
+    """Whether what follows the number of a text is made of names, powers and signs; "1/min" after a space only."""
+    if unit.startswith("1") and not text[: text.rindex(unit)][-1:].isspace():
+        return False
+    try:
+        return bool(_factors(_tidy(unit)))
+    except _NoUnit:
+        return False
+
+
+def mended(text: str) -> str:
+    """What to write where signs stand between the digits of a number: "0,3 mm", "1,234.5 rpm", "1.2·10^-3 m"."""
+    number, rest = _digits(text)
+    if _POWER_OF_TEN.match(rest):
+        return f"Write powers of ten as in {number}e-3"
+    between = "Write the digits of a number without signs or spaces between them"
+    if grouped := _GROUPS.fullmatch(number):
+        decimals = f".{grouped[3]}" if grouped[3] else ""
+        return f"{between}: {re.sub(r'[^0-9+-]', '', grouped[1])}{decimals}{rest}"
+    if re.fullmatch(r"[+-]?\d*,\d+", number):
+        return f"Write a decimal point: {number.replace(',', '.')}{rest}"
+    return (
+        between
+        if re.search(r"\d[^\d]+\d.*[^\d]|\d[^\d.]+\d|\.\.", number) or rest[:1].isdigit()
+        else ""
+    )

@@ -1,0 +1,94 @@
+"""A law that is a formula in the scene, made a function."""
+
+import ast
+import hashlib
+import linecache
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+from hpcclear.base.arithmetic import WORDS, read
+from hpcclear.base.units import dimensions
+from hpcclear.laws.declared import JOINT, VARYING, ContactLaw, FrictionLaw, Law, Parameter
+from hpcclear.laws.translate import LawError
+
+LONGEST = 500
+
+SHORT = {
+    "contact": {"d": "depth", "v": "rate", "v0": "impact_speed", "K": "stiffness"},
+    "friction": {"v": "speed", "F": "force"},
+}
+"""Short names that a formula may use, by the kind of law, for what they stand for."""
+
+
+def law_of(kind: str, formula: str, units: Mapping[str, str]) -> Law:
+    """The law of a formula, whose parameters have these units.
+
+    Raises
+    ------
+    LawError
+        If it is none.
+    """
+    return _made(kind, formula, tuple(units.items()))
+
+
+@lru_cache(maxsize=64)
+def _made(kind: str, formula: str, units: tuple[tuple[str, str], ...]) -> Law:
+    short = SHORT[kind]
+    parameters = tuple(Parameter(name, unit, "a parameter of the formula") for name, unit in units)
+    entry = "force" if kind == "contact" else "ratio"
+    known = {name: name for name in (*VARYING[kind], *JOINT)} | short
+    for name, unit in units:
+        if name in WORDS or name in known:
+            raise LawError(
+                f"the parameter {name!r} has a name that formulas use", "Give it another name"
+            )
+        _check_si(name, unit)
+    known |= {name: name for name, _ in units}
+    tree = read(formula, LONGEST, WORDS, "K * d**1.5 * (1 + b * v)")
+    called = {id(one.func) for one in ast.walk(tree) if isinstance(one, ast.Call)}
+    used: list[str] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and id(node) not in called:
+            if node.id not in known:
+                others = ", ".join(sorted({*short, *JOINT}))
+                raise LawError(
+                    f"contains {node.id!r}, which is not a parameter",
+                    f'Give it a unit, units = {{ {node.id} = "m" }}, and a value; known are {others}',
+                )
+            node.id = known[node.id]
+            used.append(node.id)
+    names = list(dict.fromkeys(used))
+    text = f"from math import *\n\n\ndef {entry}({', '.join(names)}):\n    return {ast.unparse(tree)}\n"
+    function = function_of(text, entry)
+    named: dict[str, Any] = {
+        "name": "expression",
+        "words": "a formula in the scene",
+        "formula": formula,
+    }
+    if kind == "contact":
+        return ContactLaw(**named, parameters=parameters, force=function)
+    return FrictionLaw(**named, parameters=parameters, ratio=function)
+
+
+def _check_si(name: str, unit: str) -> None:
+    """LawError if a unit is known and not of the SI: a formula takes its numbers as they are."""
+    try:
+        size, powers = dimensions(unit)
+    except ValueError:
+        return  # said of all laws alike
+    if size != Fraction(1000) ** powers.get("gram", Fraction(0)):
+        reason = (
+            f"the unit {unit!r} of {name} is not an SI unit, and a formula is computed in SI units"
+        )
+        raise LawError(reason, f'Write, say, "s/m"; the value of {name} may have any unit')
+
+
+def function_of(text: str, name: str, around: Mapping[str, Any] | None = None) -> Any:
+    """The function `name` of a text, whose lines `inspect` finds; `around`: what it may use."""
+    path = f"<formula {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
+    linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
+    names: dict[str, Any] = {**(around or {})}
+    exec(compile(text, path, "exec"), names)
+    return names[name]

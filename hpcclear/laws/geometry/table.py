@@ -1,0 +1,94 @@
+"""A force that was measured or computed elsewhere, as a table against the depth.
+
+A monotone cubic lies between the rows (Fritsch and Butland 1984, doi:10.1137/0905021), a straight line behind the last. The
+numbers are written into the function, so that lanes evaluate it without a branch: each row adds its part of the depth.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from hpcclear.laws.declared import Geometry, Parameter
+from hpcclear.laws.formula import function_of
+
+Rows = tuple[tuple[float, float], ...]
+
+EXAMPLE = ((1e-6, 100.0),)
+
+
+@lru_cache(maxsize=32)
+def of_rows(rows: Rows) -> Geometry:
+    """The geometry of rows (depth in m, force in N), both rising from 0."""
+    rows = rows if rows[0][0] == 0.0 else ((0.0, 0.0), *rows)
+    depths, forces = np.array(rows).T
+    cubics, slope = _cubics(depths, forces)
+    last = float(depths[-1])
+    return Geometry(
+        words="a table of force against depth, from one's own measurement or finite elements",
+        source="F. N. Fritsch and J. Butland 1984, doi:10.1137/0905021, for what lies between its rows",
+        formula="a monotone cubic from row to row",
+        valid="depths up to the last row",
+        elastic=function_of(_elastic(depths, cubics, slope), "elastic"),
+        energy=function_of(_energy(depths, forces, cubics, slope), "energy"),
+        parameters=(
+            Parameter("depth_scale", "m", "factor of the depths in the table", 1.0, above=0),
+            Parameter("force_scale", "N", "factor of the forces in the table", 1.0, above=0),
+        ),
+        deepest=lambda depth_scale: last * depth_scale,
+        of_rows=of_rows,
+    )
+
+
+def _cubics(depths: np.ndarray, forces: np.ndarray) -> tuple[np.ndarray, float]:
+    """Cubics (4, cells) by falling powers of the depth beyond a row, and the slope at the last row."""
+    if len(depths) == 2:  # a straight line, as the example, for which nobody has to load SciPy
+        slope = float(forces[1] / depths[1])
+        return np.array([[0.0], [0.0], [slope], [0.0]]), slope
+    from scipy.interpolate import PchipInterpolator
+
+    curve = PchipInterpolator(depths, forces)
+    return curve.c, float(curve(depths[-1], 1))
+
+
+def _parts(depths: np.ndarray) -> list[str]:
+    """Lines that give the parts of the depth between rows, ``s0`` and so on, and that behind the last, ``beyond``."""
+    lines = [
+        f"    s{k} = min(max(x - {low!r}, 0.0), {high - low!r})"
+        for k, (low, high) in enumerate(zip(depths.tolist(), depths[1:].tolist(), strict=False))
+    ]
+    return [
+        "    x = depth / depth_scale",
+        *lines,
+        f"    beyond = max(x - {depths[-1].item()!r}, 0.0)",
+    ]
+
+
+def _elastic(depths: np.ndarray, cubics: np.ndarray, slope: float) -> str:
+    """The force: cubics (4, cells) by falling powers, whose constants are the sums of what stands before them."""
+    terms = [
+        f"s{k} * ({m!r} + s{k} * ({c2!r} + s{k} * {c3!r}))"
+        for k, (c3, c2, m, _) in enumerate(cubics.T.tolist())
+    ]
+    total = " + ".join([*terms, f"{float(slope)!r} * beyond"])
+    head = "def elastic(depth, depth_scale, force_scale):"
+    return "\n".join([head, *_parts(depths), f"    return force_scale * ({total})", ""])
+
+
+def _energy(depths: np.ndarray, forces: np.ndarray, cubics: np.ndarray, slope: float) -> str:
+    """Its integral."""
+    terms = [
+        f"s{k} * ({f!r} + s{k} * ({m / 2!r} + s{k} * ({c2 / 3!r} + s{k} * {c3 / 4!r})))"
+        for k, (f, (c3, c2, m, _)) in enumerate(
+            zip(forces.tolist(), cubics.T.tolist(), strict=False)
+        )
+    ]
+    total = " + ".join(
+        [*terms, f"beyond * ({forces[-1].item()!r} + {float(slope) / 2!r} * beyond)"]
+    )
+    head = "def energy(depth, depth_scale, force_scale):"
+    return "\n".join(
+        [head, *_parts(depths), f"    return force_scale * depth_scale * ({total})", ""]
+    )
+
+
+GEOMETRY = of_rows(EXAMPLE)
