@@ -17,7 +17,7 @@ class Verdict(IntEnum):
 
 
 def together(verdicts: Sequence[int]) -> Verdict:
-    """The verdict that all of some statements hold: it fails where one fails, and is undecided where one is not known to hold."""
+    """The verdict that all of some statements hold: it fails where one fails, and is undecided where one is not decided."""
     found = set(verdicts)
     if Verdict.FAILS in found:
         return Verdict.FAILS
