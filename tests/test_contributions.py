@@ -10,6 +10,7 @@ from margins import most
 from scipy.stats import qmc
 
 from hpcclear.report import scatter
+from hpcclear.report.parts import Recommended
 from hpcclear.scene.correlation import Correlation
 from hpcclear.statistics.sensitivity.contributions import contributions
 
@@ -98,7 +99,7 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
         {"design": ["case alpha"], "input": ["C", "m2", "m3", "u2", "other"]},
     )  # fmt: skip
     best = xr.Dataset(coords={"design": "case alpha"})
-    shares, tolerances, first = scatter.lines({"contributions": content}, best)
+    shares, tolerances, first = scatter.lines(Recommended({"contributions": content}, best, best))
     assert first.label == "tighten first"
     listed = (
         "C 55% ± 2%, m2+m3 (correlated) 30% ± 4%, u2 below 0.8%. The cubic fit does not explain 15%"
@@ -106,7 +107,7 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     assert listed in shares.text
     assert "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%" in tolerances.text
     assert "other" not in shares.text + tolerances.text
-    assert list(scatter.lines({}, best)) == []
+    assert list(scatter.lines(Recommended({}, best, best))) == []
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -176,6 +177,6 @@ def test_two_blocks_are_listed_as_two():
         {"design": ["case alpha"], "input": list("abcde")},
     )  # fmt: skip
     best = xr.Dataset(coords={"design": "case alpha"})
-    shares, _, first = scatter.lines({"contributions": content}, best)
+    shares, _, first = scatter.lines(Recommended({"contributions": content}, best, best))
     assert "a+b (correlated) 30% ± 2%, c+d (correlated) 20% ± 2%, e 10% ± 2%" in shares.text
     assert "them together lowers the standard deviation of f by 43% ± 1%" in first.text
