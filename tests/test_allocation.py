@@ -90,7 +90,7 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     least = float((costs / exact).sum())
     assert least * 0.995 < float(best["first_true"]) < 1.01 * least
     assert widths == pytest.approx(exact, rel=0.01)
-    assert int(best["constraint_verdict"]) == Verdict.HOLDS
+    assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert np.sqrt((slopes**2 * widths**2).sum() / 3) <= most
     parts = {"verification": found, "contributions": dataset.read(tmp_path / "a/contributions.nc")}
     lines = {line.label: line.text for line in answer(parts, "a")}

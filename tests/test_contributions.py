@@ -10,6 +10,7 @@ from margins import most
 from scipy.stats import qmc
 
 from hpcclear.report import scatter
+from hpcclear.report.parts import Recommended
 from hpcclear.scene.correlation import Correlation
 from hpcclear.statistics.sensitivity.contributions import contributions
 
@@ -86,7 +87,7 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
         {"design": ["case alpha"], "input": ["C", "m2", "m3", "u2", "other"]},
     )  # fmt: skip
     best = xr.Dataset(coords={"design": "case alpha"})
-    shares, tolerances, first = scatter.lines({"contributions": content}, best)
+    shares, tolerances, first = scatter.lines(Recommended({"contributions": content}, best, best))
     assert first.label == "tighten first"
     listed = (
         "C 55% ± 2%, m2+m3 (correlated) 30% ± 4%, u2 below 0.8%. The cubic fit does not explain 15%"
@@ -94,7 +95,7 @@ def test_lines_name_what_scatters_alone_and_what_is_zero_within_its_error():
     assert listed in shares.text
     assert "C 25% ± 2%, m2 10% ± 2%, m3 2.0% ± 1.0%, u2 below 0.5%" in tolerances.text
     assert "other" not in shares.text + tolerances.text
-    assert list(scatter.lines({}, best)) == []
+    assert list(scatter.lines(Recommended({}, best, best))) == []
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -151,3 +152,19 @@ def test_a_chain_of_correlations_is_one_group_as_long_as_no_link_lacks():
     chain = Correlation(inputs=["a", "b", "c", "d"], matrix=matrix.tolist())
     assert chain.groups(["d", "c", "b", "a"]) == [0, 1, 1, 1]
     assert chain.groups(["a", "c", "d"]) == [0, 0, 0]
+
+
+def test_two_blocks_are_listed_as_two():
+    each = {name: (("design", "input"), [[0.3, 0.3, 0.2, 0.2, 0.1]]) for name in ("contribution", "halved")}  # fmt: skip
+    errors = {f"{name}_error": (("design", "input"), [[0.01] * 5]) for name in each}
+    content = xr.Dataset(
+        {
+            **each, **errors, "unexplained": ("design", [0.0]), "group": (("design", "input"), [[1, 1, 2, 2, 0]]),
+            "halved_together": ("design", [0.4321]), "halved_together_error": ("design", [0.004]),
+        },
+        {"design": ["case alpha"], "input": list("abcde")},
+    )  # fmt: skip
+    best = xr.Dataset(coords={"design": "case alpha"})
+    shares, _, first = scatter.lines(Recommended({"contributions": content}, best, best))
+    assert "a+b (correlated) 30% ± 2%, c+d (correlated) 20% ± 2%, e 10% ± 2%" in shares.text
+    assert "them together lowers the standard deviation of f by 43% ± 1%" in first.text

@@ -196,7 +196,7 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
     for verdict, text in zip(verdicts, done["constraints"].to_numpy(), strict=True):
         assert f": {constraints.WORDS[verdict]}" in str(text)
     best = done.sel(design="light alpha")
-    assert int(best["constraint_verdict"]) == Verdict.HOLDS
+    assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert (
         int(best["samples"]) > 512
     )  # as many as the rare failure needs, not as mean and deviation do

@@ -244,7 +244,7 @@ def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
     assert {line.label: line.text for line in answer({"verification": found}, "out")}[
         "recommended"
     ] == "heavy alpha"
-    assert int(best["constraint_verdict"]) == Verdict.HOLDS
+    assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert int(best["rare_samples"]) > 0
     grid = [(a, b) for a in np.linspace(0.105, 0.42, 22) for b in np.linspace(0.07, 0.28, 106)]
     heaviest = max(b for a, b in grid if share_above(values, a, b) <= 5e-4)

@@ -116,7 +116,9 @@ def test_what_is_told_of_designs_is_where_they_lie(study: Path) -> None:
         assert (lower - slack <= true[:, column]).all()
         assert (true[:, column] <= upper + slack).all()
     assert found["third_goal"].to_numpy().tolist() == [THIRD] * found.sizes["design"]
-    assert f"mean of f, deviation of f and {THIRD}" in found["dominated"].attrs["long_name"]
+    assert (
+        f"mean of f, standard deviation of f and {THIRD}" in found["dominated"].attrs["long_name"]
+    )
     assert "fourth_goal" not in found
 
 

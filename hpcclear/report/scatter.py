@@ -29,7 +29,7 @@ SMALL = 0.005
 """Share below which, half-width included, an input is listed without a number."""
 
 
-def _lines(of: Recommended) -> Iterator[Line]:
+def lines(of: Recommended) -> Iterator[Line]:
     """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
     they are not known."""
     own = of.of_best("contributions")
@@ -143,4 +143,4 @@ def _upwards(half_width: float, step: float) -> float:
     return float(max(np.ceil(half_width / step - 1e-9), 1.0) * step)
 
 
-PARTS = (LinesOf(20, ("contributions",), _lines), LinesOf(30, ("worst",), _worst))
+PARTS = (LinesOf(20, ("contributions",), lines), LinesOf(30, ("worst",), _worst))

@@ -21,11 +21,13 @@ SIMULATED = (
     ("life_mean", "mean, own wear"),
     ("life_deviation", "std. deviation, own wear"),
 )
+"""Variables of kind ``verification`` by simulation, and the heads of their columns."""
+
 _PREDICTED = (
     ("mean_surrogate", "surrogate: mean"),
     ("deviation_surrogate", "surrogate: std. deviation"),
 )
-"""Variables of kind ``verification``, and the heads of their columns."""
+"""The same by the surrogate."""
 
 _WORDS = (
     "Values are by simulation, ± half-width of the 95 % confidence interval. f: {}. In brackets: the name of the design in "
@@ -78,7 +80,7 @@ def _variables(verified: xr.Dataset) -> str:
 
 
 def names_in(verified: xr.Dataset) -> list[str]:
-    """Names of the verified designs, in order."""
+    """Return the names of all designs."""
     return [str(name) for name in verified["design"].to_numpy()]
 
 
