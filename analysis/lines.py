@@ -78,7 +78,7 @@ FEATURES = {
         "statistics/streams/* ensemble/statistics.py ensemble/raw.py ensemble/split.py ensemble/parts.py "
         "ensemble/bundles.py scene/pages.py ranks/nodes.py",
     "killed runs, lost ranks, damaged files":
-        "ranks/watch.py ranks/mailbox.py results/lock.py results/faults.py results/checkpoint.py base/private.py "
+        "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py "
         "results/places.py",
     "surrogates beside Kriging":
         "statistics/surrogate/regression.py statistics/surrogate/leaf.py statistics/surrogate/piecewise.py "

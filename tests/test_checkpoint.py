@@ -21,6 +21,7 @@ import xarray as xr
 from patience import crowded
 
 from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.lock import Holder, Lock
 from hpcclear.base.outcome import (
     IMPACTS,
     LEVELS,
@@ -37,7 +38,6 @@ from hpcclear.base.outcome import (
 from hpcclear.results import dataset, files, netcdf
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
 from hpcclear.results.keys import check_key, key_attribute
-from hpcclear.results.lock import Holder, Lock
 from hpcclear.results.places import fresh_sibling
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import load_scene
@@ -470,7 +470,7 @@ def test_a_second_run_is_refused_and_told_who_holds_the_lock(tmp_path):
     with Lock(tmp_path):
         with pytest.raises(InputError, match=f"process {os.getpid()} on "), Lock(tmp_path):
             pass
-        code = "from pathlib import Path\nfrom hpcclear.results.lock import Lock\n"
+        code = "from pathlib import Path\nfrom hpcclear.base.lock import Lock\n"
         code += f"Lock(Path({str(tmp_path)!r})).acquire()"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert done.returncode == 1
@@ -514,7 +514,7 @@ def test_a_stale_lock_is_recognised(tmp_path, flock, stale, monkeypatch):
 
 def test_the_lock_of_a_killed_process_is_stale_even_before_it_is_reaped(tmp_path):
     code = (
-        "from pathlib import Path\nfrom hpcclear.results.lock import Lock\nimport time\n"
+        "from pathlib import Path\nfrom hpcclear.base.lock import Lock\nimport time\n"
         f"Lock(Path({str(tmp_path)!r})).acquire()\nprint('held', flush=True)\ntime.sleep(60)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:

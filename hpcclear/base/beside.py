@@ -48,7 +48,7 @@ def compiled_beside(parts: Sequence[str]) -> Iterator[None]:
             with _other(wanted):
                 yield
     finally:
-        kept.unlock(first, lock)
+        kept.unlock(lock)
 
 
 @contextlib.contextmanager
