@@ -55,7 +55,7 @@ def commands() -> Iterator[tuple[str, dict[str, Any]]]:
     """Commands; their arguments by position and options by name."""
     from hpcclear.cli import cli
 
-    for name, command in cli.commands.items():
+    for name, command in cli.every().items():
         arguments = 0
         yield name, {}
         context = command.make_context(name, [], resilient_parsing=True)

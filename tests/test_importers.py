@@ -398,7 +398,17 @@ def test_the_command_takes_a_unit_and_prints_notes(tmp_path):
     source = written(tmp_path, dxf(LAYERS, unit=0), "sketch.dxf")
     made = tmp_path / "made.toml"
     code, output = run(
-        ["import", str(source), str(made), "--unit", "mm", "--sketch", str(tmp_path / "s.svg")], 0
+        [
+            "init",
+            "--import",
+            str(source),
+            str(made),
+            "--unit",
+            "mm",
+            "--sketch",
+            str(tmp_path / "s.svg"),
+        ],
+        0,
     )
     assert code == 0, output
     assert "3 bodies, 4 joints" in output

@@ -401,7 +401,7 @@ def test_what_a_sample_of_a_linkage_costs_is_told(capsys):
     assert "run time per sample" in told
     assert "60 samples" in told
     assert re.search(
-        r"about \d+ samples, .* of one core; more exact: hpcclear plan",
+        r"about \d+ samples, .* of one core; more exact: hpcclear accuracy --plan",
         " ".join(told.split()),
     )
 

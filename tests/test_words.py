@@ -188,7 +188,7 @@ def test_numbers_in_tables_have_a_unit(name):
 
 def help_passages() -> Iterator[tuple[str, str]]:
     """Prose of the help of every command, with the command's name; examples and metavariables are left out."""
-    for name, command in [("hpcclear", cli), *cli.commands.items()]:
+    for name, command in [("hpcclear", cli), *cli.every().items()]:
         texts = (command.help or "").split("\n\n")
         yield from ((name, " ".join(text.split())) for text in texts if "xample:" not in text)
         yield from ((name, command.short_help or ""),)
