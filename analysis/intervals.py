@@ -18,10 +18,10 @@ import numpy as np
 from directly import Here, run_of
 from regret import STUDIES, scene_of
 
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread, student
 from hpcclear.study import tolerance, truth

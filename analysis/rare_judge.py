@@ -27,11 +27,11 @@ import numpy as np
 import regret
 from directly import run_of
 
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import student
 from hpcclear.statistics.random.tail import of_share

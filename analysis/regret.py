@@ -29,7 +29,6 @@ from typing import Any
 import numpy as np
 from directly import run_of
 
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.report.merit import SPAN, recommended
@@ -37,6 +36,7 @@ from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.statistics.random.replicates import spread
 from hpcclear.statistics.search import improvement

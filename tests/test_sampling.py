@@ -11,11 +11,10 @@ from margins import at_most
 from scipy import stats
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.domain import box, to_coordinates, to_physical
 from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points, latin_hypercube, monte_carlo
+from hpcclear.scene.sampling import check_points, latin_hypercube, monte_carlo, unit_lhs
 from hpcclear.scene.table import read_points
 
 JOBS = Path(__file__).parent.parent / "jobs"

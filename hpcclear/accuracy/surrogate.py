@@ -8,13 +8,13 @@ import numpy as np
 
 from hpcclear.accuracy.profile import Profile
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import Points
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.streams import generator
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.leaf import Leaf, Method

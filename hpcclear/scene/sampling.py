@@ -12,7 +12,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.domain import box, entries, slender_inertias, to_physical
@@ -22,6 +21,26 @@ from hpcclear.scene.points import Points, expanded
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.streams import generator, sobol, uniform
 from hpcclear.scene.study import Study
+
+
+def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
+    """A Latin hypercube in the unit cube: each of `samples` equal strata of each axis holds one
+    point.
+
+    Parameters
+    ----------
+    samples, dimensions : int
+        Shape (n, d) of the result.
+    rng : Generator
+        Source of randomness; it is advanced.
+
+    References
+    ----------
+    McKay, Beckman, Conover (1979), doi:10.1080/00401706.1979.10489755.
+    """
+    from scipy.stats import qmc  # most of a second to import; a single response needs none of it
+
+    return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
 
 
 def check_points(

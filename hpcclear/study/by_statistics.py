@@ -12,10 +12,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.report.merit import SPAN
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
 from hpcclear.statistics.search import improvement

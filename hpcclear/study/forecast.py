@@ -14,13 +14,13 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.ranks.boundary import alone
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import Points, snapped
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES, Verification
 from hpcclear.scene.streams import generator
 from hpcclear.scene.study import Study

@@ -10,14 +10,13 @@ import numpy as np
 from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.scene import Scene
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.goals import Goal
 from hpcclear.scene.points import snapped
 from hpcclear.scene.random_inputs import RandomInput
-from hpcclear.scene.sampling import offsets
+from hpcclear.scene.sampling import offsets, unit_lhs
 from hpcclear.scene.streams import generator, sobol
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random.inputs import Derived, RandomVariable

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.stages import REPLICATES
 from hpcclear.scene.study import Study
 from hpcclear.study import by_f, by_statistics, edge, truth

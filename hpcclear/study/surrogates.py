@@ -5,12 +5,12 @@ from functools import partial
 
 import numpy as np
 
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.plugins import SURROGATES
 from hpcclear.results import dataset
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import Box, box, to_coordinates
 from hpcclear.scene.points import snapped
+from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
 from hpcclear.statistics.surrogate.fitting import KrigingMethod

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
-from hpcclear.base.hypercube import unit_lhs
 from hpcclear.statistics.surrogate.metrics import ROUNDING, leave_one_out
 from hpcclear.statistics.surrogate.polynomial import exponents_up_to, monomials, slopes
 from hpcclear.statistics.surrogate.term_choice import choose_terms
@@ -134,7 +133,8 @@ def scale_inputs(points: ArrayLike, bounds: Array) -> Array:
 
 def latin_hypercube(n: int, bounds: Array, rng: np.random.Generator) -> Array:
     """Latin hypercube of n points, shape (n, d): one point in each n-th of every input."""
-    unit = unit_lhs(n, len(bounds), rng)
+    strata = np.stack([rng.permutation(n) for _ in bounds], axis=1)
+    unit = (strata + rng.random(strata.shape)) / n
     return np.asarray(bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0]))
 
 
