@@ -16,20 +16,20 @@ from structure import PACKAGE, ROOT, checkout
 
 FEATURES = {
     "unknowns of a machine from measured signals":
-        "identify/* */identified.py cli/identify.py",
+        "identify/* */identified.py cli/commands/identify.py",
     "laws, objectives, distributions, searches of a user":
         "plugins/* laws/checks.py laws/translate.py laws/formula.py "
-        "laws/constant.py scene/plugged.py base/arithmetic.py cli/laws.py statistics/search/foreign.py "
+        "laws/constant.py scene/plugged.py base/arithmetic.py statistics/search/foreign.py "
         "statistics/search/asking.py",
     "wear and service lives":
-        "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/wear.py cli/wear.py report/figures/wear.py "
-        "study/lives.py statistics/random/survival.py dynamics/stepping/profile.py",
+        "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/wear.py cli/wear.py cli/commands/wear.py "
+        "report/figures/wear.py study/lives.py statistics/random/survival.py dynamics/stepping/profile.py",
     "steady means to a target error, chaos, maps":
         "dynamics/evaluation/steady/* dynamics/steady/* ensemble/maps.py ensemble/bifurcation.py "
         "report/figures/maps.py report/figures/portraits.py study/chaos.py base/asking.py",
     "which effects can be neglected":
-        "ensemble/certificate.py ensemble/trial.py ensemble/effects.py cli/effects.py study/certificate.py "
-        "scene/switches.py report/figures/effects.py statistics/random/paired.py",
+        "ensemble/certificate.py ensemble/trial.py ensemble/effects.py cli/effects.py cli/commands/effects.py "
+        "study/certificate.py scene/switches.py report/figures/effects.py statistics/random/paired.py",
     "the paper's study: its numbers and claims":
         "study/paper/* study/claims.py study/printed.py study/readings.py",
     "rare failures, worst cases, constraints tested":
@@ -38,7 +38,7 @@ FEATURES = {
     "curves, tables and workbooks in; tables out":
         "scene/sheets.py scene/delimited.py scene/headings.py "
         "scene/workbook.py scene/clock.py scene/file_curves.py scene/measured.py scene/table.py "
-        "report/tables.py report/export.py cli/results.py",
+        "report/tables.py report/export.py cli/commands/export.py",
     "comparison with measurements":
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
         "report/scatter.py",
@@ -65,13 +65,14 @@ FEATURES = {
         "base/lowering/* base/text/* base/one_text.py base/cached.py base/code_folder.py base/width.py base/bits.py "
         "base/jit.py base/unrolled.py base/numbered.py ensemble/compiling.py base/hashing.py",
     "error against run time, plans of jobs":
-        "accuracy/* cli/accuracy.py cli/plan.py report/figures/accuracy.py study/forecast.py study/tolerance.py "
+        "accuracy/* cli/accuracy.py cli/plan.py cli/commands/accuracy.py "
+        "report/figures/accuracy.py study/forecast.py study/tolerance.py "
         "study/launched.py base/host.py",
     "statistics of millions of samples, parts of arrays":
         "statistics/streams/* ensemble/statistics.py ensemble/raw.py ensemble/split.py ensemble/parts.py "
         "ensemble/bundles.py scene/pages.py ranks/nodes.py",
     "killed runs, lost ranks, damaged files":
-        "ranks/watch.py ranks/mailbox.py results/lock.py results/faults.py results/checkpoint.py base/private.py "
+        "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py "
         "results/places.py",
     "surrogates beside Kriging":
         "statistics/surrogate/regression.py statistics/surrogate/leaf.py statistics/surrogate/piecewise.py "
@@ -94,8 +95,8 @@ FEATURES = {
     "the page and its gallery":
         "report/html/* report/answer.py report/targets.py report/spread.py report/failures.py",
     "archives, citation, schema, other units":
-        "results/crate.py results/provenance.py scene/citation.py cli/cite.py scene/schema.py base/units.py base/unit_names.py "
-        "scene/plausibility.py scene/former.py",
+        "results/crate.py results/provenance.py scene/citation.py cli/commands/reproduce.py scene/schema.py "
+        "base/units.py base/unit_names.py scene/plausibility.py",
 }  # fmt: skip
 
 

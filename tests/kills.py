@@ -51,7 +51,7 @@ def _points(folder: Path) -> list[str]:
     table = folder.parent / "points.csv"
     # a chain of bars between two pins of the ground
     table.write_text("name,x [mm],y [mm]\nA,0,0\nB,0,40\nC,110,80\nD,100,0\n")
-    return ["import", str(table), str(folder / "linkage.toml")]
+    return ["init", "--import", str(table), str(folder / "linkage.toml")]
 
 
 def _table(folder: Path) -> list[str]:
@@ -70,14 +70,14 @@ def _of(name: str, scene: str, output: str, *words: str, options: Sequence[str] 
     return made
 
 
-_RANGE = ("--x", "C=0.1mm:1mm:24", "--transient", "1", "--revolutions", "2")
+_RANGE = ("--x", "C=0.1mm:1mm:24", "--transient", "1", "--revolutions", "2", "--bifurcation")
 _LIVES = (*overrides("wear.lives=4", "wear.cycles=1e4"), *SHORT)
 _UNKNOWN = ("--unknown", "joints.crank_rod.clearance=10um:150um", "--advise", "--members", "32")
 
 COMMANDS = {
     "sample": Command(lambda folder: commands.sample(folder / "samples.nc", 4000, *OPTIONS)),
     "run": Command(study, interval=CHECKPOINT_INTERVAL),
-    "bifurcation": Command(_of("bifurcation", "quickstart.toml", "b.nc", *_RANGE, *SHORT)),
+    "map --bifurcation": Command(_of("map", "quickstart.toml", "b.nc", *_RANGE, *SHORT)),
     "map": Command(_of("map", "hunt_crossley.toml", "map.nc", "--x", "C=0.1mm:0.3mm:6")),
     "wear": Command(_of("wear", "wear.toml", "wear.nc", *_LIVES)),
     "effects": Command(
@@ -88,9 +88,10 @@ COMMANDS = {
         _of("accuracy", "quickstart.toml", "accuracy", "--quick", *SHORT, options=()),
         interval=CHECKPOINT_INTERVAL,
     ),
-    "plan": Command(
+    "accuracy --plan": Command(
         lambda folder: [
-            "plan",
+            "accuracy",
+            "--plan",
             str(commands.SCENE),
             "--ranks",
             "2",
@@ -100,7 +101,7 @@ COMMANDS = {
         interval=None,
     ),
     # a scene that is there already is never overwritten
-    "import": Command(_points, ranks=0, interval=None, again=frozenset({0, 2})),
+    "init --import": Command(_points, ranks=0, interval=None, again=frozenset({0, 2})),
     "export": Command(_table, ranks=0, interval=None),
 }
 """By name. Times of a plan and of an accuracy differ from run to run, so their files are left out of `files`."""

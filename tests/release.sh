@@ -114,7 +114,7 @@ installed() {
     hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     hpcclear report results
     hpcclear plot results/response.nc --figure orbit -o orbit.png
-    hpcclear cite >hpcclear.bib
+    hpcclear show citation >hpcclear.bib
     test -s results/report.html
 }
 

@@ -16,6 +16,7 @@ import pytest
 from patience import crowded
 
 from hpcclear.base.errors import InputError, StorageError
+from hpcclear.base.lock import Holder, Lock
 from hpcclear.base.outcome import (
     Status,
     failed,
@@ -25,7 +26,6 @@ from hpcclear.base.outcome import (
 )
 from hpcclear.results import files
 from hpcclear.results.checkpoint import Checkpoint, discard, unfinished
-from hpcclear.results.lock import Holder, Lock
 
 KEY = {"scene.drive.speed": "523.6", "seed": "0", "version": "0.1.0"}
 
@@ -228,7 +228,7 @@ def test_a_stale_lock_is_recognised(tmp_path, flock, stale, monkeypatch):
 
 def test_the_lock_of_a_killed_process_is_stale_even_before_it_is_reaped(tmp_path):
     code = (
-        "from pathlib import Path\nfrom hpcclear.results.lock import Lock\nimport time\n"
+        "from pathlib import Path\nfrom hpcclear.base.lock import Lock\nimport time\n"
         f"Lock(Path({str(tmp_path)!r})).acquire()\nprint('held', flush=True)\ntime.sleep(60)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:

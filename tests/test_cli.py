@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from click.testing import CliRunner
 from commands import MPIEXEC, warm
 from light import loaded_by
 from patience import crowded
 
 from hpcclear import __version__
-from hpcclear.cli import cli
+from hpcclear.cli import OLD, cli
 from hpcclear.results import dataset
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -123,10 +124,54 @@ def test_both_entry_points_give_version_and_help():
     installed = Path(sys.executable).parent / "hpcclear"
     done = subprocess.run([installed, "--version"], capture_output=True, text=True, check=True)
     assert __version__ in done.stdout
-    for command in cli.commands:
+    for command in cli.every():
         done = hpcclear(command, "--help")
         assert done.returncode == 0
         assert "Example" in done.stdout
+
+
+@pytest.mark.parametrize(("former", "words"), OLD.items())
+def test_a_former_name_of_a_command_is_one_and_is_not_listed(former, words):
+    old, new = (CliRunner().invoke(cli, [*one.split(), "--help"]) for one in (former, words))
+    assert (old.exit_code, old.output) == (new.exit_code, new.output) == (0, new.output)
+    assert f"hpcclear {words.split()[0]} " in new.output.replace("Usage: cli ", "hpcclear ")
+    assert former not in cli.every()
+    assert f"\n  {former} " not in CliRunner().invoke(cli, ["--help"]).output
+
+
+def test_words_of_a_former_name_go_to_the_command(tmp_path):
+    points = tmp_path / "points.csv"
+    points.write_text("name,x [mm],y [mm]\nO,0,0\nA,50,0\nB,150,80\nC,200,0\n")
+    made = [tmp_path / f"{name}.toml" for name in ("former", "new")]
+    said = [
+        CliRunner().invoke(cli, [*words, "--unit", "mm", str(points), str(file)])
+        for words, file in zip((["import"], ["init", "--import"]), made, strict=True)
+    ]
+    assert [one.exit_code for one in said] == [0, 0]
+    assert made[0].read_text() == made[1].read_text()
+    assert said[0].output.replace("former.toml", "new.toml") == said[1].output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["accuracy", "a.toml", "--plan", "--quick"],
+        ["accuracy", "a.toml", "-o", "a", "--error", "0.1"],
+        ["map", "a.toml", "-o", "a.nc", "--x", "C=1:2:3", "--bifurcation", "--y", "C=1:2:3"],
+        ["map", "a.toml", "-o", "a.nc", "--x", "C=1:2:3", "--section", "1"],
+        ["sample", "a.toml", "-o", "a.nc", "--merge", "--statistics"],
+        ["reproduce", "a", "--crate", "--samples", "3"],
+        ["init", "--import", "a.csv", "b.toml", "--jobs"],
+        ["init", "a.csv", "b.toml"],
+        ["init", "a.toml", "--unit", "mm"],
+        ["init", "--import", "a.csv"],
+        ["accuracy", "a.toml"],
+    ],
+)
+def test_options_of_another_mode_of_a_command_are_refused(words):
+    done = CliRunner().invoke(cli, words)
+    assert done.exit_code == 2, done.output
+    assert re.search("cannot be combined with|needs --|Missing|unexpected extra", done.output)
 
 
 @pytest.mark.parametrize(

@@ -140,9 +140,9 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path, holder, monkeypatch):
     threading.Timer(0.2, holder.kill).start()
     left = tmp_path / "code.abc.part"  # what it was writing
     left.touch()
-    descriptor = kept.lock(tmp_path / "code")
-    assert descriptor is not None
-    kept.unlock(tmp_path / "code", descriptor)
+    held = kept.lock(tmp_path / "code")
+    assert held is not None
+    kept.unlock(held)
     assert holder.wait() != 0
     assert list(tmp_path.iterdir()) == []
 

@@ -102,22 +102,22 @@ def settings(*entries: str) -> list[str]:
 
 RANKS = [str(MPIEXEC), "-n", "2"]
 COMMANDS: dict[str, tuple[list[str], list[str]]] = {
-    "laws": ([], ["laws"]),
-    "cite": ([], ["cite"]),
-    "schema": ([], ["schema"]),
+    "show laws": ([], ["show", "laws"]),
+    "show citation": ([], ["show", "citation"]),
+    "show schema": ([], ["show", "schema"]),
     "init": ([], ["init", "made.toml"]),
-    "import": ([], ["import", "points.csv", "imported.toml"]),
+    "init --import": ([], ["init", "--import", "points.csv", "imported.toml"]),
     "check": ([], ["check", "slider_crank.toml", *settings(*SHORT)]),
     "simulate": ([], ["simulate", "slider_crank.toml", "-o", "r.nc", *settings(*SHORT)]),
     "sample": (RANKS, ["sample", "quickstart.toml", "-o", "s.nc", *settings(*FEW)]),
-    "merge": ([], ["merge", "quickstart.toml", "-o", "s.nc", *settings(*FEW)]),
+    "sample --merge": ([], ["sample", "--merge", "quickstart.toml", "-o", "s.nc", *settings(*FEW)]),
     "map": (
         RANKS,
         ["map", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "m.nc", *settings(*FEW)],
     ),
-    "bifurcation": (
+    "map --bifurcation": (
         RANKS,
-        ["bifurcation", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "b.nc", *settings(*FEW)],
+        ["map", "--bifurcation", "quickstart.toml", "--x", "C=0.3mm:1mm:3", "-o", "b.nc", *settings(*FEW)],
     ),
     "wear": (RANKS, ["wear", "wear.toml", "-o", "w.nc", *settings("wear.lives=1")]),
     "effects": (
@@ -131,16 +131,24 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     ),
     "run": (RANKS, ["run", "quickstart.toml", "-o", "study"]),
     "accuracy": (RANKS, ["accuracy", "slider_crank.toml", "-o", "a", "--quick"]),
-    "plan": ([], ["plan", "quickstart.toml", *settings(*FEW)]),
+    "accuracy --plan": ([], ["accuracy", "--plan", "quickstart.toml", *settings(*FEW)]),
     "export": ([], ["export", "s.nc", "-o", "s.csv"]),
     "compare": ([], ["compare", "r.nc", "measured.csv"]),
     "plot": ([], ["plot", "r.nc", "--figure", "orbit", "-o", "o.png"]),
     "report": ([], ["report", "s.nc", "-o", "p.html"]),
     "reproduce": ([], ["reproduce", "s.nc", "--samples", "1"]),
-    "crate": ([], ["crate", "."]),
+    "reproduce --crate": ([], ["reproduce", "--crate", "."]),
 }  # fmt: skip
 """Launcher and words of each command."""
-READING = ("merge", "export", "report", "reproduce", "crate", "compare", "plot")
+READING = (
+    "sample --merge",
+    "export",
+    "report",
+    "reproduce",
+    "reproduce --crate",
+    "compare",
+    "plot",
+)
 """Commands that read results."""
 LONG = ("run", "accuracy", "identify", "effects", "wear")
 """Commands that work for minutes: they are stopped before, when everything has been started."""

@@ -96,14 +96,14 @@ def test_pictures_of_pages_are_drawn_of_their_scenes(tmp_path):
 def test_commands_and_options_that_are_named_exist(page):
     options = {
         word
-        for command in (cli, *cli.commands.values())
+        for command in (cli, *cli.every().values())
         for parameter in command.params
         if isinstance(parameter, click.Option)
         for word in parameter.opts
     }
     for text in inline(page):
         if found := re.match(r"(?:mpiexec -n \S+ )?hpcclear ([a-z]+)", text):
-            command = cli.commands[found[1]]
+            command = cli.every()[found[1]]
             known = {word for p in command.params for word in (*p.opts, *p.secondary_opts)} | {
                 "--help",
                 "-h",
@@ -218,7 +218,7 @@ def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
 @pytest.mark.nightly
 def test_the_reference_is_complete(site):
     commands = Site(site / "reference/commands/index.html").text
-    for name, command in cli.commands.items():
+    for name, command in cli.every().items():
         for parameter in command.params:
             assert all(word in commands for word in parameter.opts if word[0] == "-"), name
     files = Site(site / "reference/files/index.html").text

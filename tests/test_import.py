@@ -88,12 +88,12 @@ def test_tables_that_make_no_linkage(text, words, tmp_path):
 def test_the_command_writes_a_scene_and_a_sketch(tmp_path):
     (tmp_path / "points.csv").write_text(FOUR_BAR)
     words = [str(tmp_path / name) for name in ("points.csv", "linkage.toml")]
-    code, output = run(["import", *words, "--sketch", str(tmp_path / "sketch.png")], 0)
+    code, output = run(["init", "--import", *words, "--sketch", str(tmp_path / "sketch.png")], 0)
     assert code == 0, output
     assert "3 bodies, 4 joints" in output
     assert (tmp_path / "sketch.png").stat().st_size > 10_000
     before = (tmp_path / "linkage.toml").read_text()
-    code, _ = run(["import", *words], 0)
+    code, _ = run(["init", "--import", *words], 0)
     assert code == 2
     assert (tmp_path / "linkage.toml").read_text() == before
     code, output = run(["check", words[1], "--no-cost"], 0)

@@ -173,7 +173,9 @@ def test_names_that_a_scene_cannot_have_are_replaced_and_listed(name, tmp_path):
     )
     (tmp_path / name).write_bytes(files.KINDS[name](made))
     words = ["--unit", "mm"] if name == "successor.csv" else []
-    code, output = run(["import", str(tmp_path / name), str(tmp_path / "o.toml"), *words], 0)
+    code, output = run(
+        ["init", "--import", str(tmp_path / name), str(tmp_path / "o.toml"), *words], 0
+    )
     assert code == 0, output
     assert f"{len(made.bodies)} bodies" in output
     assert "'rocker-arm' is rocker_arm" in output

@@ -62,7 +62,7 @@ import numpy as np, hpcclear.scene
 def schema(): return {"log": float(np.log(np.zeros(1))[0]), "ratio": float((np.zeros(1) / 0.0)[0])}
 hpcclear.scene.scene_schema = schema
 from hpcclear.cli import main
-main(["schema"])
+main(["show", "schema"])
 """
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=False,

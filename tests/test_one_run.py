@@ -132,7 +132,7 @@ def planted(path: Path, **attributes: str) -> Path:
 @contextlib.contextmanager
 def locked(folder: Path, name: str) -> Iterator[None]:
     """Another process holds a lock."""
-    code = "import sys, pathlib\nfrom hpcclear.results.lock import Lock\n"
+    code = "import sys, pathlib\nfrom hpcclear.base.lock import Lock\n"
     code += (
         "Lock(pathlib.Path(sys.argv[1]), sys.argv[2]).acquire()\nprint('held', flush=True)\ninput()"
     )

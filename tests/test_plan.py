@@ -86,7 +86,9 @@ def test_a_scene_without_a_study_is_refused_with_a_remedy():
 
 
 def test_the_command_refuses_an_error_that_is_none():
-    result = CliRunner().invoke(cli, ["plan", str(JOBS / "quickstart.toml"), "--error", "0"])
+    result = CliRunner().invoke(
+        cli, ["accuracy", "--plan", str(JOBS / "quickstart.toml"), "--error", "0"]
+    )
     assert result.exit_code == 2
     assert "--error" in result.output
 

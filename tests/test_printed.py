@@ -48,7 +48,7 @@ def test_check_counts_the_ranks_that_reached_each_other():
 @pytest.mark.parametrize(
     ("words", "where", "resumes"),
     [
-        (["plan", "jobs/quickstart.toml"], "hpcclear.accuracy.plan.measure", False),
+        (["accuracy", "--plan", "jobs/quickstart.toml"], "hpcclear.accuracy.plan.measure", False),
         (["run", "jobs/quickstart.toml", "-o", "x"], "hpcclear.study.run_study", True),
     ],
 )

@@ -66,7 +66,14 @@ def test_twenty_parts_of_which_three_were_killed_are_the_bytes_of_one_run(tmp_pa
     for part in killed:
         code, text = run(sample(output, SAMPLES, "--part", str(part)), 0)
         assert code == 0, text
-    words = ["merge", str(SCENE), *overrides(*CHEAP, f"study.samples={SAMPLES}"), "-o", str(output)]
+    words = [
+        "sample",
+        "--merge",
+        str(SCENE),
+        *overrides(*CHEAP, f"study.samples={SAMPLES}"),
+        "-o",
+        str(output),
+    ]
     code, text = run(words, 0)
     assert code == 0, text
     assert output.read_bytes() == whole

@@ -131,7 +131,7 @@ def _script() -> str:
 BEFORE = [
     "call hpcclear.scene:load_scene",
     "call hpcclear.ensemble.samples:design",
-    "call hpcclear.results.lock:Lock.acquire",
+    "call hpcclear.base.lock:Lock.acquire",
     "call hpcclear.results.checkpoint:Checkpoint._open",
     "import hpcclear.ensemble.samples",
     "import hpcclear.scene",

@@ -29,7 +29,7 @@ WIDEST = 140
 
 def commands() -> Iterator[str]:
     """The `--help` of every command."""
-    for name, command in cli.commands.items():
+    for name, command in cli.every().items():
         context = click.Context(command, info_name=f"hpcclear {name}", max_content_width=88)
         yield from (f"## {name}", "", "```text", command.get_help(context), "```", "")
 

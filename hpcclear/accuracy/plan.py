@@ -1,4 +1,4 @@
-"""Error against core-hours, measured on some of the samples: what the `plan` command knows."""
+"""Error against core-hours, measured on some of the samples: what `accuracy --plan` knows."""
 
 import os
 import pickle

@@ -23,6 +23,7 @@ from numba.core.serialize import dumps
 
 from hpcclear.base import kept
 from hpcclear.base.code_folder import chosen_folder, source_key
+from hpcclear.base.lock import Lock
 from hpcclear.base.width import asked_width, features
 
 
@@ -88,7 +89,7 @@ class _Files:
     def __init__(self, usual: Any) -> None:
         self._start = Path(usual._cache_path) / str(usual._index_name).removesuffix(".nbi")
         self._of = source_key(), usual._version, usual._source_stamp
-        self._locks: dict[Path, int | None] = {}
+        self._locks: dict[Path, Lock | None] = {}
 
     def _path(self, key: Any) -> Path:
         name = kept.digest(repr((self._of, key)).encode()).hex()[:32]
@@ -115,7 +116,7 @@ class _Files:
     def release(self) -> None:
         """Let others compile, or load what was compiled."""
         while self._locks:
-            kept.unlock(*self._locks.popitem())
+            kept.unlock(self._locks.popitem()[1])
 
 
 def _compile(compiled: Any, *signature: Any) -> Any:

@@ -7,6 +7,7 @@ import os
 import platform
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 from hpcclear.base import host
@@ -107,6 +108,42 @@ class StorageError(RuntimeError):
 
     def __str__(self) -> str:
         return plain(f"cannot write {self.path}: {self.reason}. {self.remedy}")
+
+
+_USER_ERRORS = {
+    errno.EACCES: "give yourself permission to write there, or choose another place",
+    errno.EPERM: "give yourself permission to write there, or choose another place",
+    errno.EROFS: "the file system is read-only; choose another place",
+    errno.ENOENT: "make the directory first, or choose another place",
+    errno.ENOTDIR: "a part of the path is a file; choose another place",
+    errno.EISDIR: "a directory of this name is in the way; choose another name",
+    errno.ENOTEMPTY: "a directory of this name is in the way; choose another name",
+    errno.EEXIST: "a file of this name is in the way; choose another name",
+    errno.ELOOP: "a symbolic link is in the way; choose another place",
+    errno.ENAMETOOLONG: "choose a shorter name",
+}
+_DISK_ERRORS = {
+    errno.ENOSPC: "Free some space (or remove files, where there may be only so many), then run the same command again",
+    errno.EDQUOT: "Your quota is used up: free some space, then run the same command again",
+    errno.EMFILE: "Raise the limit of open files (ulimit -n), then run the same command again",
+    errno.EFBIG: "Raise the file size limit (ulimit -f), then run the same command again",
+}
+
+
+def refused(path: Path, error: OSError | ValueError) -> InputError | StorageError:
+    """What to raise for an error met while writing `path`: a wrong place or a failing disk.
+
+    A `ValueError` (a NUL character, text that no file name can be) is a wrong place.
+    """
+    if isinstance(error, ValueError):
+        return InputError(
+            "output", str(path), "the system does not allow this name", "Choose another name"
+        )
+    reason = os.strerror(error.errno) if error.errno else str(error)
+    if error.errno in _USER_ERRORS:
+        return InputError("output", str(path), reason, _USER_ERRORS[error.errno].capitalize())
+    remedy = _DISK_ERRORS.get(error.errno or 0, "Check the disk, then run the same command again")
+    return StorageError(str(path), reason, remedy + "; results written earlier are intact")
 
 
 class LimitError(RuntimeError):

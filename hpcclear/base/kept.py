@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from hpcclear.base import host
+from hpcclear.base.lock import Lock
 from hpcclear.base.plain import plain
 from hpcclear.base.remarks import remark
 
@@ -91,57 +91,43 @@ def _say(text: str) -> None:
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[None]:
     """In the block no other process makes this file; where there are no locks, or one is held too long, others may."""
-    descriptor = lock(path)
+    held = lock(path)
     try:
         yield
     finally:
-        unlock(path, descriptor)
+        unlock(held)
 
 
-def lock(path: Path) -> int | None:
+def lock(path: Path) -> Lock | None:
     """Take the lock of a file that is to be made; return what `unlock` takes, None where it cannot be had.
 
-    It ends with the process that holds it. The lock file goes first, then the lock: one who has waited looks for the
-    file that was made before making it.
+    It ends with the process that holds it. One who has waited looks for the file that was made before making it.
     """
     global _given_up
-    try:
-        descriptor = os.open(_lock_of(path), os.O_RDWR | os.O_CREAT, 0o600)
-    except OSError:
-        return None
-    began, said = time.monotonic(), False
-    try:
-        while not _given_up:
-            try:
-                host.lock_file(descriptor)
-            except BlockingIOError:
-                pass
-            else:
-                for left in path.parent.glob(f"{glob.escape(path.name)}.*.part"):
-                    left.unlink(missing_ok=True)  # by one that was killed while writing
-                return descriptor
+    wanted, began, said = _lock_of(path), time.monotonic(), False
+    with contextlib.suppress(OSError):  # no file can be made there, or the file system has no locks
+        while not wanted.take():
+            if _given_up:
+                return None
             waited = time.monotonic() - began
             if waited > SILENT and not said:
                 remark("Note: another process compiles the same code: waiting for it")
                 said = True
             _given_up = waited > PATIENCE
             time.sleep(0.05)
-    except OSError:  # a file system without locks
-        pass
-    except BaseException:
-        os.close(descriptor)
-        raise
-    os.close(descriptor)
+        with contextlib.suppress(OSError):
+            for left in path.parent.glob(f"{glob.escape(path.name)}.*.part"):
+                left.unlink()  # by one that was killed while writing
+        return wanted
     return None
 
 
-def unlock(path: Path, descriptor: int | None) -> None:
+def unlock(held: Lock | None) -> None:
     """Give back what `lock` returned."""
-    if descriptor is not None:
+    if held is not None:
         with contextlib.suppress(OSError):
-            os.unlink(_lock_of(path))
-        os.close(descriptor)
+            held.release()
 
 
-def _lock_of(path: Path) -> Path:
-    return path.with_name(f"{path.name}.lock")
+def _lock_of(path: Path) -> Lock:
+    return Lock(path.parent, f"{path.name}.lock")

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.normal import TAIL
+from hpcclear.base.quantiles import TAIL
 
 FINE = 2048
 """Pins over which the distribution of a clearance is summed."""

@@ -5,8 +5,10 @@ known to the target error.
 """
 
 import contextlib
+import importlib
 import io
 import os
+import pkgutil
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -22,54 +24,80 @@ from hpcclear.base.errors import (
     mendable,
 )
 from hpcclear.base.remarks import listen
-from hpcclear.cli import cite, ensembles, identify, laws, results, scenes, studies
-from hpcclear.cli.options import is_root, say
+from hpcclear.cli import commands
+from hpcclear.cli.options import GROUPS, Command, is_root, say
 from hpcclear.ranks.launcher import end_job, is_launched, pin_threads
 from hpcclear.ranks.stopping import Exit, StopSwitch
 
-_ROOT_ALONE = (
-    scenes.init,
-    scenes.import_,
-    scenes.simulate,
-    ensembles.merge,
-    scenes.report,
-    scenes.reproduce,
-    scenes.crate,
-    cite.cite,
-    scenes.schema,
-    laws.laws,
-    *results.COMMANDS,
+OLD = {
+    "import": "init --import",
+    "schema": "show schema",
+    "laws": "show laws",
+    "cite": "show citation",
+    "merge": "sample --merge",
+    "bifurcation": "map --bifurcation",
+    "plan": "accuracy --plan",
+    "crate": "reproduce --crate",
+}
+"""Former names of commands, not listed, and the words that stand for them."""
+
+
+class Program(click.Group):
+    """The commands: each is a file of `hpcclear.cli.commands`, loaded when it is called or listed."""
+
+    def every(self) -> dict[str, Command]:
+        """All commands by name, in the order of their groups."""
+        found = {name: _load(name) for name in _names()}
+        order = list(GROUPS)
+        return dict(sorted(found.items(), key=lambda item: order.index(item[1].group)))
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands, in the order of their groups."""
+        return list(self.every())
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> Command | None:
+        """The command of a name; None if there is none."""
+        return _load(cmd_name) if cmd_name in _names() else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The name of a command, the command and its words, from those of the program."""
+        new = OLD[args[0]].split() if args[0] in OLD else args[:1]
+        return super().resolve_command(ctx, [*new, *args[1:]])
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands, a section for each group."""
+        every = self.every()
+        for group, title in GROUPS.items():
+            rows = [
+                (name, one.short_help or "") for name, one in every.items() if one.group == group
+            ]
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+def _names() -> list[str]:
+    return sorted(one.name for one in pkgutil.iter_modules(commands.__path__))
+
+
+def _load(name: str) -> Command:
+    command: Command = importlib.import_module(f"{commands.__name__}.{name}").run
+    return command
+
+
+@click.group(
+    cls=Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
 )
-"""Commands for which no rank goes into MPI: the others have left when root begins."""
-
-_ON_RANKS = (
-    scenes.check,
-    ensembles.sample,
-    ensembles.map_command,
-    ensembles.bifurcation,
-    ensembles.wear,
-    ensembles.effects,
-    identify.identify,
-    studies.run,
-    studies.accuracy,
-    studies.plan,
-)
-
-
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="hpcclear")
 def cli() -> None:
     """Robust design of mechanisms with clearance joints.
 
     Input files (scenes) are TOML; results are NetCDF files that open in xarray. To use more than one
-    core, start sample, run, wear, map, bifurcation, effects, identify, accuracy or plan under mpiexec:
+    core, start commands of the group Compute, except simulate, under mpiexec:
 
         mpiexec -n 4 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
-
-
-for _command in (*_ROOT_ALONE, *_ON_RANKS):
-    cli.add_command(_command)
 
 
 def _check_words(words: Sequence[str]) -> None:
@@ -82,7 +110,7 @@ def _check_words(words: Sequence[str]) -> None:
 def _refused(error: click.ClickException) -> int:
     """Say what is wrong with the words of a command; ranks that got other words do not wait for this one."""
     context = getattr(error, "ctx", None)
-    if is_launched() and (context is None or context.command not in _ROOT_ALONE):
+    if is_launched() and (context is None or getattr(context.command, "ranks", True)):
         from hpcclear.ranks.boundary import refuse_together
 
         text = io.StringIO()

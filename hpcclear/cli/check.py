@@ -1,11 +1,13 @@
 """What the command `check` prints: effects, states, the study, and the measured run time of a sample."""
 
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
+from hpcclear.cli.options import place_of, show
 from hpcclear.cli.terminal import console, quantity, remark, table
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
@@ -62,6 +64,15 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     if cost and not locked:
         out.print(table("Run time of a sample on this machine", _cost_rows(scene)))
     return not locked
+
+
+def draw(scene: Scene, sketch: Path) -> None:
+    """Draw the mechanism to a file and print where it is."""
+    from hpcclear.dynamics.planar.problem import poses_at_start
+    from hpcclear.report import save, sketch_figure
+
+    poses = poses_at_start(scene, 0.0 if scene.template is None else scene.template.DRAWN_AT)
+    show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
 def turning(value: float, unit: str) -> str:
@@ -229,7 +240,9 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
         whole, each = expected(scene, evaluated, each)
     rows.append(("hpcclear sample", _all(scene.study.samples, each)))
     if whole:
-        rows.append(("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear plan"))
+        rows.append(
+            ("hpcclear run", f"about {_all(whole, each)}; more exact: hpcclear accuracy --plan")
+        )
     return rows
 
 

@@ -3,11 +3,12 @@
 import contextlib
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.core import ParameterSource
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.plain import plain
@@ -145,8 +146,28 @@ GATHERED: dict[str, Any] = {"written": Written, "how": How}
 """Arguments of commands, and what they are gathered of."""
 
 
+GROUPS = {
+    "start": "Start",
+    "compute": "Compute",
+    "look": "Look at results",
+    "keep": "Keep results",
+}
+"""Groups of commands, and their headings in `hpcclear --help`."""
+
+
 class Command(click.Command):
-    """A command that gets options which belong together as one argument."""
+    """A command: options that belong together reach it as one argument.
+
+    Attributes
+    ----------
+    group : str
+        One of `GROUPS`.
+    ranks : bool
+        Whether all ranks carry it out; otherwise only root does, and the others leave at once.
+    """
+
+    group = ""
+    ranks = True
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse words into `ctx.params`; return those that are left over."""
@@ -157,7 +178,53 @@ class Command(click.Command):
         return left
 
 
-command = functools.partial(click.command, cls=Command)
+def command(group: str, words: str, ranks: bool = False) -> Callable[[Callable[..., int]], Command]:
+    """Make a command of a function; its name is that of the function's file.
+
+    `words`: its line in the list of commands. Other arguments: see `Command`.
+    """
+
+    def declared(function: Callable[..., int]) -> Command:
+        name = function.__module__.rpartition(".")[2]
+        work = function if ranks else _of_root(function)
+        made = click.command(name, cls=Command, short_help=words)(work)
+        made.group, made.ranks = group, ranks
+        return made
+
+    return declared
+
+
+def _of_root(function: Callable[..., int]) -> Callable[..., int]:
+    """A command that one process carries out."""
+
+    @functools.wraps(function)
+    def alone(**values: object) -> int:
+        return function(**values) if is_root() else Exit.DONE
+
+    return alone
+
+
+def check_mode(
+    mode: str, chosen: bool, others: Sequence[str] = (), its_own: Sequence[str] = ()
+) -> None:
+    """Raise UsageError where options were given that a mode of a command does not use.
+
+    Parameters
+    ----------
+    mode : str
+        The flag that chooses the mode.
+    chosen : bool
+        Whether it was given.
+    others, its_own : sequence of str
+        Parameters that are of use only without the flag, and only with it.
+    """
+    context = click.get_current_context()
+    for option in context.command.params:
+        given = context.get_parameter_source(option.name or "") is ParameterSource.COMMANDLINE
+        if given and option.name in (others if chosen else its_own):
+            word = max(option.opts, key=len)
+            why = f"{word} cannot be combined with {mode}" if chosen else f"{word} needs {mode}"
+            raise click.UsageError(f"{why}.", context)
 
 
 def with_scene(function: Callable[..., int]) -> Callable[..., int]:
@@ -186,16 +253,6 @@ def check_free(path: Path) -> None:
 def is_root() -> bool:
     """Whether this process is the first of its launcher, or has none."""
     return launched_rank() in (0, None)
-
-
-def of_one_process(command: Callable[..., int]) -> Callable[..., int]:
-    """A command that one process carries out: others of its launcher leave at once."""
-
-    @functools.wraps(command)
-    def alone(**values: object) -> int:
-        return command(**values) if is_root() else Exit.DONE
-
-    return alone
 
 
 SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")

@@ -1,4 +1,4 @@
-"""The output of `plan`: cost of several errors, and the job to request."""
+"""The output of `accuracy --plan`: cost of several errors, and the job to request."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The `bifurcation` command: one entry of a scene over a range, and what the motion does once a revolution at each value."""
+"""`map --bifurcation`: one entry of a scene over a range, and what the motion does once a revolution at each value."""
 
 import time
 from collections.abc import Callable, Mapping

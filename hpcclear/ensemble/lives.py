@@ -258,10 +258,7 @@ def _exceeded(clearance: Array, limit: float) -> Iterator[tuple[str, Array]]:
     """Share of lives above a limit at each revolution and joint, and its 95 % confidence intervals."""
     total = (~np.isnan(clearance)).sum(axis=0)
     above = (clearance > limit).sum(axis=0)
-    lower, upper = np.zeros(above.shape), np.ones(above.shape)
-    for place in np.ndindex(*above.shape):
-        low, high = share_interval(above[place], int(total[place]))
-        lower[place], upper[place] = float(low), float(high)
+    lower, upper = share_interval(above, total)
     with np.errstate(invalid="ignore", divide="ignore"):
         yield "exceedance", above / total
     yield "exceedance_lower", lower

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, refused
+from hpcclear.base.lock import Lock
 from hpcclear.base.outcome import JOINTS, OUTCOME
 from hpcclear.base.plain import plain
 from hpcclear.ranks.progress import Style
@@ -33,7 +34,6 @@ from hpcclear.results.checkpoint import (
     unfinished,
 )
 from hpcclear.results.keys import check_key, key_attribute, key_of
-from hpcclear.results.lock import Lock
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
@@ -130,7 +130,7 @@ class Place:
                 directory = fresh_sibling(directory)
             directory.mkdir(exist_ok=True)
         except OSError as error:
-            raise files.refused(directory, error) from None
+            raise refused(directory, error) from None
         inside = tuple(directory / name for name in folders)
         lock = directory / ".hpcclear.lock"
         return cls(

@@ -283,8 +283,8 @@ def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
     share, low, high = above / (total - failed) if total > failed else np.nan, np.nan, np.nan
     text = f"{_percent(share)} of the samples" if total > failed else "–"
     if drawn and total > failed:
-        low = float(share_interval(np.array([above]), total)[0][0])
-        high = float(share_interval(np.array([above + failed]), total)[1][0])
+        low = float(share_interval(above, total)[0])
+        high = float(share_interval(above + failed, total)[1])
         text = f"{text} ({_percent(low)} to {_percent(high)})"
     return Line(label, text, Estimate(100.0 * share, 100.0 * low, 100.0 * high, "%"))
 

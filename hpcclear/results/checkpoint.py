@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, refused
 from hpcclear.base.outcome import JOINTS, OUTCOME, recast
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
@@ -61,7 +61,7 @@ def discard(directory: Path) -> None:
         if not any(directory.iterdir()):
             directory.rmdir()
     except OSError as error:
-        raise files.refused(directory, error) from None
+        raise refused(directory, error) from None
 
 
 @dataclass
@@ -342,7 +342,7 @@ class Checkpoint:
         try:
             yield
         except OSError as error:
-            raise files.refused(self.directory, error) from None
+            raise refused(self.directory, error) from None
 
 
 def _join(

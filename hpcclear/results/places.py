@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from hpcclear.results import files
+from hpcclear.base.errors import refused
 
 
 def parts_of(output: Path) -> Path:
@@ -29,7 +29,7 @@ def fresh_sibling(path: Path) -> Path:
             except FileExistsError:
                 pass
             except OSError as error:
-                raise files.refused(sibling, error) from None
+                raise refused(sibling, error) from None
         elif not any(os.path.lexists(place) for place in (sibling, parts_of(sibling))):
             return sibling
         number += 1

@@ -103,7 +103,7 @@ class Correlation(Table):
         list of arrays, shape (n,) each
             Those of names that are not among the inputs are what they were.
         """
-        from scipy.special import ndtr, ndtri  # as in `hpcclear.base.normal`
+        from scipy.special import ndtr, ndtri  # as in `hpcclear.base.quantiles`
 
         own = [name for name in self.inputs if name in names]
         made = list(chances)

@@ -17,7 +17,7 @@ class Contact(LawTable):
     kind: ClassVar[str] = "contact"
     formula: ClassVar[str] = "force"
     law: str
-    """Name of a law (`hpcclear laws` lists them), "module:name" of a file beside the scene, or "expression"."""
+    """Name of a law (`hpcclear show laws` lists them), "module:name" of a file beside the scene, or "expression"."""
     geometry: str | None = None
     """Geometry of the contact: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or
     "table"."""
@@ -60,7 +60,7 @@ class Friction(LawTable):
     kind: ClassVar[str] = "friction"
     formula: ClassVar[str] = "ratio"
     law: str = "none"
-    """Name of a law (`hpcclear laws` lists them), "module:name" of a file beside the scene, or "expression"."""
+    """Name of a law (`hpcclear show laws` lists them), "module:name" of a file beside the scene, or "expression"."""
     ratio: str | None = None
     """For the law "expression": friction / normal force as a function of the sliding speed v and parameters."""
     units: dict[str, str] | None = None

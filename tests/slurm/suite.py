@@ -127,9 +127,9 @@ def parts(samples: int, expected: bytes) -> None:
         "--set",
         f"study.samples={samples}",
     ]  # in the order of the parts, as files quote them
-    merge = ["hpcclear", "merge", SCENE, "-o", str(output), *settings]
+    merge = ["hpcclear", "sample", "--merge", SCENE, "-o", str(output), *settings]
     short = subprocess.run(merge, cwd=ROOT, capture_output=True, text=True, check=False)
-    expect("parts: merge names the one that is missing", "'3/4'" in short.stderr, log)
+    expect("parts: --merge names the one that is missing", "'3/4'" in short.stderr, log)
     options = (*options, "--array=3", "--export=ALL,PARTS=4")
     job = submit("sample_array.slurm", log, *words, options=options)
     wait(f"{job}_3", *ENDS, seconds=600.0)

@@ -165,4 +165,5 @@ class Compiled:
         self._call = ctypes.PYFUNCTYPE(result, *numbers)(self.address)
 
     def __call__(self, *arguments: Any) -> Any:
+        """Call it with Python's numbers, and arrays by their addresses."""
         return self._call(*flat(arguments))

@@ -74,6 +74,7 @@ class Function(Expressions):
     # ---- names ----------------------------------------------------------------------------------
 
     def read(self, name: str) -> Any:
+        """Value of a name: of a local, of the text's own names, or a builtin."""
         if name in self.slots:
             return self.builder.load(self.slots[name])
         if name in self.bound:
@@ -97,6 +98,7 @@ class Function(Expressions):
         self.builder.store(self.cast(value, kind), self.slots[name])
 
     def called(self, function: Any, arguments: list[Any]) -> Any:
+        """What another function of the text returns for these values."""
         kinds = tuple(map(kind_of, arguments))
         name, result = self._call(function, kinds)
         callee = self.module.globals.get(name) or declared(self.module, name, kinds, result)
@@ -139,6 +141,7 @@ class Function(Expressions):
             self.store(value, self.address(owner, self.index(target.slice)))
 
     def address(self, owner: Any, index: list[Any]) -> Any:
+        """Where an entry of an array stands."""
         return (
             self.place(owner, index) if isinstance(owner, Array) else self.builder.gep(owner, index)
         )

@@ -168,7 +168,7 @@ def _observed(content: xr.Dataset) -> "Figure":
     variables = labels.design_variables(content)
     if not variables or content.attrs.get("hpcclear_kind") != "bifurcation":
         reason = "the dataset is no bifurcation"
-        remedy = "Make one with hpcclear bifurcation"
+        remedy = "Make one with hpcclear map --bifurcation"
         raise InputError("kind", content.attrs.get("hpcclear_kind"), reason, remedy)
     figure, axes = style.grid(1, 1, 70.0)
     x, across = entry(variables[0])

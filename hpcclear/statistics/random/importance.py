@@ -23,7 +23,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.student import student
-from hpcclear.statistics.random.replicates import Limited, of_hits, spread
+from hpcclear.statistics.random.replicates import Limited, spread
+from hpcclear.statistics.random.survival import share_interval
 
 REPEATS = 16
 """Independent repeats, whose disagreement is the error."""
@@ -296,8 +297,8 @@ class Rare:
         one = weighted(self.f, self.weights, self.limit, confidence)
         if self.plain:
             hits = self.before[0] + int((self.f > self.limit).sum())
-            ends = of_hits(hits, self.draws, confidence)
-            one = Limited(hits / self.draws, one.shifts, *ends)
+            ends = share_interval(hits, self.draws, confidence)
+            one = Limited(hits / self.draws, one.shifts, *map(float, ends))
         if self.plain or self.known:
             upper = min(self.factor * one.upper, 1.0)
             return Limited(one.value, one.shifts, one.lower / self.factor, upper)

@@ -22,6 +22,7 @@ import scipy  # its part `special` is loaded at first use: a fifth of a start
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.student import student
+from hpcclear.statistics.random.survival import share_interval
 
 FEWEST = 4
 """Replicates, or values, from which on an error is reported."""
@@ -206,28 +207,17 @@ def _interval_of_share(
     """
     total = int(counts.sum())
     if not 0.0 < share < 1.0:
-        return of_hits(share * total, total, confidence)
+        lower, upper = share_interval(share * total, total, confidence)
+        return float(lower), float(upper)
     # between two values nothing is known
     error = np.hypot(float(spread(shifts[None])[0]), 0.5 / total)
     # as many independent draws, fewer for an error of few degrees of freedom
     worth = (student(confidence, total - 1) / student(confidence, int((counts > 0).sum()) - 1)) ** 2
     draws = share * (1.0 - share) / error**2 * worth
-    tails = ((1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0)
     hits = share * draws
+    tails = ((1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0)
     lower, upper = scipy.special.betaincinv(hits + 0.5, draws - hits + 0.5, tails)
     return float(lower), float(upper)
-
-
-def of_hits(hits: float, draws: float, confidence: float) -> tuple[float, float]:
-    """Interval of a probability, at a two-sided confidence, from so many hits of independent draws (Clopper and Pearson)."""
-    tail = (1.0 - confidence) / 2.0
-    lower = float(scipy.special.betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
-    upper = (
-        float(scipy.special.betaincinv(hits + 1.0, draws - hits, 1.0 - tail))
-        if hits < draws
-        else 1.0
-    )
-    return lower, upper
 
 
 def surely_less(values: Array, shifts: Array, confidence: float) -> Booleans:

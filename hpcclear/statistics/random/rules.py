@@ -17,8 +17,7 @@ from scipy.special import ndtr, roots_legendre
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.base.normal import TAIL, truncated_quantile
-from hpcclear.base.quantiles import Normal, Quantiles, Samples, Uniform
+from hpcclear.base.quantiles import TAIL, Normal, Quantiles, Samples, Uniform, truncated_quantile
 
 FINE = 400
 """Nodes of the inner products that define rules, and steps of a quantile function."""

@@ -5,24 +5,36 @@ Biometrika 26 (1934), doi:10.1093/biomet/26.4.404.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array
 
 CONFIDENCE = 0.95
 
 
-def share_interval(count: Integers, total: int) -> tuple[Array, Array]:
-    """Clopper and Pearson's 95 % confidence interval of a probability, from `count` (n,) of `total`; 0 and 1 of none."""
+def share_interval(
+    hits: ArrayLike, draws: ArrayLike, confidence: float = CONFIDENCE
+) -> tuple[Array, Array]:
+    """Return Clopper and Pearson's confidence interval of a probability; 0 and 1 without draws.
+
+    Parameters
+    ----------
+    hits, draws : array_like of any shape
+        Independent draws, `hits` of which met the event; neither need be whole.
+    confidence : float
+        Two-sided.
+
+    Returns
+    -------
+    lower, upper : arrays of the shape of `hits`
+    """
     from scipy.special import betaincinv  # a fifth of a second, and pages need the quantiles alone
 
-    count = np.asarray(count)
-    if total == 0:
-        return np.zeros(count.shape), np.ones(count.shape)
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    rest = total - count
-    lower = betaincinv(np.maximum(count, 1), rest + 1, tail)
-    upper = betaincinv(count + 1, np.maximum(rest, 1), 1.0 - tail)
-    return np.where(count > 0, lower, 0.0), np.where(rest > 0, upper, 1.0)
+    hit = np.asarray(hits, dtype=float)
+    rest, tail = np.asarray(draws) - hit, 0.5 * (1.0 - confidence)
+    lower = betaincinv(np.where(hit > 0, hit, 1.0), rest + 1.0, tail)
+    upper = betaincinv(hit + 1.0, np.where(rest > 0, rest, 1.0), 1.0 - tail)
+    return np.where(hit > 0, lower, 0.0), np.where(rest > 0, upper, 1.0)
 
 
 def quantiles(values: Array, levels: Array) -> Array:

@@ -1,9 +1,12 @@
-"""One run at a time in a results directory: a lock that names its holder and outlives no dead one.
+"""Locks: one run at a time in a results directory, one process at a time that compiles a function.
 
-The lock is a file with the holder's host, process and batch job. While the holder lives, the
-operating system also holds an advisory lock on that file (flock), which no crash can leave behind;
-it alone decides between runs that start at the same instant. On file systems without flock the
+The lock is a file. While its holder lives, the operating system holds an advisory lock on that file (flock), which no crash
+can leave behind. The lock of a run also names its holder: host, process and batch job. On file systems without flock the
 exclusive creation of the file decides, and what it says about its holder.
+
+The package filelock (4.3.1) judges dead holders too, by host, process and boot, but knows no batch jobs: a lock of another
+host is never free. Its lock by flock names no holder, and does without flock for ENOSYS alone. Loading it takes 0.055 s of
+processor time, a third of `hpcclear --help`.
 """
 
 import errno
@@ -11,14 +14,12 @@ import json
 import os
 import secrets
 import socket
-import subprocess
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Self
 
 from hpcclear.base import host
-from hpcclear.base.errors import InputError
-from hpcclear.results.files import refused
+from hpcclear.base.errors import InputError, refused
 
 _NO_FLOCK = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
 _ATTEMPTS = 100  # of taking a lock that others keep releasing in between
@@ -110,6 +111,8 @@ def _job_is_over(job: str) -> bool:
     """Whether Slurm says that the job is not waiting and not running; False without an answer."""
     if not job.isdecimal():
         return False
+    import subprocess
+
     command = ["squeue", "--noheader", "--format=%T", "--jobs", job]
     try:
         answer = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
@@ -121,7 +124,7 @@ def _job_is_over(job: str) -> bool:
 
 
 class Lock:
-    """A context in which no other run works on a directory.
+    """A lock file in a directory; as a context, one in which no other run works there.
 
     Parameters
     ----------
@@ -192,6 +195,26 @@ class Lock:
                 if self._descriptor != descriptor:
                     os.close(descriptor)
         raise self._refusal(None)
+
+    def take(self) -> bool:
+        """Take the lock without a name if no process holds it at this moment; return whether it was free.
+
+        Raises
+        ------
+        OSError
+            The file cannot be made, or its file system has no such locks.
+        """
+        descriptor = os.open(self.path, host.flags("O_RDWR", "O_NOFOLLOW", "O_CREAT"), 0o600)
+        try:
+            host.lock_file(descriptor)
+            if self._is_current(descriptor):
+                self._descriptor = descriptor
+        except BlockingIOError:
+            pass
+        finally:
+            if self._descriptor is None:
+                os.close(descriptor)
+        return self._descriptor is not None
 
     def release(self) -> None:
         """Give the lock back; nothing happens when it is not held."""

@@ -1,11 +1,54 @@
-"""The command `laws`: what laws, objectives and other plug-ins there are, with their parameters and sources."""
+"""`show`: what a scene may name, the schema of scene files, how to cite."""
 
 from typing import Any
 
 import click
 
-from hpcclear.cli.options import of_one_process, show
+from hpcclear import __version__
+from hpcclear.cli.options import command, show
 from hpcclear.ranks.stopping import Exit
+
+
+@command("start", "Show laws, the schema of scene files, or how to cite.")
+@click.argument("what", type=click.Choice(["laws", "schema", "citation"]))
+def run(what: str) -> int:
+    """Show what this version knows.
+
+    laws: laws, geometries of contact, objectives, distributions, surrogates and searches that a scene may name, those of
+    installed packages too; laws with formula, parameters, units, bounds, range and source. To write your own, see
+    docs/extending.md.
+
+    schema: the JSON schema of scene files, for editors.
+
+    citation: BibTeX entries of this version and of the paper whose method it implements.
+
+    Example: hpcclear show citation > hpcclear.bib
+    """
+    {"laws": _laws, "schema": _schema, "citation": _citation}[what]()
+    return Exit.DONE
+
+
+def _schema() -> None:
+    import json
+
+    from hpcclear.scene import scene_schema
+
+    show(json.dumps(scene_schema(), indent=2))
+
+
+PROGRAM = f"""@software{{hpcclear,
+  author  = {{{{The hpcclear developers}}}},
+  title   = {{hpcclear: MPI-parallel robust design of mechanisms with clearance joints}},
+  version = {{{__version__}}},
+  license = {{BSD-3-Clause}},
+}}"""
+
+
+def _citation() -> None:
+    from hpcclear.scene.citation import BIBTEX
+
+    show(f"{PROGRAM}\n\n{BIBTEX}")
+
 
 _TITLES = {
     "contact": "effects.contact.law (normal force)",
@@ -14,17 +57,16 @@ _TITLES = {
     "film": "film.model of a joint with clearance (oil films)",
 }
 
+_OTHERS = {
+    "study.objective": "OBJECTIVES",
+    "study.random.*.distribution": "DISTRIBUTIONS",
+    "study.surrogate.model": "SURROGATES",
+    "study.swarm.algorithm": "SEARCHES",
+}
+"""Registries by the entries that name what is in them."""
 
-@click.command(short_help="List laws, objectives and other plug-ins, with their sources.")
-@of_one_process
-def laws() -> int:
-    """List what a scene may name: laws, geometries of contact, objectives, distributions, surrogates and searches.
 
-    Laws are listed with formula, parameters, units, bounds, range and source, those of installed packages too.
-    To write your own, see docs/extending.md.
-
-    Example: hpcclear laws
-    """
+def _laws() -> None:
     from hpcclear import plugins
     from hpcclear.cli.terminal import console, table
     from hpcclear.scene.laws import known_laws
@@ -38,16 +80,6 @@ def laws() -> int:
             console().print(table(name, list(_rows(law, origin))))
     for place, others in _OTHERS.items():
         _list(place, getattr(plugins, others))
-    return Exit.DONE
-
-
-_OTHERS = {
-    "study.objective": "OBJECTIVES",
-    "study.random.*.distribution": "DISTRIBUTIONS",
-    "study.surrogate.model": "SURROGATES",
-    "study.swarm.algorithm": "SEARCHES",
-}
-"""Registries by the entries that name what is in them."""
 
 
 def _list(place: str, registry: Any) -> None:

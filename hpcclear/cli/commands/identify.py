@@ -1,4 +1,4 @@
-"""The command `identify` and what it prints: unknowns with their intervals, the fit, growth, and what to measure."""
+"""`identify`: unknowns with their intervals, the fit, growth, and what to measure."""
 
 import sys
 from pathlib import Path
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
 
 
-@command(short_help="Identify clearances from a measured signal.")
+@command("compute", "Identify clearances from a measured signal.", ranks=True)
 @with_scene
 @output_option("NetCDF file to write.")
 @click.option(
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     help="Simulations, rounded up to a power of two. By default 256, doubled by each further unknown.",
 )  # fmt: skip
 @with_how
-def identify(written: Written, output: Path, how: How, **settings: Any) -> int:
+def run(written: Written, output: Path, how: How, **settings: Any) -> int:
     """Identify unknown clearances from a measured signal, with calibrated intervals.
 
     Random inputs of the scene's study are unknown too, within their distributions. Exit code 4 if the model does not

@@ -1,0 +1,106 @@
+"""`accuracy`: what accuracy costs in time, measured in full, or estimated for the job of a run."""
+
+from pathlib import Path
+
+import click
+
+from hpcclear.cli.options import (
+    FRESH,
+    LIMIT,
+    PATH,
+    Amount,
+    Written,
+    check_mode,
+    command,
+    flag,
+    on_ranks,
+    place_of,
+    remarked,
+    say,
+    with_scene,
+)  # fmt: skip
+from hpcclear.ranks.stopping import Exit
+
+
+@command("compute", "Plot accuracy against run time; plan the job of a run.", ranks=True)
+@with_scene
+@click.option("-o", "--output", type=PATH, help="Directory for accuracy.nc and the figures.")
+@flag("--quick", "Measure with fewer points, in about a minute.")
+@FRESH
+@LIMIT
+@flag("--plan", "Estimate core-hours and wall time of a run instead, and print its Slurm options.")
+@click.option(
+    "--error",
+    type=Amount(0.0, 0.5, min_open=True),
+    metavar="RELATIVE",
+    help="With --plan, target error of the objective, relative. By default the settings of the file are used.",
+)
+@click.option(
+    "--ranks",
+    "workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="With --plan, number of ranks to plan for. By default those of this run.",
+)
+def run(
+    written: Written,
+    output: Path | None,
+    quick: bool,
+    fresh: bool,
+    time_limit: float | None,
+    plan: bool,
+    error: float | None,
+    workers: int | None,
+) -> int:
+    """Plot accuracy against run time, for each setting that costs time: tolerance, revolutions, points of the surrogate,
+    Monte Carlo samples and number of ranks.
+
+    Each figure is written as soon as its panel is measured. After a stop the same command resumes.
+
+    With --plan, estimate core-hours and wall time of a run from a few measured samples; no file is written.
+
+    Example: mpiexec -n 2 hpcclear accuracy jobs/slider_crank.toml -o results/accuracy --quick
+
+    Example: hpcclear accuracy jobs/quickstart.toml --plan --error 1e-3 --ranks 16
+    """
+    check_mode("--plan", plan, ("output", "quick", "fresh", "time_limit"), ("error", "workers"))
+    if plan:
+        _plan(written, error, workers)
+    elif output is None:
+        raise click.UsageError("Missing option '-o' / '--output'.", click.get_current_context())
+    else:
+        _measure(written, output, quick, fresh, time_limit)
+    return Exit.DONE
+
+
+def _measure(
+    written: Written, output: Path, quick: bool, fresh: bool, time_limit: float | None
+) -> None:
+    with on_ranks(time_limit) as ranks:
+        from hpcclear.accuracy.profile import PROFILES
+        from hpcclear.accuracy.run import run_accuracy
+        from hpcclear.cli.accuracy import describe
+        from hpcclear.ensemble.session import Options
+        from hpcclear.scene import load_scene
+
+        def notify(text: str) -> None:
+            say(f"accuracy: {text}")
+
+        profile = PROFILES["quick" if quick else "full"]
+        scene, place = remarked(load_scene(*written)), place_of(output)
+        describe(*run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh)))
+
+
+def _plan(written: Written, error: float | None, workers: int | None) -> None:
+    with on_ranks(resumes=False) as ranks:
+        from hpcclear.accuracy.plan import ladder, measure
+        from hpcclear.cli.plan import describe, preview
+        from hpcclear.scene import load_scene
+
+        planned = ranks.size if workers is None else workers
+        scene = remarked(load_scene(*written))
+        made = measure(
+            scene, ranks, ladder(scene, error), planned, say,
+            lambda plan: say(preview(plan, planned)), "auto",
+        )  # fmt: skip
+        describe(made, str(written.file), error, planned)

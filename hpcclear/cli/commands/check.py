@@ -1,0 +1,50 @@
+"""`check`: whether a scene is valid, what would be simulated, and how long a sample takes."""
+
+import contextlib
+import sys
+from pathlib import Path
+
+import click
+
+from hpcclear.cli.options import PATH, Written, command, on_ranks, with_scene
+from hpcclear.ranks.launcher import is_launched
+from hpcclear.ranks.stopping import Exit
+
+
+@command("start", "Validate an input file and estimate run time.", ranks=True)
+@with_scene
+@click.option("--cost/--no-cost", default=True, help="Simulate one sample and report its run time.")
+@click.option(
+    "--sketch",
+    type=PATH,
+    metavar="FIGURE",
+    help="Draw the mechanism with names, axes and signs to this file (png, svg, pdf).",
+)
+def run(written: Written, cost: bool, sketch: Path | None) -> int:
+    """Validate an input file and estimate run time.
+
+    If the design in the file cannot turn, the exit code is 1 if the study varies its geometry, and 2 otherwise.
+    Under mpiexec or srun the command also tests that all ranks connect: exit code 2 if the launcher belongs to another MPI.
+
+    Example: hpcclear check jobs/slider_crank.toml --no-cost --sketch sketch.png
+    """
+
+    from hpcclear.ranks.boundary import alone
+
+    launched = is_launched()
+    with (
+        on_ranks(ahead=(), resumes=False) if launched else contextlib.nullcontext(alone()) as ranks
+    ):
+        from hpcclear.scene import load_scene
+
+        scene = load_scene(*written)
+        from hpcclear.cli.check import describe_scene, draw  # not for a scene that is refused
+
+        turns = describe_scene(scene, cost, ranks)
+        if scene.study is not None and scene.study.variables:
+            from hpcclear.cli.corners import describe
+
+            describe(scene, cost)
+        if sketch is not None:
+            draw(scene, sketch)
+        sys.exit(Exit.DONE if turns else Exit.FAILED)

@@ -1,0 +1,90 @@
+"""`compare`: a response beside measurements."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcclear.cli.options import PATH, command, place_of, show
+from hpcclear.ranks.stopping import Exit
+
+if TYPE_CHECKING:
+    from hpcclear.report.compare import Quantity
+
+
+@command("look", "Compare a response with measurements.")
+@click.argument("file", type=PATH)
+@click.argument("measured", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Draw both to this file (png, svg, pdf).")
+@click.option(
+    "--align",
+    type=click.Choice(["auto", "angle", "correlation", "none"]),
+    default="auto",
+    show_default=True,
+    help="Alignment in phase. By default by angle if the table has one, else by the largest correlation.",
+)
+@click.option(
+    "--name",
+    "names",
+    multiple=True,
+    metavar="COLUMN=QUANTITY",
+    help="Quantity of the response that a column measures. Repeatable. By default columns have the names of quantities.",
+)
+def run(file: Path, measured: Path, output: Path | None, align: Any, names: tuple[str, ...]) -> int:
+    """Compare a response with measured series (CSV, xlsx); print error norms in the units of the measurement.
+
+    The first column is time or crank_angle, the others are quantities as exported tables name them, such as
+    "contact_force crank_rod [kN]". The averaged revolutions are repeated
+    periodically and compared with the measurement.
+
+    Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
+    """
+    from hpcclear.cli.terminal import console, table
+    from hpcclear.report.compare import NOT_ALIGNED, compare
+    from hpcclear.results import dataset
+
+    pairs = (one.rpartition("=")[::2] for one in names)
+    chosen = {column.strip(): quantity.strip() for column, quantity in pairs}
+    found = compare(dataset.read(file, "response"), measured, align, chosen)
+    out = console()
+    angular = found.axis == "angle"
+    moved = f"{math.degrees(found.shift):.4g} deg" if angular else f"{found.shift:.6g} s"
+    picked = "as it stands" if found.aligned == NOT_ALIGNED else "the one that correlates best"
+    rows = [
+        ("measured points", str(len(found.x))),
+        ("aligned", f"{found.aligned}, shifted by {moved}"),
+        ("simulated revolutions", f"{found.revolutions} averaged ones, repeated periodically"),
+        ("first point", f"in revolution {found.revolution} of these, {picked}"),
+    ]
+    out.print(table("Comparison", rows))
+    for one in found.quantities:
+        out.print(table(one.name, _norms(one)))
+    if output is not None:
+        from hpcclear.report import overlay_figure, save
+
+        show(f"figure   {save(overlay_figure(found), place_of(output))}")
+    return Exit.DONE
+
+
+def _norms(one: "Quantity") -> list[tuple[str, str]]:
+    """Error norms of a quantity in the unit of its measurement."""
+    from hpcclear.report.figures.compared import scale
+
+    unit, norms = scale(one.shown, one.unit), one.norms
+
+    def shown(name: str) -> str:
+        return f"{norms[name] * unit.factor:+.4g} {unit.unit}"
+
+    least, most = (pick(one.by_revolution) * unit.factor for pick in (min, max))
+    return [
+        (
+            "RMS error",
+            f"{shown('rms').lstrip('+')}, {norms['relative_rms']:.3g} of the measured RMS",
+        ),
+        ("RMS error by revolution", f"{least:.4g} to {most:.4g} {unit.unit}"),
+        ("largest error", shown("largest").lstrip("+")),
+        ("error of the mean", shown("mean")),
+        ("error of the peak", f"{shown('peak')} at the measured points"),
+        ("correlation coefficient", f"{norms['correlation']:.4f}"),
+    ]

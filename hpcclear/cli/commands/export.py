@@ -1,0 +1,84 @@
+"""`export`: a result as a table."""
+
+from pathlib import Path
+
+import click
+
+from hpcclear.base.errors import InputError
+from hpcclear.cli.options import PATH, command, directory_option, flag, place_of, say, show
+from hpcclear.ranks.stopping import Exit
+
+
+@command("keep", "Write results as a table for Excel, MATLAB or pandas.")
+@click.argument("files", type=PATH, nargs=-1, required=True, metavar="FILE...")
+@directory_option("Table to write: its name ends in .csv, .xlsx, .mat or .parquet.")
+@click.option(
+    "--unit",
+    "units",
+    multiple=True,
+    metavar="UNIT",
+    help='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
+)
+@flag(
+    "--statistics",
+    "Write statistics of samples instead: for each file columns of value and interval.",
+)
+@click.option(
+    "--beyond",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="With --statistics, share of samples beyond this value. Repeatable.",
+)
+def run(
+    files: tuple[Path, ...],
+    output: Path,
+    units: tuple[str, ...],
+    statistics: bool,
+    beyond: tuple[str, ...],
+) -> int:
+    """Write a result file as a table: one row per design or instant, joints as columns.
+
+    Headings are names with units. Quantities have the units that the scene file uses, otherwise SI units.
+    With --statistics, the table compares several samples, such as those of several fits.
+
+    Example: hpcclear export results/samples.nc -o results/samples.xlsx
+    """
+    from hpcclear.report import export as writing
+    from hpcclear.report.spread import rows_of, side_by_side
+
+    writing.check_format(output)
+    if statistics:
+        samples = writing.read_samples(files)
+        lines = side_by_side(samples, beyond)
+        table = writing.statistics(samples, place_of(output), lines, units)
+        _print_rows(["statistic", *samples], rows_of(lines))
+    else:
+        _check_one(files, beyond)
+        table = writing.export(files[0], place_of(output), units)
+        for name in table.attrs["left_out"]:
+            say(f"Note: {name} is left out: it has too many columns. It stands in {files[0]}")
+    show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
+    return Exit.DONE
+
+
+def _check_one(files: tuple[Path, ...], beyond: tuple[str, ...]) -> None:
+    if len(files) > 1 or beyond:
+        reason = "a table holds one result"
+        raise InputError(
+            "export", f"{len(files)} files", reason, "Add --statistics, or export each by itself"
+        )
+
+
+def _print_rows(headings: list[str], rows: list[list[str]]) -> None:
+    """Print a table of texts, its columns as wide as the terminal allows."""
+    from rich import box
+    from rich.table import Table
+
+    from hpcclear.cli.terminal import console
+
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in headings:
+        made.add_column(heading, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    console().print(made)

@@ -1,0 +1,107 @@
+"""`map`: periodic and chaotic motion over parameters, and bifurcation diagrams."""
+
+from pathlib import Path
+
+import click
+
+from hpcclear.cli.options import (
+    How,
+    Written,
+    check_mode,
+    command,
+    flag,
+    on_ranks,
+    output_option,
+    place_of,
+    remarked,
+    with_how,
+    with_scene,
+)  # fmt: skip
+from hpcclear.ranks.stopping import Exit
+
+
+@command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
+@with_scene
+@output_option("NetCDF file to write.")
+@click.option(
+    "--x",
+    "x",
+    required=True,
+    metavar="PATH=LO:HI:N",
+    help="First parameter: scene entry, bounds, number of cells.",
+)
+@click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second parameter.")
+@flag("--bifurcation", "Observe one value of each revolution instead, for a bifurcation diagram.")
+@click.option(
+    "--observe",
+    "name",
+    default="objective",
+    show_default=True,
+    metavar="SERIES",
+    help='With --bifurcation, series of a response, taken at the section: "contact_force crank_rod". With max, min or mean '
+    'before it, that value of each revolution: "max contact_force crank_rod".',
+)
+@click.option(
+    "--section",
+    default="0 deg",
+    show_default=True,
+    metavar="ANGLE",
+    help="Crank angle at which the series is taken, in rad or with a unit.",
+)
+@click.option(
+    "--transient",
+    type=click.IntRange(min=0),
+    default=60,
+    show_default=True,
+    help="Revolutions before the first one that is observed.",
+)
+@click.option(
+    "--revolutions",
+    type=click.IntRange(min=1),
+    default=60,
+    show_default=True,
+    help="Revolutions that are observed.",
+)
+@with_how
+def run(
+    written: Written,
+    output: Path,
+    x: str,
+    y: str | None,
+    bifurcation: bool,
+    name: str,
+    section: str,
+    transient: int,
+    revolutions: int,
+    how: How,
+) -> int:
+    """Map periodic and chaotic motion over one or two entries of the scene.
+
+    Each cell has the largest Lyapunov exponent per revolution, the period, the number of different
+    motions reached from several starts, and f with its half-width.
+
+    With --bifurcation, one value of each revolution is observed over a range of one entry. If the motion repeats every
+    n revolutions, the diagram has n dots at that value. hpcclear plot draws it.
+
+    Example: mpiexec -n 2 hpcclear map jobs/hunt_crossley.toml --x C=0.1mm:1mm:40 -o results/map.nc
+
+    Example: mpiexec -n 2 hpcclear map jobs/hunt_crossley.toml --bifurcation --x drive.speed="500 rpm:6000 rpm:12"
+    -o results/b.nc
+    """
+    observing = ("name", "section", "transient", "revolutions")
+    check_mode("--bifurcation", bifurcation, ("y",), observing)
+    with on_ranks(how.time_limit) as ranks:
+        from hpcclear.cli.printing import describe_bifurcation, describe_map
+        from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
+        from hpcclear.ensemble.maps import number_of, run_map
+        from hpcclear.scene import load_scene
+
+        if bifurcation:
+            seen = Observation(name, number_of("--section", section, "rad"), transient, revolutions)
+            scene, place = remarked(load_scene(*written)), place_of(output)
+            describe_bifurcation(run_bifurcation(scene, x, place, ranks, seen, how.options()))
+        else:
+            axes = (x,) if y is None else (x, y)
+            scene = remarked(load_scene(*written))
+            describe_map(run_map(scene, axes, place_of(output), ranks, how.options()))
+    return Exit.DONE

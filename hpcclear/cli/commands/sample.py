@@ -1,0 +1,128 @@
+"""`sample`: many designs of a scene, in parts as well."""
+
+from pathlib import Path
+
+import click
+
+from hpcclear.base.errors import InputError
+from hpcclear.cli.options import (
+    PATH,
+    POINTS,
+    How,
+    Written,
+    check_mode,
+    command,
+    flag,
+    is_root,
+    on_ranks,
+    output_option,
+    place_of,
+    remarked,
+    with_how,
+    with_scene,
+)  # fmt: skip
+from hpcclear.ranks.stopping import Exit
+
+
+@command("compute", "Simulate many designs.", ranks=True)
+@with_scene
+@output_option("NetCDF file to write.")
+@POINTS
+@flag(
+    "--statistics",
+    "Keep mean, standard deviation and histogram of Monte Carlo samples instead of the samples.",
+)
+@click.option(
+    "--raw",
+    type=PATH,
+    help="With --statistics: keep the samples too, in this directory. Open its samples.nc to read all of them.",
+)
+@click.option(
+    "--part",
+    metavar="K/N",
+    help="Simulate part K of N, for a job array. Each part has its own file; --merge joins them.",
+)
+@flag("--merge", "Merge the files of all parts into one, equal to the file of a single run.")
+@click.option(
+    "--beyond",
+    "thresholds",
+    multiple=True,
+    metavar="[RESULT=]VALUE",
+    help='Print the share of samples above this value of f, or of a result: "peak_contact_force=3 kN". Repeatable.',
+)
+@with_how
+def run(
+    written: Written,
+    output: Path,
+    points: Path | None,
+    thresholds: tuple[str, ...],
+    statistics: bool,
+    raw: Path | None,
+    part: str | None,
+    merge: bool,
+    how: How,
+) -> int:
+    """Simulate the designs of the study, or those of a table (--points).
+
+    With --merge, give the same scene, --set, --points and -o as for the parts. The parts are kept; missing parts are listed.
+
+    Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
+    """
+    if merge:
+        simulating = ("thresholds", "statistics", "raw", "part", *How._fields)
+        check_mode("--merge", True, simulating)
+        return _merge(written, output, points) if is_root() else Exit.DONE
+    with on_ranks(how.time_limit) as ranks:
+        _check_kind(points, statistics, raw, part, how.fresh, thresholds)
+        from hpcclear.cli.printing import describe_samples, describe_statistics
+        from hpcclear.ensemble.samples import run_sample
+        from hpcclear.ensemble.split import Part
+        from hpcclear.ensemble.statistics import run_statistics
+        from hpcclear.report.spread import beyond, units_of
+        from hpcclear.scene import load_scene
+
+        chosen = None if part is None else Part.parse(part)
+        scene, place = remarked(load_scene(*written)), place_of(output)
+        units, joints = units_of(scene.objective), scene.joint_labels
+        levels = [beyond(units, words, joints) for words in thresholds]
+        if statistics:
+            kept = None if raw is None else place_of(raw)
+            describe_statistics(
+                run_statistics(scene, place, ranks, raw=kept, options=how.options())
+            )
+        else:
+            found = run_sample(
+                scene, place, ranks, table=points, part=chosen, options=how.options()
+            )
+            describe_samples(found, levels)
+    return Exit.DONE
+
+
+def _merge(written: Written, output: Path, points: Path | None) -> int:
+    from hpcclear.cli.printing import describe_samples
+    from hpcclear.ensemble.samples import design, run_merge
+    from hpcclear.ranks.boundary import alone
+    from hpcclear.scene import load_scene
+
+    scene = remarked(load_scene(*written))
+    describe_samples(run_merge(scene, design(scene, points), output, alone()))
+    return Exit.DONE
+
+
+def _check_kind(
+    points: Path | None, statistics: bool, raw: Path | None, part: str | None, fresh: bool,
+    thresholds: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Raise InputError where options name two kinds of sampling at once."""
+    if part is not None and (statistics or fresh):
+        reason = "a part of a job array writes its samples for a later merge"
+        raise InputError("--part", part, reason, "Drop --statistics and --fresh")
+    if statistics and points is not None:
+        reason = "--statistics generates the study's Monte Carlo points itself"
+        raise InputError("--points", str(points), reason, "Drop one of the two")
+    if thresholds and statistics:
+        reason = "--statistics keeps a histogram and no samples"
+        raise InputError("--beyond", ", ".join(thresholds), reason, "Drop one of the two")
+    if raw is not None and not statistics:
+        reason = "without --statistics the samples are written anyway"
+        raise InputError("--raw", str(raw), reason, "Drop it, or add --statistics")
