@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+import opened
 import xarray as xr
 from scipy import stats
 from test_report import Tree
@@ -13,7 +14,6 @@ from test_report import Tree
 from hpcclear.base.arrays import Array
 from hpcclear.report.html.page import write_report
 from hpcclear.report.scatter import HALF_WIDTH
-from hpcclear.results import dataset
 
 NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(?:e([-+]?\d+))?(?![\w.]*\d)")
 TELLING = 3
@@ -123,7 +123,7 @@ def _loads(content: xr.Dataset) -> Iterator[float]:
 
 
 def contents(place: Path) -> list[xr.Dataset]:
-    return [dataset.read(path) for path in sorted(place.rglob("*.nc"))]
+    return [opened.read(path) for path in sorted(place.rglob("*.nc"))]
 
 
 def shown(place: Path) -> str:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 import xarray as xr
@@ -48,7 +49,7 @@ def verified(mean, deviation, half=1e-6, **more):
         "deviation_lower": deviation - half,
         "deviation_upper": deviation + half,
     }
-    return dataset.dataset("verification", {"design": np.array(NAMES)}, columns | more)
+    return dataset.dataset("verification", {"design": np.array(NAMES)}, columns | more).to_xarray()
 
 
 MEAN = [4e-4, 2e-4, 3e-4, 2.015e-4, 1e-4]
@@ -198,7 +199,7 @@ def test_the_answer_stands_on_top_of_the_page(tmp_path):
 @pytest.mark.parametrize(("least", "words"), [(1.9e-5, True), (2.1e-5, False)])
 def test_the_least_deviation_is_told_as_far_as_limits_tell(tmp_path, least, words):
     """A design within beta's limits has less; beta is the best of these in the other, and the page says so."""
-    dataset.write(verified(MEAN, [*DEVIATION[:3], least, 1e-5]), tmp_path / "verification.nc")
+    opened.write(verified(MEAN, [*DEVIATION[:3], least, 1e-5]), tmp_path / "verification.nc")
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert (
         "lowest standard deviation of f of all simulated designs (or is statistically indistinguishable from the lowest)"

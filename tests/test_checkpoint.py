@@ -16,6 +16,7 @@ from multiprocessing.context import BaseContext
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import xarray as xr
 from patience import crowded
@@ -318,8 +319,8 @@ def test_another_run_is_refused_with_the_differing_keys(tmp_path):
 
 def test_final_files_carry_the_key_too(tmp_path):
     final = dataset.samples_dataset([], np.empty((3, 0)), {}, outcomes(0, 3), key_attribute(KEY))
-    dataset.write(final, tmp_path / "x.nc")
-    found = dataset.read(tmp_path / "x.nc")
+    opened.write(final, tmp_path / "x.nc")
+    found = opened.read(tmp_path / "x.nc")
     check_key(found, dict(reversed(KEY.items())), tmp_path / "x.nc")
     with pytest.raises(InputError, match="version"):
         check_key(found, {**KEY, "version": "0.2.0"}, tmp_path / "x.nc")
@@ -410,7 +411,7 @@ def work(folder: str, safe: Connection) -> None:
         done += 4
         final = checkpoint.completed()
         content = dataset.samples_dataset(["m2"], np.ones((len(final), 1)), {}, final)
-        dataset.write(content, root / "final.nc")
+        opened.write(content, root / "final.nc")
         checkpoint.save_stage("fit", {"x": np.full(1000, done)})
 
 

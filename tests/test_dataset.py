@@ -11,6 +11,7 @@ from pathlib import Path
 import cf_xarray.units
 import h5py
 import numpy as np
+import opened
 import pint
 import pint_xarray  # noqa: F401
 import pytest
@@ -22,6 +23,7 @@ from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.objectives import MEAN_GAP, ORDINALS
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status, failed, record_type
 from hpcclear.results import dataset, files, netcdf
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.results.provenance import provenance
 
@@ -50,7 +52,7 @@ def samples(n: int = 9) -> xr.Dataset:
     values = np.random.default_rng(1).random((n, 3))
     names, units = ["m2", "C", "mechanism.rod.length"], {"mechanism.rod.length": "m"}
     made_by = provenance(SCENE, HASH)
-    return dataset.samples_dataset(names, values, units, outcomes(n), made_by)
+    return dataset.samples_dataset(names, values, units, outcomes(n), made_by).to_xarray()
 
 
 def example(kind: str) -> xr.Dataset:
@@ -78,7 +80,7 @@ def example(kind: str) -> xr.Dataset:
         data["m2"] = np.ones(tuple(sizes[dim] for dim in table.design_dims))
     if table.limit_dims is not None:
         data["m2_lower"] = np.zeros(tuple(sizes[dim] for dim in table.limit_dims))
-    return dataset.dataset(kind, coords, data, provenance(SCENE, HASH))
+    return dataset.dataset(kind, coords, data, provenance(SCENE, HASH)).to_xarray()
 
 
 # -- table and builders -------------------------------------------------------------------------
@@ -256,7 +258,9 @@ def test_limits_of_design_variables_stand_beside_them():
 
 def test_timing_and_response_builders():
     seconds = {name: np.ones((2, 3)) for name in ("busy", "idle", "compile", "write")}
-    timing = dataset.timing_dataset(["sample", "fit", "swarm"], seconds, "hpcclear run x.toml")
+    timing = dataset.timing_dataset(
+        ["sample", "fit", "swarm"], seconds, "hpcclear run x.toml"
+    ).to_xarray()
     assert timing["busy"].sel(stage="fit").sizes == {"rank": 2}
     assert str(timing["command"].values) == "hpcclear run x.toml"
     series = {"crank_angle": np.zeros(5), "contact_force": np.zeros((5, 2))}
@@ -274,8 +278,8 @@ def test_timing_and_response_builders():
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
     original, path = example(kind), tmp_path / "file.nc"
-    dataset.write(original, path)
-    assert dataset.read(path, kind, HASH).identical(original)
+    opened.write(original, path)
+    assert opened.read(path, kind, HASH).identical(original)
     with xr.open_dataset(path, engine=engine) as found:
         xr.testing.assert_equal(found.load(), original)
         assert found.attrs["scene"] == SCENE
@@ -291,7 +295,7 @@ def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
 def test_numbers_survive_to_the_last_bit(tmp_path):
     values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
     original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
-    netcdf.save(original, tmp_path / "x.nc")
+    opened.save(original, tmp_path / "x.nc")
     found = netcdf.load(tmp_path / "x.nc").to_xarray()
     assert found["x"].values.tobytes() == values.tobytes()
     assert found["n"].values.tobytes() == original["n"].values.tobytes()
@@ -299,9 +303,11 @@ def test_numbers_survive_to_the_last_bit(tmp_path):
 
 def test_long_attributes_and_empty_dimensions(tmp_path):
     attributes = {"scene": "ä" * 200_000, "nothing": "", "number": 3.5}
-    original = dataset.samples_dataset([], np.empty((0, 0)), {}, outcomes(0), attributes)
-    dataset.write(original, tmp_path / "x.nc")
-    assert dataset.read(tmp_path / "x.nc").identical(original)
+    original = dataset.samples_dataset(
+        [], np.empty((0, 0)), {}, outcomes(0), attributes
+    ).to_xarray()
+    opened.write(original, tmp_path / "x.nc")
+    assert opened.read(tmp_path / "x.nc").identical(original)
     with xr.open_dataset(tmp_path / "x.nc", engine="h5netcdf") as found:
         assert found.attrs["scene"] == attributes["scene"]
 
@@ -309,11 +315,12 @@ def test_long_attributes_and_empty_dimensions(tmp_path):
 WRITE_IN_ANOTHER_PROCESS = """
 import sys
 sys.path.insert(0, {tests!r})
+import opened
 from test_dataset import example
 from hpcclear.results import dataset
 from hpcclear.results.names import designs_in
 for kind in dataset.KINDS:
-    dataset.write(example(kind), f"{folder}/{{kind}}.nc")
+    opened.write(example(kind), f"{folder}/{{kind}}.nc")
 """
 
 
@@ -324,19 +331,19 @@ def test_equal_content_gives_equal_bytes_in_another_process_at_another_time(tmp_
     )
     for kind in KINDS:
         here = tmp_path / "here.nc"
-        dataset.write(example(kind), here)
+        opened.write(example(kind), here)
         assert here.read_bytes() == (tmp_path / f"{kind}.nc").read_bytes(), kind
 
 
 def test_a_design_that_differs_by_one_bit_gives_other_bytes(tmp_path):
     original, other = samples(), samples()
     other["C"].values[0] = np.nextafter(other["C"].values[0], 1)
-    assert netcdf.encode(original) != netcdf.encode(other)
+    assert netcdf.encode(Results.of(original)) != netcdf.encode(Results.of(other))
 
 
 def test_a_written_file_has_the_permissions_of_an_ordinary_one(tmp_path):
     (tmp_path / "ordinary").write_bytes(b"")
-    dataset.write(samples(), tmp_path / "x.nc")
+    opened.write(samples(), tmp_path / "x.nc")
     assert (tmp_path / "x.nc").stat().st_mode == (tmp_path / "ordinary").stat().st_mode
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["ordinary", "x.nc"]
 
@@ -350,13 +357,13 @@ def test_a_symbolic_link_is_replaced_and_what_it_points_to_is_left_alone(tmp_pat
     inside = tmp_path / "inside"
     inside.mkdir()
     (inside / "x.nc").symlink_to(outside)
-    dataset.write(samples(), inside / "x.nc")
+    opened.write(samples(), inside / "x.nc")
     assert outside.read_text() == "precious"
     assert not (inside / "x.nc").is_symlink()
-    dataset.read(inside / "x.nc", "samples")
+    opened.read(inside / "x.nc", "samples")
     (tmp_path / "link").symlink_to(inside)  # a linked directory is what the user asked for
-    dataset.write(samples(), tmp_path / "link" / "y.nc")
-    dataset.read(inside / "y.nc", "samples")
+    opened.write(samples(), tmp_path / "link" / "y.nc")
+    opened.read(inside / "y.nc", "samples")
 
 
 def places(folder: Path) -> dict[str, Path]:
@@ -381,7 +388,7 @@ def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
     place = places(tmp_path)[case]
     before = sorted(tmp_path.iterdir())
     with pytest.raises(InputError, match="output"):
-        dataset.write(samples(), place)
+        opened.write(samples(), place)
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -398,14 +405,14 @@ def test_a_probe_leaves_nothing_behind(tmp_path):
 
 def test_a_nul_in_a_path_is_bad_input(tmp_path):
     with pytest.raises(InputError):
-        dataset.write(samples(), f"{tmp_path}/a\0b")
+        opened.write(samples(), f"{tmp_path}/a\0b")
 
 
 @pytest.mark.parametrize("call", ["write", "fsync", "replace"])
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
 def test_a_failing_disk_keeps_the_last_good_file(tmp_path, monkeypatch, call, code):
     path = tmp_path / "x.nc"
-    dataset.write(samples(5), path)
+    opened.write(samples(5), path)
     good = path.read_bytes()
 
     def fail(*args: object, **kwargs: object) -> None:
@@ -414,7 +421,7 @@ def test_a_failing_disk_keeps_the_last_good_file(tmp_path, monkeypatch, call, co
     with monkeypatch.context() as patch:
         patch.setattr(os, call, fail)
         with pytest.raises(StorageError, match=os.strerror(code)):
-            dataset.write(samples(6), path)
+            opened.write(samples(6), path)
     assert path.read_bytes() == good
     assert [entry.name for entry in tmp_path.iterdir()] == ["x.nc"]
 
@@ -431,7 +438,7 @@ def test_an_interrupt_in_the_middle_of_a_write_leaves_no_rubbish(tmp_path, monke
 
     monkeypatch.setattr(os, "write", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        dataset.write(samples(), tmp_path / "x.nc")
+        opened.write(samples(), tmp_path / "x.nc")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -439,14 +446,14 @@ LIMITED = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
+import opened
 from test_dataset import samples
-from hpcclear.results import dataset
 from hpcclear.base.errors import StorageError
 import resource
-dataset.write(samples(5), {path!r})
+opened.write(samples(5), {path!r})
 resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
 try:
-    dataset.write(samples(5000), {path!r})
+    opened.write(samples(5000), {path!r})
 except StorageError as error:
     print(error)
     sys.exit(1)
@@ -460,7 +467,7 @@ def test_a_file_size_limit_ends_in_a_message_and_keeps_the_last_good_file(tmp_pa
     assert done.returncode == 1, done.stderr
     assert "ulimit" in done.stdout
     assert done.stderr == ""
-    assert dataset.read(path, "samples").sizes["sample"] == 5
+    assert opened.read(path, "samples").sizes["sample"] == 5
     assert [entry.name for entry in tmp_path.iterdir()] == ["x.nc"]
 
 
@@ -482,7 +489,7 @@ def test_no_permission_is_bad_input(place_of_all):
 
 @functools.cache
 def sealed() -> bytes:
-    image = netcdf.encode(samples())
+    image = netcdf.encode(Results.of(samples()))
     return image + netcdf.seal(image)
 
 
@@ -490,7 +497,7 @@ def refuses(folder: Path, content: bytes) -> str:
     path = folder / "damaged.nc"
     path.write_bytes(content)
     with pytest.raises(InputError) as caught:
-        dataset.read(path, "samples")
+        opened.read(path, "samples")
     return caught.value.reason
 
 
@@ -528,25 +535,25 @@ def test_files_that_are_not_there_or_no_files_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for place in (tmp_path / "none.nc", tmp_path, tmp_path / "pipe", Path("/dev/zero")):
         with pytest.raises(InputError):
-            dataset.read(place)
+            opened.read(place)
 
 
 def test_a_value_changed_with_h5py_is_noticed(tmp_path):
     path = tmp_path / "x.nc"
-    dataset.write(samples(), path)
+    opened.write(samples(), path)
     with h5py.File(path, "r+") as file:
         file["objective"][0] = 1.0
     with pytest.raises(InputError, match="changed"):
-        dataset.read(path)
+        opened.read(path)
 
 
 def test_a_file_of_another_kind_or_scene_is_refused(tmp_path):
     path = tmp_path / "x.nc"
-    dataset.write(samples(), path)
+    opened.write(samples(), path)
     with pytest.raises(InputError, match="it holds samples, not front"):
-        dataset.read(path, "front")
+        opened.read(path, "front")
     with pytest.raises(InputError, match="another scene"):
-        dataset.read(path, "samples", "0" * 64)
+        opened.read(path, "samples", "0" * 64)
 
 
 def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
@@ -593,9 +600,9 @@ def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
 def test_sealed_files_that_say_what_cannot_be_are_refused(tmp_path, what):
     with xr.set_options(keep_attrs=True):
         spoilt = spoil(samples(), what)
-    netcdf.save(spoilt, tmp_path / "x.nc")
+    opened.save(spoilt, tmp_path / "x.nc")
     with pytest.raises(InputError):
-        dataset.read(tmp_path / "x.nc", "samples")
+        opened.read(tmp_path / "x.nc", "samples")
 
 
 def hostile(path: Path, what: str, secret: Path) -> None:
@@ -644,19 +651,19 @@ def hostile(path: Path, what: str, secret: Path) -> None:
 def test_hostile_structure_under_a_forged_seal_is_refused(tmp_path, what):
     path, secret = tmp_path / "x.nc", tmp_path / "secret"
     secret.write_bytes(b"password" * 10)
-    dataset.write(samples(), path)
+    opened.write(samples(), path)
     hostile(path, what, secret)
     image = path.read_bytes()
     path.write_bytes(image + netcdf.seal(image))
     with pytest.raises(InputError, match="structure"):
-        dataset.read(path, "samples")
+        opened.read(path, "samples")
 
 
 def test_what_a_file_cannot_hold_is_refused_when_writing():
     with pytest.raises(ValueError, match="type"):
-        netcdf.encode(xr.Dataset({"x": ("k", np.array([object()]))}))
+        netcdf.encode(Results.of(xr.Dataset({"x": ("k", np.array([object()]))})))
     with pytest.raises(ValueError, match="type"):
-        netcdf.encode(xr.Dataset({"x": ("k", np.zeros(2, complex))}))
+        netcdf.encode(Results.of(xr.Dataset({"x": ("k", np.zeros(2, complex))})))
 
 
 # -- conventions --------------------------------------------------------------------------------
@@ -665,7 +672,7 @@ def test_what_a_file_cannot_hold_is_refused_when_writing():
 @pytest.mark.parametrize("kind", KINDS)
 def test_cf_checker_finds_no_error(tmp_path, kind):
     path, report = tmp_path / "x.nc", tmp_path / "report.json"
-    dataset.write(example(kind), path)
+    opened.write(example(kind), path)
     command = [str(Path(sys.executable).with_name("compliance-checker")), "--test", "cf:1.11"]
     subprocess.run(
         [*command, "--format", "json", "--output", report, path], capture_output=True, check=False
@@ -681,7 +688,7 @@ def test_cf_checker_finds_no_error(tmp_path, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, kind):
     registry = pint.UnitRegistry()
-    dataset.write(example(kind), tmp_path / "x.nc")
+    opened.write(example(kind), tmp_path / "x.nc")
     with xr.open_dataset(tmp_path / "x.nc", decode_timedelta=False) as found:
         measured = [n for n, v in found.data_vars.items() if "units" in v.attrs]
         for name in measured:

@@ -373,7 +373,7 @@ def test_spectrum_finds_amplitude_and_order() -> None:
 def test_models_of_a_file_predict_as_the_surrogate_does() -> None:
     points, bounds = data.design(40, 2), np.column_stack([data.LOWER, data.UPPER])
     oracle = fit_kriging(points, data.noisy(points, 2), bounds, rng=np.random.default_rng(2))
-    model = models_in(data.kriging())["m2 m3 u2 I2 C"]
+    model = models_in(data.kriging().variables)["m2 m3 u2 I2 C"]
     fresh = data.design(20, 9)
     np.testing.assert_array_equal(model.predict(fresh), oracle.predict(fresh))
     with pytest.raises(InputError, match="does not extrapolate"):
@@ -381,7 +381,7 @@ def test_models_of_a_file_predict_as_the_surrogate_does() -> None:
 
 
 def test_leave_one_out_is_what_a_model_without_the_point_predicts() -> None:
-    model = models_in(data.kriging())["u2 I2 C"].leaves[0]
+    model = models_in(data.kriging().variables)["u2 I2 C"].leaves[0]
     inputs, others = model.to_unit(model.inputs), np.arange(len(model.values)) != 7
     squares = np.square((inputs[:, None] - inputs) / model.length_scales).sum(axis=-1)
     smooth = model.signal_variance * np.exp(-squares / 2)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import opened
 import pytest
 from commands import CHEAP, SCENE, overrides, run, sample, warm_command
 
@@ -387,7 +388,7 @@ def damaged(content: bytes, other: bytes, dice: random.Random) -> bytes:
 def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     _, output = result
     content, timing = output.read_bytes(), output.with_suffix(".timing.nc").read_bytes()
-    good = dataset.read(output, "samples")
+    good = opened.read(output, "samples")
     names, records = tuple(designs_in(good)), dataset.records(good)
     values = list(designs_in(good).values())
     dice, path, parts = random.Random(count), tmp_path / "x.nc", tmp_path / "parts"
@@ -401,7 +402,7 @@ def test_damaged_results_are_refused_or_done_again(result, tmp_path, count):
     for _ in range(count):
         path.write_bytes(damaged(content, timing, dice))
         with pytest.raises(InputError):
-            dataset.read(path, "samples")
+            opened.read(path, "samples")
         spoilt = damaged(part, content, dice)
         first.write_bytes(spoilt)
         if (

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from click.testing import CliRunner
 from commands import finish, overrides, run, start, wait_for_parts
@@ -34,7 +35,6 @@ from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, serie
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
-from hpcclear.results import dataset
 
 sys.path.insert(0, str(ROOT / "analysis"))
 import identify_machines
@@ -393,7 +393,7 @@ def record(path: Path, noise: float, samples: int, change: float, form: str, see
 
 def test_each_record_is_judged_as_if_it_were_alone(made, scene, tmp_path, monkeypatch):
     """Good ones and one of another machine, beside loose, coarse, dead, free-running ones: verdicts stay to the last bit."""
-    monkeypatch.setattr(answer, "simulated", lambda *_, **__: made[0])
+    monkeypatch.setattr(answer, "ensemble_of", lambda *_, **__: made[0])
     monkeypatch.setattr(answer, "prepare", partial(prepare, members=24))  # enough to compare
     bare = scene.with_({"study": None})
     kinds = {
@@ -480,7 +480,7 @@ def identified(measured, tmp_path_factory):
 
 def test_the_command_prints_intervals_growth_and_advice(identified):
     place, printed, code, _ = identified
-    content = dataset.read(place, "identify")
+    content = opened.read(place, "identify")
     assert code == (0 if content["explained"].all() else 4)
     for words in ("crank_rod", "95 %", "per day", "time to", "by crank_moment", "by frame_force_x"):  # fmt: skip
         assert words in " ".join(printed.split()), printed
@@ -495,7 +495,7 @@ def test_the_page_and_the_figures_show_it(identified, tmp_path):
     page = write_report(place, output=tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Unknowns of the machine" in page
     assert "was left out" not in page
-    content = dataset.read(place)
+    content = opened.read(place)
     for draw in (report.posterior_figure, report.features_figure, report.growth_figure):
         assert draw(content).axes
     assert len(hpcclear.to_table(content)) == 1
@@ -504,7 +504,7 @@ def test_the_page_and_the_figures_show_it(identified, tmp_path):
 
 
 def test_an_answer_is_never_more_certain_than_it_is(identified):
-    content = dataset.read(identified[0]).isel(record=[0])
+    content = opened.read(identified[0]).isel(record=[0])
 
     def said(low, middle, high, explained=1):
         own = content.copy(deep=True)

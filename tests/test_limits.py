@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import commands
+import opened
 import pytest
 from patience import crowded
 
 from hpcclear.ranks.schedule import COLUMNS
-from hpcclear.results import dataset
 
 pytestmark = pytest.mark.mpi
 TWO_RANKS = pytest.param(2, marks=pytest.mark.nightly)
@@ -60,13 +60,13 @@ def test_a_full_disk_ends_in_a_message_and_keeps_what_is_there(small_disk, compi
     assert not (small_disk / "samples.nc").exists()
     subprocess.run(["mount", "-o", "remount,size=100m", small_disk], check=True)
     kept = (
-        sum(dataset.read(p, "samples").sizes["sample"] for p in commands.result_files(small_disk))
+        sum(opened.read(p, "samples").sizes["sample"] for p in commands.result_files(small_disk))
         - 64
     )
     code, output = commands.run([*words[:-1], "log"], ranks)
     assert code == 0, output
     assert 0 < kept < 20_000
-    assert dataset.read(small_disk / "samples.nc", "samples").sizes["sample"] == 20_000
+    assert opened.read(small_disk / "samples.nc", "samples").sizes["sample"] == 20_000
 
 
 def limited(kind: int, amount: int, words: list[str], ranks: int = 2) -> tuple[int, str]:
@@ -172,7 +172,7 @@ def test_another_scene_is_refused_with_the_keys_that_differ_and_fresh_lies_besid
     assert "--fresh" in text
     assert commands.run([*other, "--fresh"], 0)[0] == 0
     assert output.read_bytes() == before
-    beside = dataset.read(tmp_path / "samples-2.nc", "samples")
+    beside = opened.read(tmp_path / "samples-2.nc", "samples")
     assert beside.sizes["sample"] == 100
     assert commands.run([*other, "--fresh"], 0)[0] == 0
     assert (tmp_path / "samples-3.nc").read_bytes() == (tmp_path / "samples-2.nc").read_bytes()
@@ -214,7 +214,7 @@ def test_checkpoints_take_less_than_a_hundredth_of_the_time(tmp_path):
     # the plain command: to be watched takes time too
     code, output = commands.finish(commands.start(words, program=("-m", "hpcclear")))
     assert code == 0, output
-    timing = dataset.read(tmp_path / "samples.timing.nc", "timing")
+    timing = opened.read(tmp_path / "samples.timing.nc", "timing")
     root = timing.sel(rank=0)
     total = sum(float(root[name].sum()) for name in COLUMNS)
     # the stage "files" opens the checkpoint and writes the result, which a run without checkpoints writes too

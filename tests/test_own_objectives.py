@@ -6,6 +6,7 @@ from pathlib import Path
 
 import commands
 import numpy as np
+import opened
 import pytest
 import tomli_w
 from scipy.integrate import simpson
@@ -16,7 +17,6 @@ from hpcclear.base.objectives import MEAN_GAP, OF_ALL, OF_JOINTS, OURS, RECORDED
 from hpcclear.base.outcome import FIELDS, OUTCOME
 from hpcclear.dynamics.laws.objectives import _RANGES, _ROWS, rate_in_lanes
 from hpcclear.ensemble.identity import run_key
-from hpcclear.results import dataset
 
 ROOT = Path(__file__).parents[1]
 GOALS = Path(__file__).parent / "data" / "mygoals.py"
@@ -156,7 +156,7 @@ def test_samples_on_two_ranks_have_the_same_bytes(tmp_path):
         written.append(output.read_bytes())
     assert written[0] == written[1]
     assert b"def loss(" in written[0]
-    found = dataset.read(output, "samples")
+    found = opened.read(output, "samples")
     np.testing.assert_array_equal(found["objective"], found["rate_of_objective"].sum("joint"))
 
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 from own_engine import engine
@@ -15,7 +16,6 @@ from hpcclear.cli.printing import describe_study
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import labels
 from hpcclear.report.html import gallery
-from hpcclear.results import dataset
 from hpcclear.study import run_study
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
@@ -46,7 +46,7 @@ def place(request, tmp_path: Path) -> Path:
     if request.param == "engine":
         return shutil.copytree(request.getfixturevalue("study"), tmp_path / "out")
     if request.param == "accuracy":
-        dataset.write(data.accuracy(), tmp_path / "accuracy.nc")
+        opened.write(data.accuracy(), tmp_path / "accuracy.nc")
         return tmp_path
     return data.write_study(tmp_path)
 
@@ -68,12 +68,12 @@ def test_every_number_is_another_where_the_files_hold_others(place: Path) -> Non
     factors = {"m": 1.21, "s": 1.13, "kg": 1.37, "kg m^2": 1.43, "N": 1.31}
     before, free = shown(place), []
     for path in place.rglob("*.nc"):
-        content = dataset.read(path)
+        content = opened.read(path)
         for variable in content.data_vars.values():
             if (unit := str(variable.attrs.get("units"))) in factors:
                 variable *= factors[unit]
         path.unlink()
-        dataset.write(content, path)
+        opened.write(content, path)
         free += summed(content)
         measured = [name for name, v in content.items() if v.attrs.get("units") in factors]
         free += held(content.drop_vars(measured))
@@ -85,7 +85,7 @@ def test_every_number_is_another_where_the_files_hold_others(place: Path) -> Non
 def test_the_answer_in_the_terminal_tells_what_files_hold(study: Path, capsys) -> None:
     describe_study(study)
     printed = " ".join(capsys.readouterr().out.split())
-    found = dataset.read(study / "verification.nc")
+    found = opened.read(study / "verification.nc")
     known = {
         labels.quantity(float(value), str(variable.attrs["units"]), digits)
         for digits in range(4, 8)

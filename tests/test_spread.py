@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 import xarray as xr
@@ -16,7 +17,6 @@ from hpcclear.base.outcome import Flag
 from hpcclear.cli import cli
 from hpcclear.report import spread
 from hpcclear.report.html.page import MOST_DRAWN, write_report
-from hpcclear.results import dataset
 from hpcclear.statistics.random.survival import fewest, order_interval
 
 
@@ -149,7 +149,7 @@ def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
     scene = Path("jobs/quickstart.toml").read_text()
     case = '[study.cases.rare]\nrandom = ["C"]\nobjectives = ["mean", { statistic = "exceedance", limit = "0.5 mm" }]'
     scene = re.sub(r"\[study.cases\].*?\n\n", f"{case}\n\n", scene, flags=re.S)
-    dataset.write(drawn(500, scene=scene), tmp_path / "samples.nc")
+    opened.write(drawn(500, scene=scene), tmp_path / "samples.nc")
     page = write_report(tmp_path).read_text()
     assert "Statistics of the samples" in page
     assert "P99 of f" in page
@@ -159,8 +159,8 @@ def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
 
 def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_path):
     for name, failed in (("H7g6", 5), ("H7f7", 1)):
-        dataset.write(drawn(100, failed), tmp_path / f"{name}.nc")
-    dataset.write(data.timing(), tmp_path / "H7g6.timing.nc")
+        opened.write(drawn(100, failed), tmp_path / f"{name}.nc")
+    opened.write(data.timing(), tmp_path / "H7g6.timing.nc")
     chosen = [tmp_path / f"{name}.nc" for name in ("H7f7", "H7g6")]
     for page in (write_report(tmp_path), write_report(*chosen, output=tmp_path / "chosen.html")):
         text = page.read_text()
@@ -181,7 +181,7 @@ def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_p
 def test_a_page_of_many_samples_names_the_commands_that_draw_one(tmp_path):
     """Figures of 50 files took 46 s and 11 MB; a page of many has their numbers, and none of them is drawn unasked."""
     for k in range(MOST_DRAWN + 1):
-        dataset.write(drawn(100, 1 + k), tmp_path / f"fit{k}.nc")
+        opened.write(drawn(100, 1 + k), tmp_path / f"fit{k}.nc")
     page = write_report(tmp_path).read_text()
     heads = re.findall(r"<h2 [^>]*>([^<]*)</h2>", page)
     assert [head for head in heads if "figures" in head.lower()] == ["Figures of single files"]

@@ -13,11 +13,11 @@ from pathlib import Path
 import commands
 import losses
 import numpy as np
+import opened
 import pytest
 from losses import Loss
 from patience import crowded
 
-from hpcclear.results import dataset
 from hpcclear.results.checkpoint import INTERVAL as CHECKPOINT_INTERVAL
 
 sys.path.insert(0, str(commands.PROGRAM.parent))
@@ -328,7 +328,7 @@ def test_results_of_an_interrupted_run_are_datasets_of_their_own(tmp_path, undis
     time.sleep(1.0)
     commands.kill(job.pid, signal.SIGTERM)
     assert commands.finish(job)[0] == 3
-    parts = [dataset.read(path, "samples") for path in commands.result_files(tmp_path)]
+    parts = [opened.read(path, "samples") for path in commands.result_files(tmp_path)]
     numbers = np.concatenate([part["sample"] for part in parts])
     assert numbers.size == np.unique(numbers).size > 100
     assert all(np.isfinite(part["m2"]).all() for part in parts)

@@ -201,7 +201,7 @@ def of_one_process(command: Callable[..., int]) -> Callable[..., int]:
 SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")
 """What every rank of every such command loads, in pieces: between two it hears what root says."""
 
-STUDYING = (*SIMULATING, "xarray", "hpcclear.ensemble.compiling", "hpcclear.study")
+STUDYING = (*SIMULATING, "hpcclear.ensemble.compiling", "hpcclear.study")
 
 
 @contextlib.contextmanager

@@ -20,9 +20,9 @@ from hpcclear.cli.options import (
     show,
 )
 from hpcclear.ranks.stopping import Exit
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
     from hpcclear.report.compare import Quantity
@@ -257,7 +257,7 @@ def plot(
     return Exit.DONE
 
 
-def _moving(content: "Content", place: Path) -> "xr.Dataset":
+def _moving(content: "Content", place: Path) -> Results:
     """The response that a film shows."""
     if content.response is None:
         reason = "it holds no response, so there is no motion to show"

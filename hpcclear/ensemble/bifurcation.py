@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
@@ -20,6 +19,7 @@ from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
 from hpcclear.results import dataset
+from hpcclear.results.content import Results, Variable
 from hpcclear.scene import Scene
 
 REDUCED: "dict[str, Callable[[Array], float]]" = {"max": np.max, "min": np.min, "mean": np.mean}
@@ -41,7 +41,7 @@ class Observation:
     revolutions: int = 60
     """transient and revolutions: how many are left out and observed."""
 
-    def of(self, response: xr.Dataset) -> xr.DataArray:
+    def of(self, response: Results) -> Variable:
         """The series that is observed; raises InputError where the response lacks this name."""
         found = motion.series(response)
         word, _, rest = self.name.partition(" ")
@@ -53,7 +53,7 @@ class Observation:
             raise InputError("--observe", self.name, "responses have no such series", remedy)
         return found[name]
 
-    def described(self, response: xr.Dataset) -> Objective:
+    def described(self, response: Results) -> Objective:
         """Its unit and words, of a short response."""
         if self.name == OBJECTIVE:
             return replace(MEAN_GAP, name=OBJECTIVE, words="mean gap of each revolution")
@@ -66,7 +66,7 @@ class Observation:
         words = f"{quantity.replace('_', ' ')}{blank}{place}, {how}"
         return replace(MEAN_GAP, name=self.name, unit=str(series.attrs["units"]), words=words)
 
-    def __call__(self, scene: Scene, response: xr.Dataset) -> Array:
+    def __call__(self, scene: Scene, response: Results) -> Array:
         """Values (revolutions,), NaN of a failed simulation."""
         nothing = np.full(self.revolutions, np.nan)
         if not Status(int(response["status"])).valid:
@@ -140,7 +140,7 @@ def _variant(paths: tuple[str, ...], value: float) -> Mapping[str, float]:
     return dict.fromkeys(paths, float(value))
 
 
-def _short(scene: Scene, variant: Mapping[str, float]) -> xr.Dataset:
+def _short(scene: Scene, variant: Mapping[str, float]) -> Results:
     """A response of one revolution, for the names and units of its series."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    return simulate(scene.with_({**variant, **short}), checked=False)
+    return simulated(scene.with_({**variant, **short}), checked=False)

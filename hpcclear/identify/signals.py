@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.outcome import Status
 from hpcclear.report.figures import motion
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -90,7 +90,7 @@ class Spectrum:
         return cls(rows[..., 0, :] + 1j * rows[..., 1, :], rows[..., 2, :], revolutions)
 
 
-def names_of(response: xr.Dataset) -> list[str]:
+def names_of(response: Results) -> list[str]:
     """Return the signals that a mechanism has, those that people measure first."""
     known = motion.series(response)
     usual = (
@@ -106,7 +106,7 @@ def names_of(response: xr.Dataset) -> list[str]:
     return [*(one for one in usual if one in known), *free]
 
 
-def check_name(response: xr.Dataset, name: str) -> None:
+def check_name(response: Results, name: str) -> None:
     """Raise InputError where a mechanism has no signal of this name."""
     known = set(motion.series(response))
     points = [str(one) for one in response["point"].to_numpy()] if "point" in response else []
@@ -118,7 +118,7 @@ def check_name(response: xr.Dataset, name: str) -> None:
         raise InputError("--signal", name, "the mechanism has no such signal", remedy)
 
 
-def unit_of(response: xr.Dataset, name: str) -> str:
+def unit_of(response: Results, name: str) -> str:
     """Return the SI unit of a signal."""
     if name.startswith(IMPACTS):
         return "1"
@@ -126,7 +126,7 @@ def unit_of(response: xr.Dataset, name: str) -> str:
     return str(known[name].attrs["units"]) if name in known else "m/s^2"
 
 
-def series_of(response: xr.Dataset, name: str) -> Array:
+def series_of(response: Results, name: str) -> Array:
     """Return a signal of a response (t,), SI."""
     if name in response:  # of the mechanism as a whole: no need to label those of its parts
         return response[name].to_numpy()
@@ -176,13 +176,13 @@ def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
     return np.asarray(found)
 
 
-def revolutions_of(scene: Scene, response: xr.Dataset) -> Array:
+def revolutions_of(scene: Scene, response: Results) -> Array:
     """Return the crank angle of a response in revolutions of its drive (t,), rising."""
     angle, _ = motion.crank_angle(response)
     return angle / (2.0 * np.pi * turns_of(scene.linkage))
 
 
-def spectra(scene: Scene, response: xr.Dataset, names: Sequence[str]) -> Array:
+def spectra(scene: Scene, response: Results, names: Sequence[str]) -> Array:
     """Return the packed harmonics of signals of one response, shape (signals, PARTS, ORDERS + 1); NaN if it failed."""
     shape = (len(names), PARTS, ORDERS + 1)
     if not Status(int(response["status"])).valid:

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.outcome import Flag
 from hpcclear.report import alike, failures, scatter
@@ -27,6 +26,7 @@ from hpcclear.report.merit import (
 )
 from hpcclear.report.scatter import HALF_WIDTH
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 MANY = 0.05
 """Share of samples outside the range of Hertz contact above which that is the first of the next steps."""
@@ -47,7 +47,7 @@ COARSE = 0.1
 """Half-width of a Sobol index above which more samples are advised."""
 
 
-def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
+def answer(files: Mapping[str, Results], place: str) -> list[Line]:
     """Return the lines, the most important first; none if no design was verified.
 
     Parameters
@@ -89,13 +89,13 @@ def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
     ]  # fmt: skip
 
 
-def unit_of(one: xr.Dataset, name: str) -> str:
+def unit_of(one: Results, name: str) -> str:
     """Return the unit of a variable; of what a case makes small it stands beside it."""
     own = f"{name.removesuffix('_true')}_unit"
     return str(one[own].item()) if own in one else str(one[name].attrs["units"])
 
 
-def _goals(best: xr.Dataset) -> Iterator[str]:
+def _goals(best: Results) -> Iterator[str]:
     """Objectives of the case of a design besides mean and standard deviation, with confidence intervals."""
     names = [] if is_plain(best) else goals_of(best)
     for name in names:
@@ -111,7 +111,7 @@ def _goals(best: xr.Dataset) -> Iterator[str]:
         yield text
 
 
-def constraints(best: xr.Dataset) -> Iterator[str]:
+def constraints(best: Results) -> Iterator[str]:
     """Yield the constraints of the case of a design, each with its value and verdict."""
     if "constraints" in best and str(best["constraints"].item()):
         for text in str(best["constraints"].item()).split("; "):
@@ -133,9 +133,13 @@ ENDS_IN_WORDS = {"alpha": "lowest mean of f", "beta": "lowest standard deviation
 """What the ends of a front are, of a case without objectives of its own."""
 
 
-def _named(best: xr.Dataset) -> str:
+def _constraints(best: Results) -> str:
+    return str(best["constraints"].item()) if "constraints" in best else ""
+
+
+def _named(best: Results) -> str:
     name = str(best["design"].item())
-    if (verdict := standing(str(best.get("constraints", xr.DataArray("")).item()))) in _NONE:
+    if (verdict := standing(_constraints(best))) in _NONE:
         return f"{_NONE[verdict]}; nearest: {name}"
     if name.rpartition(" ")[2] == "original":
         return f"keep the baseline design ({name}): no simulated design is better"
@@ -143,11 +147,11 @@ def _named(best: xr.Dataset) -> str:
     return f"{name}: {role}" if role else name
 
 
-def _case(best: xr.Dataset) -> str:
+def _case(best: Results) -> str:
     return str(best["case"].item()) if "case" in best else "of the study"
 
 
-def _values(best: xr.Dataset) -> str:
+def _values(best: Results) -> str:
     shown = [
         f"{labels.words(v)} = {labels.value(v)}"
         for v in labels.design_variables(best)
@@ -156,7 +160,7 @@ def _values(best: xr.Dataset) -> str:
     return ", ".join(shown)
 
 
-def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
+def _moment(best: Results, word: str, original: Results | None) -> str:
     """A simulated moment with its confidence interval, and its change from the baseline."""
     one = best[f"{word}_true"]
     unit = str(one.attrs["units"])
@@ -171,13 +175,13 @@ def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
     return f"{text}, {abs(change):.0%} {'below' if change < 0 else 'above'} the baseline ({labels.quantity(before, unit)})"
 
 
-def bounds(best: xr.Dataset) -> str:
+def bounds(best: Results) -> str:
     """Return the active bounds of a design, "none" without any."""
     found = str(best["on_bounds"].item()) if "on_bounds" in best else ""
     return found or "none"
 
 
-def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
+def _left(files: Mapping[str, Results], best: Results) -> str:
     """Share of simulations outside the range of Hertz contact."""
     parts = []
     if "beyond_hertz" in best:
@@ -190,7 +194,7 @@ def _left(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     return "outside the range of Hertz contact in " + " and ".join(parts) if parts else "not known"
 
 
-def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
+def _shares(files: Mapping[str, Results]) -> Iterator[Line]:
     """First-order and total Sobol indices with their errors, the largest total first; none where they are not known."""
     found = files.get("sensitivity")
     if found is None or "sobol_total" not in found:
@@ -230,13 +234,13 @@ def _shares(files: Mapping[str, xr.Dataset]) -> Iterator[Line]:
         yield Line("warning", text)
 
 
-def _failed(files: Mapping[str, xr.Dataset]) -> list[str]:
+def _failed(files: Mapping[str, Results]) -> list[str]:
     """Why samples failed, where, and what to do; none where all succeeded."""
     samples = files.get("samples")
     return failures.explained(samples) if samples is not None and "status" in samples else []
 
 
-def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
+def _poor_fits(files: Mapping[str, Results]) -> Iterator[str]:
     """Surrogates that do not fit, a sentence for each kind of them."""
     for kind, what in (
         ("sensitivity", "sensitivities by slopes"),
@@ -246,13 +250,13 @@ def _poor_fits(files: Mapping[str, xr.Dataset]) -> Iterator[str]:
             yield f"{'; '.join(found)} ({what}); simulated values do not depend on surrogates"
 
 
-def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
+def _scatter(files: Mapping[str, Results], best: Results) -> str:
     """Share of the design's variance that is chaos, and how many designs are chaotic; "" if not simulated."""
     found, name = files.get("chaos"), str(best["design"].item())
     if found is None or name not in found["design"].to_numpy():
         return ""
     own = found.sel(design=name)
-    moved = (found["chaotic"] > SOME).to_numpy()
+    moved = found["chaotic"].to_numpy() > SOME
     text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
     if not float(own["chaotic"]) > SOME:
         return f"{text}; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
@@ -262,7 +266,7 @@ def _scatter(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> str:
     )
 
 
-def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
+def _sure(best: Results, verified: Results) -> str:
     count = int(best["samples"]) if "samples" in best else 0
     level = float(verified.attrs.get("confidence", np.nan))
     text = f"{count} simulations of the recommended design"
@@ -287,19 +291,17 @@ def _sure(best: xr.Dataset, verified: xr.Dataset) -> str:
     return text
 
 
-def _surrogate_errors(best: xr.Dataset) -> list[float]:
+def _surrogate_errors(best: Results) -> list[float]:
     """Relative errors of the surrogate's mean and standard deviation, as far as they are known."""
     found = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
     return [error for error in found if np.isfinite(error)]
 
 
-def _next(
-    files: Mapping[str, xr.Dataset], ours: xr.Dataset, best: xr.Dataset, place: str
-) -> Iterator[str]:
+def _next(files: Mapping[str, Results], ours: Results, best: Results, place: str) -> Iterator[str]:
     """What to do, the most useful first; the report in the end."""
     if "beyond_hertz" in best and int(best["beyond_hertz"]) > MANY * int(best["samples"]):
         yield "stiffer bearings or less load, since the contact model is outside its range and forces are indicative only"
-    constraints = str(best.get("constraints", ""))
+    constraints = _constraints(best)
     prices = re.findall(r"about (\d+) simulations would decide", constraints)
     if OPEN in constraints:
         yield "a smaller numerics.rtol (or target_error), to decide the constraints"
@@ -318,7 +320,7 @@ def _next(
     found, name = files.get("chaos"), str(best["design"].item())
     if (
         found is not None
-        and name in found["design"]
+        and name in found["design"].to_numpy()
         and float(found.sel(design=name)["chaos_share"]) > LARGE
     ):
         yield "a larger numerics.averaged_revolutions, since chaotic scatter decreases with it"

@@ -1,21 +1,26 @@
 """A simulated response against measured series: aligned in phase, with error norms for each quantity."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base import markup
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
+from hpcclear.results.content import Results, Variable
 from hpcclear.scene.sheets import read
 from hpcclear.scene.units import UnitError, factor
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 
@@ -122,7 +127,7 @@ class Comparison:
 
 
 def compare(
-    response: xr.Dataset,
+    response: xr.Dataset | Results,
     path: str | Path,
     align: Alignment = "auto",
     names: Mapping[str, str] | None = None,
@@ -147,7 +152,7 @@ def compare(
     InputError
         The table cannot be read, names what the response has not, or has units of another kind.
     """
-    columns = read_columns(Path(path))
+    response, columns = Results.of(response), read_columns(Path(path))
     axis, unit = _axis(columns[0])
     given = columns[0].si(unit)
     inside = bearings.averaged(response)
@@ -217,7 +222,7 @@ def _every(place: Array, at: Array) -> Array:
     return every[(every >= at.min()) & (every <= at.max())]
 
 
-def _measured_axis(response: xr.Dataset, axis: str, given: Array, at: Array, every: Array) -> Array:
+def _measured_axis(response: Results, axis: str, given: Array, at: Array, every: Array) -> Array:
     """What the measured axis shows at places of the simulation; angles within a turn where it has them so."""
     sense = motion.crank_angle(response)[1] if axis == "angle" else 1
     x: Array = given[0] + sense * (every - at[0])
@@ -271,7 +276,7 @@ def _plain(name: str) -> str:
     return re.sub(r"[\s_.]+", " ", name).strip().lower()
 
 
-def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], Array]]:
+def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Array]]:
     """Places (t,) of the instants along the axis, which rise, and what gives those of measured values."""
     if axis == "time":
         time = response["time"].to_numpy()
@@ -281,9 +286,7 @@ def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], A
     return angle - angle[0], lambda given: np.unwrap(sense * (given - first))
 
 
-def _series(
-    response: xr.Dataset, column: Column, names: Mapping[str, str]
-) -> tuple[str, xr.DataArray]:
+def _series(response: Results, column: Column, names: Mapping[str, str]) -> tuple[str, Variable]:
     """Name and series (t,) of the quantity that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
     found = motion.series(response)

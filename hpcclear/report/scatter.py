@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from hpcclear.statistics.sensitivity.contributions import Falls
@@ -29,7 +29,7 @@ SMALL = 0.005
 """Share below which, half-width included, an input is listed without a number."""
 
 
-def lines(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+def lines(files: Mapping[str, Results], best: Results) -> Iterator[Line]:
     """Yield contributions to the variance at a design, and what halving each tolerance brings, the largest first; none where
     they are not known."""
     found, name = files.get("contributions"), str(best["design"].item())
@@ -98,7 +98,7 @@ def _first(names: list[str], falls: "Falls", errors: np.ndarray, prices: np.ndar
     return text + (", most for its cost" if known else "")
 
 
-def worst(files: Mapping[str, xr.Dataset], best: xr.Dataset) -> Iterator[Line]:
+def worst(files: Mapping[str, Results], best: Results) -> Iterator[Line]:
     """Yield the worst case of a design, and where it lies; none where it was not searched."""
     found, name = files.get("worst"), str(best["design"].item())
     if found is None or name not in found["design"].to_numpy():

@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-import xarray as xr
-
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import (
     accuracy,
@@ -24,6 +22,7 @@ from hpcclear.report.figures import (
     timing,
     wear,
 )
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,13 +37,13 @@ class Entry(NamedTuple):
     name: str
     kind: str
     """Of the file."""
-    draw: "Callable[[xr.Dataset], Figure]"
+    draw: "Callable[[Results], Figure]"
     caption: str
     along: str = "time"
     """A dimension that the file must have; any file of a response has instants."""
 
 
-def section_figure(found: xr.Dataset) -> "Figure":
+def section_figure(found: Results) -> "Figure":
     """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
     count = motion.whole_turns(found) - int(found.attrs.get("transient_turns", 0))
     if count < CROSSINGS:
@@ -168,7 +167,7 @@ RESPONSE: tuple[Entry, ...] = (
 
 
 def drawings(
-    found: Mapping[str, xr.Dataset], responses: Mapping[str, xr.Dataset]
+    found: Mapping[str, Results], responses: Mapping[str, Results]
 ) -> "dict[str, Callable[[], Figure]]":
     """Return what draws each figure that results allow, by its name.
 
@@ -194,6 +193,6 @@ def drawings(
         one = responses.get("original", next(iter(responses.values())))
         made["response"] = partial(response.response_figure, one)
         made |= {
-            entry.name: partial(entry.draw, one) for entry in RESPONSE if entry.along in one.dims
+            entry.name: partial(entry.draw, one) for entry in RESPONSE if entry.along in one.sizes
         }
     return made

@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.report.figures import labels, style
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.planar import Planar, turns_of
@@ -85,7 +85,7 @@ def _tabulated(scene: Scene, key: str, rows: Rows, unit: str, turns: int, load: 
 
 
 @style.drawn
-def tables_figure(found: xr.Dataset) -> "Figure":
+def tables_figure(found: Results) -> "Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
     tables = tabulated(scene_of_text(str(found.attrs["scene"]), "scene"))
     if not tables:

@@ -7,17 +7,17 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 @style.drawn
-def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
+def front_figure(front: Results, verification: Results | None = None) -> "Figure":
     """Pareto fronts of all cases, and the designs that were simulated (the paper's Fig. 9).
 
     Axes are what each case makes small: mean and standard deviation, if it requests nothing else; of more than two things
@@ -81,7 +81,7 @@ _MOMENTS = ("mean of f", "deviation of f")
 _LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"standard deviation $\sigma_f$"))
 
 
-def _goals(one: xr.Dataset) -> list[_Goal]:
+def _goals(one: Results) -> list[_Goal]:
     """What a case makes small, from its part of the fronts."""
     asked = str(one["searched"].item()).split(", ") if "searched" in one else []
     if len(asked) < 2 or tuple(asked) == _MOMENTS:
@@ -89,12 +89,12 @@ def _goals(one: xr.Dataset) -> list[_Goal]:
     return [_asked(one, words, name) for words, name in zip(asked, ORDINALS, strict=False)]
 
 
-def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
+def _moment(one: Results, name: str, words: str) -> _Goal:
     unit = labels.of(one[name])
     return _Goal(unit.label(words), name, name, unit)
 
 
-def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
+def _asked(one: Results, words: str, name: str) -> _Goal:
     """One of them, by its words: statistics of f have the unit of f, shares none, and a formula is in SI units."""
     values = one[f"searched_{name}"]
     words = labels.statistic(words)
@@ -108,7 +108,7 @@ def _asked(one: xr.Dataset, words: str, name: str) -> _Goal:
     return _Goal(label, f"searched_{name}", name, unit)
 
 
-def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
+def _runs(panel: Any, one: Results, x: _Goal, y: _Goal) -> None:
     """The solutions of every run of a case."""
     for k, run in enumerate(one["run"].to_numpy()):
         row = one.sel(run=run)
@@ -119,7 +119,7 @@ def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
 
 def _verified(
     panel: Any,
-    verification: xr.Dataset,
+    verification: Results,
     case: str,
     x: _Goal,
     y: _Goal,
@@ -166,7 +166,7 @@ def _verified(
             panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
 
 
-def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, count: int) -> None:
+def _ends(panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, count: int) -> None:
     """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
     from matplotlib.patheffects import withStroke
 
@@ -190,7 +190,7 @@ def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, c
                 drawn.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
 
 
-def _mark(one: xr.Dataset) -> tuple[str, str]:
+def _mark(one: Results) -> tuple[str, str]:
     """What a design is called in the legend, and its mark."""
     if labels.is_printed(one):
         return "paper (simulated)", "D"
@@ -199,7 +199,7 @@ def _mark(one: xr.Dataset) -> tuple[str, str]:
     return "optimised (simulated)", "o"
 
 
-def _bars(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
+def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
     """Distances to the confidence intervals as `errorbar` wants them, (2, 1); None if there are none."""
     if f"{name}_lower" not in one or f"{name}_upper" not in one:
         return None
@@ -208,7 +208,7 @@ def _bars(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
 
 
 @style.drawn
-def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2) -> "Figure":
+def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) -> "Figure":
     """Responses of optimised designs beside the baseline design's, α left and β right (the paper's Fig. 10), further ends
     behind them.
 
@@ -237,7 +237,7 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
         series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
         unit = labels.scale(
             str(next(iter(series.values())).attrs["units"]),
-            [float(abs(s).max()) for s in series.values()],
+            [float(np.nanmax(abs(s.to_numpy()))) for s in series.values()],
         )
         for panel, members in zip(line, columns.values(), strict=True):
             for design in (d for d in order if d in members):

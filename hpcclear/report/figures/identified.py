@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ BINS = 60
 DAY = 86400.0
 
 
-def _check(content: xr.Dataset) -> None:
+def _check(content: Results) -> None:
     """Raise InputError where nothing was measured."""
     if "interval" not in content:
         reason = "no signal was measured"
@@ -23,7 +23,7 @@ def _check(content: xr.Dataset) -> None:
 
 
 @style.drawn
-def posterior_figure(content: xr.Dataset) -> "Figure":
+def posterior_figure(content: Results) -> "Figure":
     """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``.
 
     Raises
@@ -56,7 +56,7 @@ def posterior_figure(content: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def features_figure(content: xr.Dataset) -> "Figure":
+def features_figure(content: Results) -> "Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
 
     Raises
@@ -66,7 +66,8 @@ def features_figure(content: xr.Dataset) -> "Figure":
     """
     _check(content)
     last = content.isel(record=-1)
-    score = ((last["measured"] - last["predicted"]) / last["predicted_deviation"]).to_numpy()
+    measured, predicted = last["measured"].to_numpy(), last["predicted"].to_numpy()
+    score = (measured - predicted) / last["predicted_deviation"].to_numpy()
     figure, axes = style.grid(1, 1, 60.0)
     panel = axes[0, 0]
     panel.axhspan(
@@ -89,7 +90,7 @@ def features_figure(content: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def growth_figure(content: xr.Dataset) -> "Figure":
+def growth_figure(content: Results) -> "Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
 
     Raises

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
-from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    import xarray as xr
+from hpcclear.results.content import Results, Variable
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -95,7 +92,7 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
     return f"{shown}{unit}"
 
 
-def value(one: xr.DataArray) -> str:
+def value(one: Variable) -> str:
     """A design variable of a design as it is printed: with its unit, or the name of the row of a table."""
     number, options = float(one), str(one.attrs.get("options", ""))
     if options and np.isfinite(number):
@@ -142,12 +139,12 @@ def between(low: float, high: float, units: str) -> str:
     return " to ".join(ends)
 
 
-def of(variable: xr.DataArray) -> Scale:
+def of(variable: Variable) -> Scale:
     """The scale of a variable of a dataset."""
     return scale(str(variable.attrs.get("units", "1")), variable.to_numpy())
 
 
-def words(variable: xr.DataArray) -> str:
+def words(variable: Variable) -> str:
     """What a variable is called on an axis; a design variable by its symbol or scene path."""
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
 
@@ -163,12 +160,12 @@ def statistic(words: str) -> str:
     return re.sub(r"^share with f above", "probability of f above", words)
 
 
-def design_variables(content: xr.Dataset) -> list[xr.DataArray]:
+def design_variables(content: Results) -> list[Variable]:
     """The design variables of a dataset in its order."""
     return [v for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"]
 
 
-def clearance(content: xr.Dataset) -> xr.DataArray | None:
+def clearance(content: Results) -> Variable | None:
     """The design variable that is a clearance, if there is one."""
     for variable in design_variables(content):
         if str(variable.attrs.get("long_name", "")).startswith("radial clearance"):
@@ -181,6 +178,6 @@ def literal(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def is_printed(one: xr.Dataset) -> bool:
+def is_printed(one: Results) -> bool:
     """Whether one design of a dataset of kind ``verification`` is one that a publication prints."""
     return "mean_paper" in one and bool(np.isfinite(one["mean_paper"]))

@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.report.figures import labels, motion, style
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +17,7 @@ _FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
 
 
 @style.drawn
-def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
+def orbit_figure(response: Results, revolutions: int | None = None) -> "Figure":
     """Orbit of the journal centres in the clearance circle, contact distinguished from free flight.
 
     Parameters
@@ -52,7 +52,7 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
 
 
 @style.drawn
-def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
+def force_polar_figure(response: Results, revolutions: int | None = None) -> "Figure":
     """Contact force over its direction in the fixed frame; parameters as for `orbit_figure`."""
     shown = motion.steady(response, revolutions)
     joints = motion.joints(shown)
@@ -90,7 +90,7 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
 
 
 @style.drawn
-def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
+def phase_figure(response: Results, revolutions: int | None = None) -> "Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
     Of a linkage, speed of its last body over its angle or place. Parameters as for `orbit_figure`.
@@ -123,7 +123,7 @@ def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
 
 @style.drawn
 def poincare_figure(
-    response: xr.Dataset, phase: float = 0.0, revolutions: int | None = None
+    response: Results, phase: float = 0.0, revolutions: int | None = None
 ) -> "Figure":
     """Poincaré section: output (slider, or a linkage's last body) and journal centres once a revolution, at one crank angle.
 

@@ -4,10 +4,10 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import fits, labels, style
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @style.drawn
-def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
+def sensitivity_figure(sensitivity: Results) -> "Figure":
     """Sensitivities against clearance, a panel for each response surface (the paper's Fig. 5, curves).
 
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
@@ -43,7 +43,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 def _sensitivity_panel(
-    axes: "Axes", surface: xr.Dataset, across: labels.Scale, unit: labels.Scale
+    axes: "Axes", surface: Results, across: labels.Scale, unit: labels.Scale
 ) -> None:
     widest = surface.isel(interval=int(np.argmax(surface["interval"].to_numpy())))
     clearance = surface["clearance"].to_numpy() * across.factor
@@ -74,7 +74,7 @@ def _sensitivity_panel(
 
 
 @style.drawn
-def fit_figure(sensitivity: xr.Dataset) -> "Figure":
+def fit_figure(sensitivity: Results) -> "Figure":
     """Fit of the response surfaces against clearance, a curve for each interval (the paper's Fig. 7).
 
     Of a dataset of kind ``sensitivity``.
@@ -93,7 +93,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
                 panel.plot(clearance, values, color=colours[k], label=f"{interval:.0%}", **options)
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")
-        lowest = float(sensitivity["r2"].sel(surface=surface).min())
+        lowest = float(np.nanmin(sensitivity["r2"].sel(surface=surface)))
         bottom = max(-0.25, min(lowest, 0.75)) - 0.02
         line[0].set_ylim(bottom, 1.03)
         if lowest < 0.0:
@@ -112,7 +112,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
+def sobol_figure(sensitivity: Results) -> "Figure":
     """Global sensitivity: first-order and total Sobol indices with two standard errors.
 
     Parameters
@@ -156,7 +156,7 @@ def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
+def surfaces_figure(kriging: Results, levels: int = 24) -> "Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
 
     Parameters
@@ -175,7 +175,7 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
 
     main = labels.clearance(kriging)
     name = "" if main is None else str(main.attrs["scene_path"])
-    found = models_in(kriging)
+    found = models_in(kriging.variables)
     shown = {k: m for k, m in found.items() if len(m.names) == 3 and name in m.names}
     if not shown:
         reason = "no model has two design variables and the clearance as inputs"
@@ -225,7 +225,7 @@ def _fields(model: "Piecewise", main: int) -> tuple[Any, Any, Any, Any]:
 
 
 @style.drawn
-def parity_figure(kriging: xr.Dataset) -> "Figure":
+def parity_figure(kriging: Results) -> "Figure":
     """Surrogate against dynamics, every model (the paper's Figs. 6 and 8).
 
     Each point is predicted by the model without that point, so that no point is judged by itself; R2 on the test
@@ -238,7 +238,7 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     """
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 
-    found = models_in(kriging)
+    found = models_in(kriging.variables)
     rows = (len(found) + 1) // 2
     figure, axes = style.grid(rows, 2, 14.0 + 46.0 * rows, sharex=True, sharey=True)
     unit = labels.of(kriging["training_output"])
@@ -265,7 +265,7 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     return figure
 
 
-def _held(sensitivity: xr.Dataset) -> str:
+def _held(sensitivity: Results) -> str:
     """What is held fixed for each surface: the clearance, unless a study says otherwise."""
     words = labels.words(sensitivity["clearance"])
     if words == "radial clearance":

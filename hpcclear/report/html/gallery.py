@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
@@ -23,6 +22,7 @@ from hpcclear.report.figures import (
 )
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,12 +84,12 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
             yield from _of_file(one.draw, found[name], f"{caption[0].upper()}{caption[1:]}.")
 
 
-def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
+def _comparison(found: Mapping[str, Results]) -> dict[str, str]:
     caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
     return _shown(designs.comparison_figure(found), caption)
 
 
-def _response_alone(found: xr.Dataset) -> dict[str, str]:
+def _response_alone(found: Results) -> dict[str, str]:
     caption = f"Response over two revolutions{_clearances(found)}."
     return _shown(response.response_figure(found), caption)
 
@@ -101,20 +101,20 @@ def _shown(figure: "Figure", caption: str) -> dict[str, str]:
 
 
 def _of_file(
-    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset | None, caption: str
+    draw: "Callable[[Results], Figure]", found: Results | None, caption: str
 ) -> Iterator[tuple[str, Maker]]:
     """A figure of one file, unless that is missing."""
     if found is not None:
         yield caption, functools.partial(picture, draw, found, caption)
 
 
-def _warnings(kind: str, content: xr.Dataset | None) -> str:
+def _warnings(kind: str, content: Results | None) -> str:
     """Which surrogates do not fit, behind a caption."""
     found = fits.warnings(kind, content)
     return f" Warning: {'; '.join(found)}." if found else ""
 
 
-def _clearances(*responses: xr.Dataset) -> str:
+def _clearances(*responses: Results) -> str:
     """At which clearances these were simulated, where that is the same for all."""
     parts = []
     for joint, name in enumerate(motion.joints(responses[0]).values()):
@@ -126,7 +126,7 @@ def _clearances(*responses: xr.Dataset) -> str:
 
 
 def picture(
-    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset, caption: str
+    draw: "Callable[[Results], Figure]", found: Results, caption: str
 ) -> dict[str, str] | None:
     """Draw a figure of one file with its caption; None if the file has not what it needs (no Sobol indices, say)."""
     try:
