@@ -31,10 +31,12 @@ from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.posterior import sequential
 from hpcclear.identify.settings import Settings
-from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
+from hpcclear.results.content import Results
+from hpcclear.results.signals import signals_in
 
 sys.path.insert(0, str(ROOT / "analysis"))
 import identify_machines
@@ -143,7 +145,7 @@ def test_a_point_of_a_linkage_has_an_acceleration():
     joints = ("mechanism.joints.o2", "mechanism.joints.o3")
     rigid = without_clearance("linkages/crank_rocker.toml", *joints, **pins)
     response = hpcclear.simulate(rigid)
-    found = series_of(response, "acceleration_x crank.b")
+    found = signals_in(Results.of(response))["acceleration_x crank.b"].values
     expected = -((2.0 * np.pi * 15.0) ** 2) * response["point_x"].sel(point="crank.b")
     np.testing.assert_allclose(found, expected, atol=1e-3 * float(np.abs(expected).max()))
 

@@ -13,9 +13,10 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.response import simulated
-from hpcclear.identify.signals import IMPACTS, revolutions_of, series_of, unit_of
+from hpcclear.identify.signals import revolutions_of
 from hpcclear.identify.training import prepared_scene
 from hpcclear.results.content import Results
+from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -68,14 +69,14 @@ def write_made(
     clockwise = found["crank_angle"][-1] < found["crank_angle"][0]
     columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
-        values = series_of(found, name)
-        if name.startswith(IMPACTS):  # whole events since the sample before, which have no noise
+        one = signal(found, name, "signal")
+        values, unit = one.values, one.unit
+        if one.counted:  # whole events since the sample before, which have no noise
             count = np.round(np.interp(places, turns, np.cumsum(values)))
             columns.append(np.diff(count, prepend=count[0]))
         else:
             sampled = make_interp_spline(turns, values, k=3)(places)
             columns.append(sampled + noise * sampled.std() * rng.standard_normal(len(places)))
-        unit = unit_of(found, name)
         headings.append(name if unit == "1" else f"{name} [{unit}]")
     _write(Path(path), headings, columns)
 

@@ -8,8 +8,9 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.maps import number_of
-from hpcclear.identify.signals import IMPACTS, ORDERS, Spectrum, harmonics
+from hpcclear.identify.signals import ORDERS, Spectrum, harmonics
 from hpcclear.report.compare import Column, read_columns
+from hpcclear.results.signals import is_counted
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -83,7 +84,7 @@ def read_measured(
     column = _column(columns, name, path)
     values = column.si(unit)
     seconds = None if time is None else time.si("s")
-    count = name.startswith(IMPACTS)
+    count = is_counted(name)
     if angle is not None:
         place = np.unwrap(sense * angle.si("rad")) / (2.0 * np.pi * turns)
     elif seconds is not None:

@@ -17,12 +17,11 @@ from hpcclear.identify.signals import (
     ORDERS,
     PARTS,
     Spectrum,
-    check_name,
     spectra,
-    unit_of,
 )
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -82,9 +81,7 @@ def units_of(scene: Scene, names: Sequence[str]) -> tuple[str, ...]:
     """Return the units of signals; raises InputError where the mechanism lacks one."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
     found = simulated(scene.with_(short), checked=False)
-    for name in names:
-        check_name(found, name)
-    return tuple(unit_of(found, name) for name in names)
+    return tuple(signal(found, name, "--signal").unit for name in names)
 
 
 def ensemble_of(

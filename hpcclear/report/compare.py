@@ -15,7 +15,8 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
-from hpcclear.results.content import Results, Variable
+from hpcclear.results.content import Results
+from hpcclear.results.signals import Signal, signals_in
 from hpcclear.scene.sheets import read
 from hpcclear.scene.units import UnitError, factor
 
@@ -66,6 +67,8 @@ class Quantity:
 
     name: str
     """As headings of exported tables have it, without the unit."""
+    label: str
+    """Its words."""
     unit: str
     shown: str
     """The unit of the measured column."""
@@ -163,9 +166,9 @@ def compare(
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
     _check_names(names or {}, columns)
-    pairs = [(column, *_series(shown, column, names or {})) for column in columns[1:]]
-    measured = [column.si(str(one.attrs.get("units", "1"))) for column, _, one in pairs]
-    simulated = [_periodic(place, one.to_numpy()) for _, _, one in pairs]
+    pairs = [(column, _signal(shown, column, names or {})) for column in columns[1:]]
+    measured = [column.si(one.unit) for column, one in pairs]
+    simulated = [(_counted if one.counted else _periodic)(place, one.values) for _, one in pairs]
     how = ("angle" if axis == "angle" else "correlation") if align == "auto" else align
     if how == "angle" and axis != "angle":
         remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
@@ -178,15 +181,16 @@ def compare(
     every = _every(place, at)
     quantities = tuple(
         Quantity(
-            name,
-            str(one.attrs.get("units", "1")),
+            one.name,
+            one.label,
+            one.unit,
             column.unit,
             own,
             curve(at),
             curve(every),
             np.array([np.sqrt(np.mean((curve(at + one) - own) ** 2)) for one in others]),
         )
-        for (column, name, one), own, curve in zip(pairs, measured, simulated, strict=True)
+        for (column, one), own, curve in zip(pairs, measured, simulated, strict=True)
     )
     series_x = _measured_axis(shown, axis, given, at, every)
     return Comparison(
@@ -286,14 +290,14 @@ def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Arra
     return angle - angle[0], lambda given: np.unwrap(sense * (given - first))
 
 
-def _series(response: Results, column: Column, names: Mapping[str, str]) -> tuple[str, Variable]:
-    """Name and series (t,) of the quantity that a column measures."""
+def _signal(response: Results, column: Column, names: Mapping[str, str]) -> Signal:
+    """The signal that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
-    found = motion.series(response)
+    found = signals_in(response)
     match = {_plain(name): name for name in found}.get(_plain(wanted))
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
-        fitting = [name for name in found if _fits(column.unit, found[name].attrs["units"])]
+        fitting = [name for name in found if _fits(column.unit, found[name].unit)]
         remedy = (
             f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, fitting or list(found))
         )
@@ -301,7 +305,7 @@ def _series(response: Results, column: Column, names: Mapping[str, str]) -> tupl
         raise InputError(
             "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
         )
-    return match, found[match]
+    return found[match]
 
 
 def _fits(unit: str, of: str) -> bool:
@@ -310,6 +314,16 @@ def _fits(unit: str, of: str) -> bool:
         return bool(unit and factor(unit, of))
     except UnitError:
         return False
+
+
+def _counted(place: Array, values: Array) -> Callable[[Array], Array]:
+    """Events (t,) between the place before and each place, continued with the period of them all."""
+    span, passed = float(place[-1]), np.cumsum(values)
+
+    def since(at: Array) -> Array:
+        return passed[-1] * np.floor(at / span) + np.interp(np.mod(at, span), place, passed)
+
+    return lambda at: np.diff(since(at), prepend=since(at[:1]))
 
 
 def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:

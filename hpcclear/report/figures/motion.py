@@ -129,24 +129,6 @@ def quantities(response: Results) -> list[tuple[str, str, str]]:
     return found
 
 
-def series(response: Results) -> dict[str, Variable]:
-    """Every series (t,) by its name; of joints, bodies and points by that and their label, which a single one may lack."""
-    found: dict[str, Variable] = {}
-    for key, variable in response.data_vars.items():
-        name, others = str(key), [dim for dim in variable.dims if dim != "time"]
-        if "time" not in variable.dims or len(others) > 1:
-            continue
-        if not others:
-            found[name] = variable
-            continue
-        labels = [str(label) for label in response[others[0]].to_numpy()]
-        for k, label in enumerate(labels):
-            found[f"{name} {label}"] = variable.isel({others[0]: k})
-        if len(labels) == 1:
-            found[name] = variable.isel({others[0]: 0})
-    return found
-
-
 def followed(response: Results) -> tuple[Variable, Variable]:
     """Where the output stands and how fast it moves: the slider, or a linkage's last body, by its angle if it turns, else along
     the axis on which it moves further."""
@@ -218,14 +200,14 @@ def objective_by_turn(response: Results) -> Array:
     return np.sqrt(squares)
 
 
-def section(response: Results, name: str | Variable, phase: float = 0.0) -> Array:
-    """A variable, by name or itself, once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
+def section(response: Results, name: str | Variable | Array, phase: float = 0.0) -> Array:
+    """A variable, by name or itself (t, ...), once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
     angle, sense = crank_angle(response)
     phase = sense * phase
     first = np.ceil((angle[0] - phase) / TURN - 1e-6)
     last = np.floor((angle[-1] - phase) / TURN + 1e-6)
     at = phase + TURN * np.arange(first, last + 1)
-    values = (response[name] if isinstance(name, str) else name).to_numpy()
+    values = np.asarray(response[name] if isinstance(name, str) else name)
     columns = values.reshape(len(angle), -1).T
     return np.column_stack([np.interp(at, angle, column) for column in columns]).reshape(
         len(at), *values.shape[1:]
