@@ -150,8 +150,8 @@ def test_an_mp4_plays(tmp_path):
 
 def test_a_map_is_drawn_in_readable_units_and_shown_on_the_page(tmp_path):
     line, plane = (report.map_figure(cells(*shape)) for shape in ((6,), (4, 3)))
-    assert line.axes[-1].get_xlabel() == "C (mm)"
-    assert plane.axes[0].get_ylabel() == "drive.speed (rpm)"
+    assert line.axes[-1].get_xlabel() == "clearance $C$ (mm)"
+    assert plane.axes[0].get_ylabel() == "speed of the drive (rpm)"
     with pytest.raises(InputError, match="no map"):
         report.map_figure(data.samples())
     opened.write(cells(6), tmp_path / "map.nc")
@@ -216,7 +216,7 @@ def test_a_bifurcation_over_a_speed_is_simulated_written_found_again_and_drawn(t
     xr.testing.assert_identical(run_bifurcation(*words).content.to_xarray(), content)
     assert found.content["observed"].attrs["units"] == "m"
     axes = report.bifurcation_figure(content).axes[0]
-    assert axes.get_xlabel() == "drive.speed (rpm)"
+    assert axes.get_xlabel() == "speed of the drive (rpm)"
     np.testing.assert_allclose(axes.lines[0].get_xdata(), np.repeat([1000, 2000, 3000], 2))
     assert len(hpcclear.to_table(content)) == 6
     with pytest.raises(InputError, match="no bifurcation"):

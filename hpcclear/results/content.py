@@ -195,7 +195,7 @@ class Results:
     def get(self, name: str, default: Other) -> Variable | Other: ...
 
     def get(self, name: str, default: Any = None) -> Any:
-        """Return a variable, or the default where there is none of this name."""
+        """Return a variable, or the default where this name is missing."""
         return self.variables.get(name, default)
 
     def __contains__(self, name: object) -> bool:

@@ -114,7 +114,7 @@ def signals_in(response: Results) -> dict[str, Signal]:
 
 
 def signal(response: Results, name: str, key: str) -> Signal:
-    """Return a signal of a response; raises InputError with the option or entry `key` where it has none of this name."""
+    """Return a signal of a response; raises InputError with the option or entry `key` where this name is missing."""
     found = signals_in(response)
     if name not in found:
         alike = [one for one in found if one.startswith(f"{name} ")]

@@ -48,7 +48,7 @@ def posterior_figure(content: Results) -> "Figure":
             ends = content["interval"][k, u].to_numpy() * scale.factor
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
-        panel.set_xlabel(scale.label(str(content["unknown"].to_numpy()[u])))
+        panel.set_xlabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
         panel.set_ylabel(f"density (1/{scale.unit})")
         panel.legend(loc="upper right")
     style.settle(axes)
@@ -119,7 +119,7 @@ def growth_figure(content: Results) -> "Figure":
             limit = scale.factor * float(content.attrs["limit"])
             panel.axhline(limit, color=style.PALETTE["orange"], ls="--", label="limit")
         panel.set_xlabel("time since the first record (days)")
-        panel.set_ylabel(scale.label(str(content["unknown"].to_numpy()[u])))
+        panel.set_ylabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
         panel.legend(loc="best")
     style.settle(axes)
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
 from hpcclear.results.content import Results, Variable
+from hpcclear.results.names import DESIGN_VARIABLES
+from hpcclear.scene.paths import described
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -145,8 +148,50 @@ def of(variable: Variable) -> Scale:
 
 
 def words(variable: Variable) -> str:
-    """What a variable is called on an axis; a design variable by its symbol or scene path."""
+    """What a variable is called in a sentence; a design variable by its short name or scene path."""
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
+
+
+MEANINGS = {
+    "m1": "crank mass $m_1$",
+    "u1": "crank centre $u_1$",
+    "I1": "crank inertia $I_1$",
+    "m2": "rod mass $m_2$",
+    "u2": "rod centre $u_2$",
+    "I2": "rod inertia $I_2$",
+    "m3": "slider mass $m_3$",
+    "C": "clearance $C$",
+}
+"""Of the short names of a scene, for a variable that is what its short name says."""
+
+WIDE = 32
+"""Letters of a line of an axis label: half a column."""
+
+
+def axis(variable: Variable) -> str:
+    """What a variable is called on an axis, in words: "radial clearance of the joint A"."""
+    words, path = (
+        str(variable.attrs.get("long_name", "")),
+        str(variable.attrs.get("scene_path", "")),
+    )
+    if path:
+        return entry(path, words)
+    return wrapped(words or variable.name.replace("_", " "))
+
+
+def entry(path: str, words: str = "") -> str:
+    """What an entry of a scene is called on an axis, by its path or short name and its words, where a file has some."""
+    short = DESIGN_VARIABLES.get(path, ("", ""))[1]
+    if short and words in ("", short):
+        return MEANINGS.get(path, wrapped(short))
+    if words in ("", f"design variable {path}"):
+        words = described([path]) if "." in path else path.replace("_", " ")
+    return wrapped(words)
+
+
+def wrapped(words: str) -> str:
+    """Words in lines of `WIDE` letters, printed as they are."""
+    return literal("\n".join(textwrap.wrap(words, WIDE)))
 
 
 def objective(content: Results) -> str:

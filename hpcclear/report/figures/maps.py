@@ -44,7 +44,7 @@ def map_figure(content: Results) -> "Figure":
 def entry(variable: Variable) -> tuple[Array, str]:
     """Values (n,) of an entry of the scene in a readable unit, and the label of its axis; angular speeds in rpm."""
     unit = RPM if variable.attrs.get("units") == "rad/s" else labels.of(variable)
-    words = labels.literal(labels.words(variable))
+    words = labels.axis(variable)
     label = unit.label(words) if unit.unit != "–" else words
     return variable.to_numpy() * unit.factor, label
 

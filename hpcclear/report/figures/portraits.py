@@ -113,8 +113,8 @@ def phase_figure(response: Results, revolutions: int | None = None) -> "Figure":
         line = LineCollection(list(parts), array=turn[1:], cmap=style.COLOURS, linewidths=0.6)
         panel.add_collection(line)
         panel.autoscale_view()
-        panel.set_xlabel(x.label(labels.words(both[0])))
-        panel.set_ylabel(y.label(labels.words(both[1])))
+        panel.set_xlabel(x.label(labels.axis(both[0])))
+        panel.set_ylabel(y.label(labels.axis(both[1])))
     bar = figure.colorbar(line, ax=axes[:, 0].tolist(), location="bottom", aspect=50, pad=0.02)
     bar.set_label(motion.turns_label(shown))
     style.settle([*axes[:, 0], bar.ax])
@@ -159,8 +159,8 @@ def poincare_figure(
         "zorder": 3,
     }
     drawn = top.scatter(position, velocity, **options)
-    top.set_xlabel(x.label(labels.words(output[0])))
-    top.set_ylabel(y.label(labels.words(output[1])))
+    top.set_xlabel(x.label(labels.axis(output[0])))
+    top.set_ylabel(y.label(labels.axis(output[1])))
     top.set_title(f"{len(order)} crossings of crank angle {np.degrees(phase):g}°")
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = motion.clearances(shown) * unit.factor

@@ -8,24 +8,10 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.results.content import Results, Variable
-from hpcclear.results.names import DESIGN_VARIABLES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-_MEANINGS = {
-    "m1": "crank mass $m_1$",
-    "u1": "crank centre $u_1$",
-    "I1": "crank inertia $I_1$",
-    "m2": "rod mass $m_2$",
-    "u2": "rod centre $u_2$",
-    "I2": "rod inertia $I_2$",
-    "m3": "slider mass $m_3$",
-    "C": "clearance $C$",
-}
-"""Of the short names of a scene, for a variable that is what its short name says."""
 
 
 @style.drawn
@@ -67,22 +53,14 @@ def samples_figure(samples: Results) -> "Figure":
         panel = figure.add_subplot(row[i % 2], sharey=first)
         drawn = _cloud(panel, variable, samples["objective"], _values(main))
         panel.tick_params(labelleft=i % 2 == 0)
-        panel.set_xlabel(labels.of(variable).label(symbol(variable)))
+        panel.set_xlabel(labels.of(variable).label(labels.axis(variable)))
         panel.set_ylabel(unit.label("$f$") if i % 2 == 0 else "")
         style.settle([panel], 3)
     if others:
         bar = figure.colorbar(drawn, cax=figure.add_subplot(cells[-1]), orientation="horizontal")
-        bar.set_label("colour of the points: " + labels.of(main).label(symbol(main)))
+        bar.set_label("colour of the points: " + labels.of(main).label(labels.axis(main)))
         style.settle([bar.ax])
     return figure
-
-
-def symbol(variable: Variable) -> str:
-    """What a design variable is called on an axis, short enough for half a column."""
-    name = str(variable.attrs["scene_path"])
-    short = name if len(name) < 24 else "…" + name[-23:]
-    is_short = DESIGN_VARIABLES.get(name, ("", ""))[1] == variable.attrs.get("long_name")
-    return _MEANINGS[name] if is_short and name in _MEANINGS else labels.literal(short)
 
 
 def _first_rows(figure: "Figure", cells: Any, samples: Results, main: Variable) -> "Axes":
@@ -115,7 +93,7 @@ def _first_rows(figure: "Figure", cells: Any, samples: Results, main: Variable) 
 def _spread(below: "Axes", samples: Results, main: Variable) -> None:
     """How f scatters between revolutions, where that is known."""
     spread = samples["objective_spread"]
-    below.set_xlabel(labels.of(main).label(symbol(main)))
+    below.set_xlabel(labels.of(main).label(labels.axis(main)))
     values = spread.to_numpy()
     if np.isnan(values).all() and not np.isnan(samples["objective"]).all():
         below.set_yticks([])

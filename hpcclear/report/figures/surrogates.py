@@ -198,11 +198,11 @@ def surfaces_figure(kriging: Results, levels: int = 24) -> "Figure":
             drawn = panel.contourf(*grid, levels=edges, cmap=style.COLOURS)
             lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
             panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
-            panel.set_xlabel(scales[0].label(symbol(str(first.attrs["scene_path"]))))
+            panel.set_xlabel(scales[0].label(labels.axis(first)))
             panel.tick_params(labelleft=k == 0)
             panel.set_title(f"$C$ = {clearances[k] * across.factor:.3g} {across.unit}")
             fits.mark(panel, known[family])
-        line[0].set_ylabel(scales[1].label(symbol(str(second.attrs["scene_path"]))))
+        line[0].set_ylabel(scales[1].label(labels.axis(second)))
         line[0].set_title(f"{line[0].get_title(loc='left')}, $R^2$ = {known[family]:.2g}")
     bar = figure.colorbar(drawn, ax=axes.ravel().tolist(), location="bottom", aspect=45, pad=0.01)
     bar.set_label(unit.label("objective $f$"))
@@ -280,14 +280,14 @@ def _surface(name: str) -> str:
 
 
 def symbol(name: str) -> str:
-    """A design variable in a formula's letters, or its path shortened."""
+    """A design variable in a formula's letters, or in words."""
     if name.endswith("_ratio"):
         return f"{symbol(name.removesuffix('_ratio'))} ratio"
     if len(name) == 2 and name[1].isdigit():
         return f"${name[0]}_{name[1]}$"
     if name == "C":
         return "$C$"
-    return labels.literal(name if len(name) < 18 else "…" + name[-17:])
+    return labels.entry(name)
 
 
 def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:
