@@ -702,3 +702,40 @@ def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, k
         assert sorted(flags) == sorted(codes)
         if "status" in found:
             np.testing.assert_array_equal(found["status"].cf == "ok", found["status"] == Status.OK)
+
+
+WITHOUT_XARRAY = """
+import sys
+from importlib import import_module
+for name in ("study", "study.stages", "accuracy.run", "identify.answer", "ensemble.statistics", "ensemble.wear",
+             "report.answer", "report.html.page", "report.figures.catalogue", "report.compare", "cli"):
+    import_module(f"hpcclear.{name}")
+print(sorted({"xarray", "pandas"} & set(sys.modules)))
+"""
+
+
+def test_commands_load_no_xarray():
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_XARRAY], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_results_select_as_xarray_does():
+    content = samples(6)
+    found = Results.of(content)
+    for chosen in (
+        {"sample": 2},
+        {"sample": [4, 1]},
+        {"joint": -1},
+        {"sample": slice(1, 4), "joint": 0},
+    ):
+        assert found.isel(chosen).to_xarray().identical(content.isel(chosen))
+    label = str(content["joint"].values[1])
+    assert found.sel(joint=label).to_xarray().identical(content.sel(joint=label))
+    assert found.sel(joint=[label]).to_xarray().identical(content.sel(joint=[label]))
+    one = content["mean_gap"].sel(joint=label)
+    np.testing.assert_array_equal(found["mean_gap"].sel(joint=label), one)
+    assert Results.of(found.to_xarray()).attrs == content.attrs
+    with pytest.raises(KeyError):
+        found.sel(joint="nowhere")
