@@ -20,13 +20,13 @@ from hpcclear.cli.options import (
     show,
 )
 from hpcclear.ranks.stopping import Exit
-from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hpcclear.report.compare import Quantity
     from hpcclear.report.html.content import Content
+    from hpcclear.results.content import Results
 
 FILE = click.argument("file", type=PATH)
 UNITS = click.option(
@@ -257,7 +257,7 @@ def plot(
     return Exit.DONE
 
 
-def _moving(content: "Content", place: Path) -> Results:
+def _moving(content: "Content", place: Path) -> "Results":
     """The response that a film shows."""
     if content.response is None:
         reason = "it holds no response, so there is no motion to show"

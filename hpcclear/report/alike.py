@@ -53,7 +53,7 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
     same = [
         f"{labels.words(one)} = {labels.value(one.isel(design=0))}"
         for one in labels.design_variables(together)
-        if np.ptp(one) <= SAME * abs(np.max(one))
+        if np.ptp(one.to_numpy()) <= SAME * abs(one.to_numpy().max())
     ]
     text += f"; in common: {', '.join(same)}" if same else ""
     return text + _lightest(together, best)
