@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def write_made(
     scene: Scene, path: str | Path, names: Sequence[str], *, noise: float, revolutions: int = 30,
-    samples: int = 512, seed: int = 0, response: xr.Dataset | None = None,
+    samples: int = 512, seed: int = 0, response: xr.Dataset | Results | None = None,
 ) -> None:  # fmt: skip
     """Simulate a scene and write what a sensor would record over the crank angle, after the transient.
 
