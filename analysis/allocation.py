@@ -176,7 +176,7 @@ def mechanism() -> None:
     study["verification"] = {"designs": 2, "infill_rounds": 3}
     with tempfile.TemporaryDirectory() as place:
         run_study(load_scene(content | {"study": study}), place, alone(), progress_style="quiet")
-        verified = dataset.read(Path(place) / "verification.nc")
+        verified = dataset.read(Path(place) / "verification.nc").to_xarray()
     best = verified.sel(design="cheap alpha")
     print(f"threshold {threshold:.4g} m; half of the largest widths cost {costs.sum():.4g}")
     print(f"study: {best['constraints'].item()}")

@@ -38,7 +38,10 @@ def main() -> None:
     parser.add_argument("--simulations", type=int, default=8192)
     parser.add_argument("--scan", type=int, default=200)
     words = parser.parse_args()
-    tables = [dataset.read(one / "verification.nc", "verification") for one in words.directories]
+    tables = [
+        dataset.read(one / "verification.nc", "verification").to_xarray()
+        for one in words.directories
+    ]
     for place, table in zip(words.directories, tables, strict=True):
         scene = load_scene(tomllib.loads(table.attrs["scene"]))
         for case in scene.required_study.cases:

@@ -133,7 +133,7 @@ def judged(scene: Scene, place: Path, simulations: int) -> dict[str, Any]:
         row: dict[str, Any] = json.loads(kept.read_text())
         return row
     seconds = time.process_time() - begun
-    table = dataset.read(place / "verification.nc", "verification")
+    table = dataset.read(place / "verification.nc", "verification").to_xarray()
     best = table.sel(design=recommended(table))
     (case,) = scene.required_study.cases
     names = scene.required_study.design_variables(case.name)

@@ -97,7 +97,7 @@ def judged(seed: int) -> dict[str, Any]:
     with dynamics(form), tempfile.TemporaryDirectory() as name:
         said, _ = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)
         place, simulations = carried_out(scene, Path(name) / "out")
-        table = dataset.read(place / "verification.nc", "verification")
+        table = dataset.read(place / "verification.nc", "verification").to_xarray()
     found: dict[str, Any] = {"seed": seed, "kind": kind, "most": float(f"{most:.3g}")}
     found |= {
         "simulations": simulations,

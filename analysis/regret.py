@@ -340,7 +340,7 @@ def measured(
     names = scene.required_study.design_variables(case)
     taken = []
     for directory, _ in runs.values():
-        table = dataset.read(directory / "verification.nc", "verification")
+        table = dataset.read(directory / "verification.nc", "verification").to_xarray()
         best = table.sel(design=recommended(table))
         taken.append([float(best[name]) for name in names])
     kept = place / "reference.npy"
@@ -351,7 +351,7 @@ def measured(
     values, errors, broken, least = judged(scene, choices_of(scene, case, [*taken, np.load(kept)]))
     told_of = []
     for row, (of, (directory, spent)) in enumerate(runs.items()):
-        models = dataset.read(directory / "kriging.nc", "kriging")
+        models = dataset.read(directory / "kriging.nc", "kriging").to_xarray()
         said, _ = forecast.expected(
             scene.with_({"study.surrogate.of": of}), partial(evaluated, scene), 1e-3
         )

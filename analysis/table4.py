@@ -15,19 +15,19 @@ COLUMNS = {"m2": 1.0, "m3": 1.0, "u2": 1.0, "I2": 1e4}
 
 def main(directory: Path) -> None:
     """Print designs, true and predicted moments, the paper's values, claims and readings."""
-    table = dataset.read(directory / "verification.nc", "verification")
+    table = dataset.read(directory / "verification.nc", "verification").to_xarray()
     print(f"{'design':28}  m2 kg  m3 kg   u2 m  I2 1e-4 |    mean 1e-4 (95 % limits)  surrogate"
           "   paper | deviation 1e-5  surrogate")  # fmt: skip
     for one in (table.isel(design=k) for k in range(table.sizes["design"])):
         print(row(one))
     print("\nsurrogate:", table.attrs["remarks"])
-    claims = dataset.read(directory / "claims.nc", "claims")
+    claims = dataset.read(directory / "claims.nc", "claims").to_xarray()
     for number, claim in enumerate(claims["text"].to_numpy()):
         print(f"\n{number + 1}. {claim}: {Verdict(int(claims['verdict'][number])).name}")
         print(f"   {claims['figure'].to_numpy()[number]}")
     if (directory / "readings.nc").exists():
         print("\nThe paper's designs, read so (distance of the means from the printed ones):")
-        readings = dataset.read(directory / "readings.nc", "readings")
+        readings = dataset.read(directory / "readings.nc", "readings").to_xarray()
         for k in np.argsort(readings["distance"].to_numpy()):
             print(f"{float(readings['distance'][k]):8.2f}  {readings['reading'].to_numpy()[k]}")
 

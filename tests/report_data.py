@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import opened
 import xarray as xr
 
 from hpcclear.base.outcome import OUTCOME, Flag, Status
@@ -58,7 +59,7 @@ def samples(count: int = 60, failed: int = 3) -> xr.Dataset:
         records[name][-failed:] = np.nan
     records["latched"][-failed:] = 0
     records["status"][-failed:] = Status.STEP_CAP
-    return dataset.samples_dataset(NAMES, points, {}, records, ATTRIBUTES)
+    return dataset.samples_dataset(NAMES, points, {}, records, ATTRIBUTES).to_xarray()
 
 
 def kriging(points: int = 40) -> xr.Dataset:
@@ -96,7 +97,7 @@ def kriging(points: int = 40) -> xr.Dataset:
     data["accepted"] = np.ones(len(inputs), np.int8)
     data |= {"family": words, "r2": np.full(len(inputs), 0.997), "rmae": np.full(len(inputs), 0.2)}
     coords = {"model": words, "point": np.arange(points), "parameter": np.array(NAMES)}
-    return dataset.dataset("kriging", coords, data, ATTRIBUTES)
+    return dataset.dataset("kriging", coords, data, ATTRIBUTES).to_xarray()
 
 
 def sensitivity() -> xr.Dataset:
@@ -135,7 +136,7 @@ def sensitivity() -> xr.Dataset:
         "clearance": clearance,
         "parameter": parameters,
     }
-    return dataset.dataset("sensitivity", coords, data, ATTRIBUTES)
+    return dataset.dataset("sensitivity", coords, data, ATTRIBUTES).to_xarray()
 
 
 def front(runs: int = 2, solutions: int = 12) -> xr.Dataset:
@@ -154,7 +155,7 @@ def front(runs: int = 2, solutions: int = 12) -> xr.Dataset:
     data["verified"] = np.zeros(shape, np.int8)
     data["verified"][:, 0, ::3] = 1
     coords = {"case": np.array(CASES), "run": np.arange(runs), "solution": np.arange(solutions)}
-    return dataset.dataset("front", coords, data, ATTRIBUTES)
+    return dataset.dataset("front", coords, data, ATTRIBUTES).to_xarray()
 
 
 def verification() -> xr.Dataset:
@@ -180,7 +181,7 @@ def verification() -> xr.Dataset:
     data |= {name: np.array([float(row[2][name]) for row in rows]) for name in NAMES[:4]}
     data |= {"samples": np.full(len(rows), 10_000), "failed": np.zeros(len(rows), int)}
     coords = {"design": np.array([row[0] for row in rows])}
-    return dataset.dataset("verification", coords, data, ATTRIBUTES)
+    return dataset.dataset("verification", coords, data, ATTRIBUTES).to_xarray()
 
 
 def claims() -> xr.Dataset:
@@ -192,7 +193,7 @@ def claims() -> xr.Dataset:
             ["slope 0.3 ± 0.01", "<img src=x onerror=alert(1)>", "2 of 8 clearances"]
         ),
     }
-    return dataset.dataset("claims", {"claim": np.arange(1, 4)}, data, ATTRIBUTES)
+    return dataset.dataset("claims", {"claim": np.arange(1, 4)}, data, ATTRIBUTES).to_xarray()
 
 
 def accuracy() -> xr.Dataset:
@@ -239,7 +240,7 @@ def accuracy() -> xr.Dataset:
         "study": "m2, m3, u2, I2, C",
         "batch": "512 samples",
     }
-    return dataset.dataset("accuracy", coords, data, ATTRIBUTES | words)
+    return dataset.dataset("accuracy", coords, data, ATTRIBUTES | words).to_xarray()
 
 
 def _spent(spent: np.ndarray) -> dict[str, object]:
@@ -312,7 +313,7 @@ def timing(ranks: int = 2) -> xr.Dataset:
     data = {"busy": busy, "idle": 0.1 * busy + 0.2, "compile": 0.2 * busy, "write": 0.01 * busy}
     data["samples"] = np.array([[260, 0], [252, 0]])[:ranks]
     command = "mpiexec -n 2 hpcclear run jobs/<i>x</i>.toml -o results/x"
-    return dataset.timing_dataset(["samples", "kriging"], data, command, ATTRIBUTES)
+    return dataset.timing_dataset(["samples", "kriging"], data, command, ATTRIBUTES).to_xarray()
 
 
 def response(revolutions: int = 4, clearance: float = 3e-4, instants: int = 200) -> xr.Dataset:
@@ -362,12 +363,12 @@ def write_study(directory: Path) -> Path:
     """A whole results directory."""
     makers = (samples, kriging, sensitivity, front, verification, claims, timing)
     for maker in makers:
-        dataset.write(maker(), directory / f"{maker.__name__}.nc")
+        opened.write(maker(), directory / f"{maker.__name__}.nc")
     (directory / "responses").mkdir()
     for k, name in enumerate(("original", *(f"{c} {s}" for c in CASES for s in ("alpha", "beta")))):
         content = response(2, clearance=3e-4 * (1.0 - 0.1 * k), instants=120)
         content.attrs["design"] = name
-        dataset.write(content, directory / "responses" / f"{name.replace(' ', '_')}.nc")
+        opened.write(content, directory / "responses" / f"{name.replace(' ', '_')}.nc")
     return directory
 
 

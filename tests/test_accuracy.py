@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from margins import FALSE_RED, at_least, at_most, fewest, most
 from scipy.stats import chi2, f
@@ -19,7 +20,6 @@ from hpcclear.cli.accuracy import advice, describe, resolution
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import accuracy as accuracy_figures
 from hpcclear.report.figures import style
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -292,8 +292,8 @@ def measured():
 
 
 def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
-    dataset.write(measured, tmp_path / "accuracy.nc")
-    again = dataset.read(tmp_path / "accuracy.nc", "accuracy")
+    opened.write(measured, tmp_path / "accuracy.nc")
+    again = opened.read(tmp_path / "accuracy.nc", "accuracy")
     assert again.identical(measured)
     for name in ("processor", "versions", "repeats", "profile", "study", "scene"):
         assert again.attrs[name]

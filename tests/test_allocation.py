@@ -8,6 +8,7 @@ import sys
 import tomllib
 
 import numpy as np
+import opened
 import pytest
 from commands import warm
 from patience import crowded
@@ -15,7 +16,6 @@ from patience import crowded
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.study import run_study
 
@@ -55,7 +55,7 @@ def scene_with(variables, random, case, physics=(), **study):
 
 def verified(scene, place):
     run_study(scene, place, alone(), progress_style="quiet")
-    return dataset.read(place / "verification.nc")
+    return opened.read(place / "verification.nc")
 
 
 # -- allocation -------------------------------------------------------------------------------------
@@ -92,7 +92,7 @@ def test_reciprocal_costs_come_to_lagrange_s_solution(objective, tmp_path):
     assert widths == pytest.approx(exact, rel=0.01)
     assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert np.sqrt((slopes**2 * widths**2).sum() / 3) <= most
-    parts = {"verification": found, "contributions": dataset.read(tmp_path / "a/contributions.nc")}
+    parts = {"verification": found, "contributions": opened.read(tmp_path / "a/contributions.nc")}
     lines = {line.label: line.text for line in answer(parts, "a")}
     assert "most for its cost" in lines["tighten first"]
     assert "lightest" not in lines.get("near", "")  # widths of masses are no masses
@@ -159,21 +159,21 @@ def f_of(m2, m3, clearance, inertia):
 
 def test_every_design_exists_and_samples_too(results):
     for name in ("verification", "front", "samples"):
-        found = dataset.read(results / f"{name}.nc")
+        found = opened.read(results / f"{name}.nc")
         for variable, options in (("fit", range(3)), ("rod", range(3)), ("m3", (0.1, 0.14, 0.2))):
             values = found[variable].to_numpy().ravel()
             values = values[np.isfinite(values)]
             assert values.size
             assert min(abs(values[:, None] - np.array(list(options))).min(axis=1)) < 1e-12
             assert max(abs(values[:, None] - np.array(list(options))).min(axis=1)) < 1e-12
-    samples = dataset.read(results / "samples.nc")
+    samples = opened.read(results / "samples.nc")
     assert samples["duty"].to_numpy()[:4].tolist() == [0, 1, 0, 1]
     assert samples["duty"].attrs["options"] == "idle; full"
 
 
 def test_the_cheapest_design_is_that_of_enumeration(results):
     """Of all fits, rods and masses the least cost for which some mass of the rod keeps both constraints."""
-    scene, found = all_kinds(), dataset.read(results / "verification.nc")
+    scene, found = all_kinds(), opened.read(results / "verification.nc")
     rng = np.random.default_rng(1)
     chances = rng.random((2, 4000))
     row = scene.study.random_input("C12")
@@ -193,7 +193,7 @@ def test_the_cheapest_design_is_that_of_enumeration(results):
 
 
 def test_the_worst_case_is_at_the_corner_of_a_monotone_f(results):
-    found, worst = (dataset.read(results / f"{name}.nc") for name in ("verification", "worst"))
+    found, worst = (opened.read(results / f"{name}.nc") for name in ("verification", "worst"))
     scene = all_kinds()
     for name in ("a alpha", "a beta", "a original"):
         one, own = found.sel(design=name), worst.sel(design=name)

@@ -49,7 +49,7 @@ def verified(mean, deviation, half=1e-6, **more):
         "deviation_lower": deviation - half,
         "deviation_upper": deviation + half,
     }
-    return dataset.dataset("verification", {"design": np.array(NAMES)}, columns | more)
+    return dataset.dataset("verification", {"design": np.array(NAMES)}, columns | more).to_xarray()
 
 
 MEAN = [4e-4, 2e-4, 3e-4, 2.015e-4, 1e-4]

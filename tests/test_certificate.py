@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import tomli_w
 import xarray as xr
@@ -39,7 +40,6 @@ from hpcclear.report.figures.effects import (
     statements,
 )
 from hpcclear.report.html.page import write_report
-from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 from hpcclear.scene import load_scene
@@ -535,7 +535,7 @@ def certified(tmp_path_factory):
 def test_the_scene_that_is_printed_stays_within_the_tolerance(certified):
     """By points of its own, which the certificate has not seen."""
     place, output = certified
-    content = dataset.read(place / "e.nc", "effects")
+    content = opened.read(place / "e.nc", "effects")
     chosen = int(np.argmax(content["recommended"].to_numpy()))
     off = content["off"].to_numpy()[chosen]
     names = content["effect"].to_numpy()
@@ -556,14 +556,14 @@ def test_the_scene_that_is_printed_stays_within_the_tolerance(certified):
 
 def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
     place, _ = certified
-    timing = dataset.read(place / "e.timing.nc", "timing")
+    timing = opened.read(place / "e.timing.nc", "timing")
     seconds = seconds_of(timing)
     assert set(seconds) >= {"all on", "gravity", "friction in joints + gravity + slider load"}
     assert {len(times) for times in seconds.values()} <= set(range(ROUNDS[0], ROUNDS[1] + 1))
     assert all(0.0 < value < 10.0 for times in seconds.values() for value in times)
     medians = {name: float(np.median(times)) for name, times in seconds.items()}
     assert json.loads(timing.attrs[SECONDS_PER_SAMPLE]) == medians
-    content = dataset.read(place / "e.nc", "effects")
+    content = opened.read(place / "e.nc", "effects")
     assert "seconds" not in " ".join([*content.variables, *content.attrs])
     estimate = saving(content, 1, {})
     assert estimate.share == pytest.approx(1.0 - float(content["work"][1]))
@@ -573,7 +573,7 @@ def test_no_time_is_in_the_file_and_costs_are_beside_it(certified):
 
 def test_savings_have_intervals_and_these_hold(certified, shift):
     """A machine that slows down and speeds up changes all times of a round alike; what is left scatters by 5 %."""
-    content = dataset.read(certified[0] / "e.nc", "effects")
+    content = opened.read(certified[0] / "e.nc", "effects")
     name = label(named(content, 1))
     rng, held = np.random.default_rng([11, shift]), 0
     for _ in range(200):
@@ -591,7 +591,7 @@ def test_savings_have_intervals_and_these_hold(certified, shift):
 
 def test_what_cannot_be_told_says_what_would_tell(certified):
     place, _ = certified
-    content = dataset.read(place / "e.nc", "effects")
+    content = opened.read(place / "e.nc", "effects")
     gravity = int(np.argmax(content["off"].sel(effect="gravity").to_numpy()))
     row = {"variant": gravity, "response": 0}
     for name, value in (("change", 0.01), ("limit", 0.03), ("finding", 2)):
@@ -607,7 +607,7 @@ def test_what_cannot_be_told_says_what_would_tell(certified):
 
 def test_figure_and_page(certified):
     place, _ = certified
-    content, timing = (dataset.read(place / name) for name in ("e.nc", "e.timing.nc"))
+    content, timing = (opened.read(place / name) for name in ("e.nc", "e.timing.nc"))
     figure = effects_figure(content, timing)
     bars = figure.axes[0].patches
     names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
@@ -660,7 +660,7 @@ def test_a_linkage_is_certified(tmp_path):
     file.write_text(tomli_w.dumps(content), encoding="utf-8")
     code, output = run(["effects", str(file), "-o", str(tmp_path / "e.nc"), "--samples", "64"], 0)
     assert code == 0, output
-    found = dataset.read(tmp_path / "e.nc", "effects")
+    found = opened.read(tmp_path / "e.nc", "effects")
     rows = {str(name): k + 1 for k, name in enumerate(found["effect"].to_numpy())}
     assert set(rows) >= {"clearance in o2", "friction in joints", "gravity", "torque breath"}
     assert float(found["change"][rows["clearance in o2"], 0]) == -1.0  # no other gap is left
@@ -694,7 +694,7 @@ def test_the_stage_keeps_its_simulations(monkeypatch, tmp_path):
 
     first, written = once()
     assert json.loads(first.times[SECONDS_PER_SAMPLE]) == {"all on": 3.0}
-    content = dataset.read(tmp_path / "effects.nc", "effects")
+    content = opened.read(tmp_path / "effects.nc", "effects")
     chosen = content.isel(variant=int(np.argmax(content["recommended"].to_numpy())))
     assert int(chosen["off"].sum()) == 2  # the other play, and contact damping
     assert any(

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -16,7 +17,6 @@ from patience import crowded
 
 from hpcclear import __version__
 from hpcclear.cli import OLD, cli
-from hpcclear.results import dataset
 
 ROOT = Path(__file__).resolve().parent.parent
 SHORT = ["--set", "numerics.transient_revolutions=0", "--set", "numerics.averaged_revolutions=1"]
@@ -95,7 +95,7 @@ def test_simulate_writes_a_response_that_opens_anywhere(tmp_path):
     response = xr.open_dataset(out)
     assert response["slider_position"].attrs["units"] == "m"
     assert response.sizes["time"] == 721
-    assert dataset.read(out, "response")["status"] == 0
+    assert opened.read(out, "response")["status"] == 0
 
 
 def test_a_response_that_did_not_end_is_written_and_told(tmp_path):
@@ -104,7 +104,7 @@ def test_a_response_that_did_not_end_is_written_and_told(tmp_path):
     done = hpcclear(*words, "--set", "numerics.max_steps=100")
     assert done.returncode == 1
     assert done.stderr.startswith("Error: step_cap: numerics.max_steps was reached")
-    found = dataset.read(out, "response")
+    found = opened.read(out, "response")
     assert np.isnan(found["objective"])
     assert found.sizes["time"] > 10
 
@@ -209,7 +209,7 @@ def test_a_table_of_designs(tmp_path):
     out = tmp_path / "designs.nc"
     done = hpcclear("sample", "jobs/slider_crank.toml", "-o", out, "--points", table, *SHORT)
     assert done.returncode == 0, done.stderr
-    samples = dataset.read(out, "samples")
+    samples = opened.read(out, "samples")
     assert samples["C"].to_numpy().tolist() == [3e-4, 5e-4]
     assert (tmp_path / "designs.timing.nc").exists()
 
@@ -263,10 +263,10 @@ def test_statistics_are_those_of_the_samples(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "mean of f" in done.stdout
     assert hpcclear(*words, "-o", tmp_path / "samples.nc").returncode == 0
-    statistics = dataset.read(out, "statistics")
-    samples = dataset.read(tmp_path / "samples.nc", "samples")
+    statistics = opened.read(out, "statistics")
+    samples = opened.read(tmp_path / "samples.nc", "samples")
     (kept,) = raw.glob("samples-*.nc")
-    assert (dataset.read(kept, "samples")["objective"] == samples["objective"]).all()
+    assert (opened.read(kept, "samples")["objective"] == samples["objective"]).all()
     assert float(statistics["objective_mean"]) == pytest.approx(
         float(samples["objective"].mean()), rel=1e-12
     )

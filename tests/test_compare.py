@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 import xarray as xr
@@ -12,7 +13,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.report import overlay_figure
 from hpcclear.report.compare import compare
-from hpcclear.results import dataset
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_a_cell_that_is_no_number_is_named(tmp_path):
 
 
 def test_the_command_prints_norms_in_the_units_of_the_measurement_and_draws(response, tmp_path):
-    dataset.write(response, tmp_path / "r.nc")
+    opened.write(response, tmp_path / "r.nc")
     path = measured(response, tmp_path / "m.csv", "crank_angle [deg]", gain=2.0)
     path.write_text(path.read_text().replace("contact_force crank_rod", "gauge 1"))
     words = [

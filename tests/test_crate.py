@@ -4,20 +4,20 @@ import hashlib
 import json
 from pathlib import Path
 
+import opened
 import pytest
 import report_data as data
 
 from hpcclear.base.errors import InputError
-from hpcclear.results import dataset
 from hpcclear.results.crate import NAME, PROFILE, write_crate
 
 
 @pytest.fixture
 def results(tmp_path) -> Path:
-    dataset.write(data.samples(), tmp_path / "samples.nc")
-    dataset.write(data.timing(), tmp_path / "timing.nc")
+    opened.write(data.samples(), tmp_path / "samples.nc")
+    opened.write(data.timing(), tmp_path / "timing.nc")
     (tmp_path / "responses").mkdir()
-    dataset.write(data.response(2), tmp_path / "responses" / "original.nc")
+    opened.write(data.response(2), tmp_path / "responses" / "original.nc")
     return tmp_path
 
 
@@ -35,7 +35,7 @@ def test_every_result_is_described_and_made_by_one_run(results):
     assert run["@type"] == "CreateAction"
     assert run["result"] == root["hasPart"]
     assert graph[run["instrument"]["@id"]]["@type"] == "SoftwareApplication"
-    samples = dataset.read(results / "samples.nc")
+    samples = opened.read(results / "samples.nc")
     assert graph[run["object"]["@id"]]["text"] == samples.attrs["scene"]
     assert "mpiexec" in run["description"]
     for name in names:
@@ -47,9 +47,9 @@ def test_every_result_is_described_and_made_by_one_run(results):
 
 def test_the_input_is_the_studys_scene_and_every_one_where_there_are_more(results):
     def restate(name: str, **attributes: str) -> None:
-        content = dataset.read(results / name)
+        content = opened.read(results / name)
         (results / name).unlink()
-        dataset.write(content.assign_attrs(attributes), results / name)
+        opened.write(content.assign_attrs(attributes), results / name)
 
     def inputs() -> list[str]:
         (results / NAME).unlink(missing_ok=True)
@@ -59,7 +59,7 @@ def test_the_input_is_the_studys_scene_and_every_one_where_there_are_more(result
         known = {one["@id"]: one.get("text") for one in graph}
         return [known[one["@id"]] for one in used]
 
-    own = dataset.read(results / "samples.nc").attrs["scene"]
+    own = opened.read(results / "samples.nc").attrs["scene"]
     restate("responses/original.nc", scene="a design of it", scene_hash="1" * 64)
     assert inputs() == [own]
     restate("timing.nc", scene="another", scene_hash="2" * 64, versions="numpy 9")
@@ -79,7 +79,7 @@ def test_equal_results_give_equal_crates_and_other_files_stay(results):
 def test_a_run_under_way_is_no_result(results):
     parts = results / ".samples.nc.parts"
     parts.mkdir()
-    dataset.write(data.samples(), parts / "part-00-000000.nc")
+    opened.write(data.samples(), parts / "part-00-000000.nc")
     assert "part-00" not in write_crate(results).read_text()
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import cf_xarray.units
 import h5py
 import numpy as np
+import opened
 import pint
 import pint_xarray  # noqa: F401
 import pytest
@@ -21,6 +22,7 @@ from hypothesis import strategies as st
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.outcome import FIELDS, JOINTS, Status, failed, record_type
 from hpcclear.results import dataset, files, netcdf
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS, designs_in
 from hpcclear.results.provenance import provenance
 
@@ -49,7 +51,7 @@ def samples(n: int = 9) -> xr.Dataset:
     values = np.random.default_rng(1).random((n, 3))
     names, units = ["m2", "C", "mechanism.rod.length"], {"mechanism.rod.length": "m"}
     made_by = provenance(SCENE, HASH)
-    return dataset.samples_dataset(names, values, units, outcomes(n), made_by)
+    return dataset.samples_dataset(names, values, units, outcomes(n), made_by).to_xarray()
 
 
 def example(kind: str) -> xr.Dataset:
@@ -77,7 +79,7 @@ def example(kind: str) -> xr.Dataset:
         data["m2"] = np.ones(tuple(sizes[dim] for dim in table.design_dims))
     if table.limit_dims is not None:
         data["m2_lower"] = np.zeros(tuple(sizes[dim] for dim in table.limit_dims))
-    return dataset.dataset(kind, coords, data, provenance(SCENE, HASH))
+    return dataset.dataset(kind, coords, data, provenance(SCENE, HASH)).to_xarray()
 
 
 # -- table and builders -------------------------------------------------------------------------
@@ -109,8 +111,8 @@ def test_names_that_cannot_be_design_variables_are_refused(name):
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
     original, path = example(kind), tmp_path / "file.nc"
-    dataset.write(original, path)
-    assert dataset.read(path, kind, HASH).identical(original)
+    opened.write(original, path)
+    assert opened.read(path, kind, HASH).identical(original)
     with xr.open_dataset(path, engine=engine) as found:
         xr.testing.assert_equal(found.load(), original)
         assert found.attrs["scene"] == SCENE
@@ -126,7 +128,7 @@ def test_files_open_everywhere_and_hold_the_same(tmp_path, kind, engine):
 def test_numbers_survive_to_the_last_bit(tmp_path):
     values = np.array([-0.0, np.inf, -np.inf, np.nan, 5e-324, np.nextafter(1, 2), 1e308])
     original = xr.Dataset({"x": ("k", values), "n": ("k", np.arange(7) + 2**62)})
-    netcdf.save(original, tmp_path / "x.nc")
+    opened.save(original, tmp_path / "x.nc")
     found = netcdf.load(tmp_path / "x.nc").to_xarray()
     assert found["x"].values.tobytes() == values.tobytes()
     assert found["n"].values.tobytes() == original["n"].values.tobytes()
@@ -134,9 +136,11 @@ def test_numbers_survive_to_the_last_bit(tmp_path):
 
 def test_long_attributes_and_empty_dimensions(tmp_path):
     attributes = {"scene": "ä" * 200_000, "nothing": "", "number": 3.5}
-    original = dataset.samples_dataset([], np.empty((0, 0)), {}, outcomes(0), attributes)
-    dataset.write(original, tmp_path / "x.nc")
-    assert dataset.read(tmp_path / "x.nc").identical(original)
+    original = dataset.samples_dataset(
+        [], np.empty((0, 0)), {}, outcomes(0), attributes
+    ).to_xarray()
+    opened.write(original, tmp_path / "x.nc")
+    assert opened.read(tmp_path / "x.nc").identical(original)
     with xr.open_dataset(tmp_path / "x.nc", engine="h5netcdf") as found:
         assert found.attrs["scene"] == attributes["scene"]
 
@@ -144,11 +148,12 @@ def test_long_attributes_and_empty_dimensions(tmp_path):
 WRITE_IN_ANOTHER_PROCESS = """
 import sys
 sys.path.insert(0, {tests!r})
+import opened
 from test_dataset import example
 from hpcclear.results import dataset
 from hpcclear.results.names import designs_in
 for kind in dataset.KINDS:
-    dataset.write(example(kind), f"{folder}/{{kind}}.nc")
+    opened.write(example(kind), f"{folder}/{{kind}}.nc")
 """
 
 
@@ -159,13 +164,13 @@ def test_equal_content_gives_equal_bytes_in_another_process_at_another_time(tmp_
     )
     for kind in KINDS:
         here = tmp_path / "here.nc"
-        dataset.write(example(kind), here)
+        opened.write(example(kind), here)
         assert here.read_bytes() == (tmp_path / f"{kind}.nc").read_bytes(), kind
 
 
 def test_a_written_file_has_the_permissions_of_an_ordinary_one(tmp_path):
     (tmp_path / "ordinary").write_bytes(b"")
-    dataset.write(samples(), tmp_path / "x.nc")
+    opened.write(samples(), tmp_path / "x.nc")
     assert (tmp_path / "x.nc").stat().st_mode == (tmp_path / "ordinary").stat().st_mode
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["ordinary", "x.nc"]
 
@@ -179,13 +184,13 @@ def test_a_symbolic_link_is_replaced_and_what_it_points_to_is_left_alone(tmp_pat
     inside = tmp_path / "inside"
     inside.mkdir()
     (inside / "x.nc").symlink_to(outside)
-    dataset.write(samples(), inside / "x.nc")
+    opened.write(samples(), inside / "x.nc")
     assert outside.read_text() == "precious"
     assert not (inside / "x.nc").is_symlink()
-    dataset.read(inside / "x.nc", "samples")
+    opened.read(inside / "x.nc", "samples")
     (tmp_path / "link").symlink_to(inside)  # a linked directory is what the user asked for
-    dataset.write(samples(), tmp_path / "link" / "y.nc")
-    dataset.read(inside / "y.nc", "samples")
+    opened.write(samples(), tmp_path / "link" / "y.nc")
+    opened.read(inside / "y.nc", "samples")
 
 
 def places(folder: Path) -> dict[str, Path]:
@@ -210,7 +215,7 @@ def test_places_that_cannot_be_written_to_are_bad_input(tmp_path, case):
     place = places(tmp_path)[case]
     before = sorted(tmp_path.iterdir())
     with pytest.raises(InputError, match="output"):
-        dataset.write(samples(), place)
+        opened.write(samples(), place)
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -224,7 +229,7 @@ def test_a_probe_refuses_them_beforehand(tmp_path, case):
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EIO])
 def test_a_failing_disk_keeps_the_last_good_file(tmp_path, monkeypatch, call, code):
     path = tmp_path / "x.nc"
-    dataset.write(samples(5), path)
+    opened.write(samples(5), path)
     good = path.read_bytes()
 
     def fail(*args: object, **kwargs: object) -> None:
@@ -233,7 +238,7 @@ def test_a_failing_disk_keeps_the_last_good_file(tmp_path, monkeypatch, call, co
     with monkeypatch.context() as patch:
         patch.setattr(os, call, fail)
         with pytest.raises(StorageError, match=os.strerror(code)):
-            dataset.write(samples(6), path)
+            opened.write(samples(6), path)
     assert path.read_bytes() == good
     assert [entry.name for entry in tmp_path.iterdir()] == ["x.nc"]
 
@@ -250,7 +255,7 @@ def test_an_interrupt_in_the_middle_of_a_write_leaves_no_rubbish(tmp_path, monke
 
     monkeypatch.setattr(os, "write", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        dataset.write(samples(), tmp_path / "x.nc")
+        opened.write(samples(), tmp_path / "x.nc")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -259,7 +264,7 @@ def test_an_interrupt_in_the_middle_of_a_write_leaves_no_rubbish(tmp_path, monke
 
 @functools.cache
 def sealed() -> bytes:
-    image = netcdf.encode(samples())
+    image = netcdf.encode(Results.of(samples()))
     return image + netcdf.seal(image)
 
 
@@ -267,7 +272,7 @@ def refuses(folder: Path, content: bytes) -> str:
     path = folder / "damaged.nc"
     path.write_bytes(content)
     with pytest.raises(InputError) as caught:
-        dataset.read(path, "samples")
+        opened.read(path, "samples")
     return caught.value.reason
 
 
@@ -305,25 +310,25 @@ def test_files_that_are_not_there_or_no_files_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for place in (tmp_path / "none.nc", tmp_path, tmp_path / "pipe", Path("/dev/zero")):
         with pytest.raises(InputError):
-            dataset.read(place)
+            opened.read(place)
 
 
 def test_a_value_changed_with_h5py_is_noticed(tmp_path):
     path = tmp_path / "x.nc"
-    dataset.write(samples(), path)
+    opened.write(samples(), path)
     with h5py.File(path, "r+") as file:
         file["objective"][0] = 1.0
     with pytest.raises(InputError, match="changed"):
-        dataset.read(path)
+        opened.read(path)
 
 
 def test_a_file_of_another_kind_or_scene_is_refused(tmp_path):
     path = tmp_path / "x.nc"
-    dataset.write(samples(), path)
+    opened.write(samples(), path)
     with pytest.raises(InputError, match="it holds samples, not front"):
-        dataset.read(path, "front")
+        opened.read(path, "front")
     with pytest.raises(InputError, match="another scene"):
-        dataset.read(path, "samples", "0" * 64)
+        opened.read(path, "samples", "0" * 64)
 
 
 def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
@@ -370,9 +375,9 @@ def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
 def test_sealed_files_that_say_what_cannot_be_are_refused(tmp_path, what):
     with xr.set_options(keep_attrs=True):
         spoilt = spoil(samples(), what)
-    netcdf.save(spoilt, tmp_path / "x.nc")
+    opened.save(spoilt, tmp_path / "x.nc")
     with pytest.raises(InputError):
-        dataset.read(tmp_path / "x.nc", "samples")
+        opened.read(tmp_path / "x.nc", "samples")
 
 
 def hostile(path: Path, what: str, secret: Path) -> None:
@@ -421,12 +426,12 @@ def hostile(path: Path, what: str, secret: Path) -> None:
 def test_hostile_structure_under_a_forged_seal_is_refused(tmp_path, what):
     path, secret = tmp_path / "x.nc", tmp_path / "secret"
     secret.write_bytes(b"password" * 10)
-    dataset.write(samples(), path)
+    opened.write(samples(), path)
     hostile(path, what, secret)
     image = path.read_bytes()
     path.write_bytes(image + netcdf.seal(image))
     with pytest.raises(InputError, match="structure"):
-        dataset.read(path, "samples")
+        opened.read(path, "samples")
 
 
 # -- conventions --------------------------------------------------------------------------------
@@ -436,7 +441,7 @@ def test_hostile_structure_under_a_forged_seal_is_refused(tmp_path, what):
 def test_cf_checker_finds_no_error(tmp_path):
     """All kinds in one start of the checker's program, which takes longer than its work."""
     for kind in KINDS:
-        dataset.write(example(kind), tmp_path / f"{kind}.nc")
+        opened.write(example(kind), tmp_path / f"{kind}.nc")
     command = [str(Path(sys.executable).with_name("compliance-checker")), "--test", "cf:1.11"]
     report = tmp_path / "report.json"
     subprocess.run(
@@ -458,7 +463,7 @@ def test_cf_checker_finds_no_error(tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, kind):
     registry = pint.UnitRegistry()
-    dataset.write(example(kind), tmp_path / "x.nc")
+    opened.write(example(kind), tmp_path / "x.nc")
     with xr.open_dataset(tmp_path / "x.nc", decode_timedelta=False) as found:
         measured = [n for n, v in found.data_vars.items() if "units" in v.attrs]
         for name in measured:
@@ -472,3 +477,40 @@ def test_units_and_flags_are_understood_by_pint_xarray_and_cf_xarray(tmp_path, k
         assert sorted(flags) == sorted(codes)
         if "status" in found:
             np.testing.assert_array_equal(found["status"].cf == "ok", found["status"] == Status.OK)
+
+
+WITHOUT_XARRAY = """
+import sys
+from importlib import import_module
+for name in ("study", "study.stages", "accuracy.run", "identify.answer", "ensemble.statistics", "ensemble.wear",
+             "report.answer", "report.html.page", "report.figures.catalogue", "report.compare", "cli"):
+    import_module(f"hpcclear.{name}")
+print(sorted({"xarray", "pandas"} & set(sys.modules)))
+"""
+
+
+def test_commands_load_no_xarray():
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_XARRAY], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_results_select_as_xarray_does():
+    content = samples(6)
+    found = Results.of(content)
+    for chosen in (
+        {"sample": 2},
+        {"sample": [4, 1]},
+        {"joint": -1},
+        {"sample": slice(1, 4), "joint": 0},
+    ):
+        assert found.isel(chosen).to_xarray().identical(content.isel(chosen))
+    label = str(content["joint"].values[1])
+    assert found.sel(joint=label).to_xarray().identical(content.sel(joint=label))
+    assert found.sel(joint=[label]).to_xarray().identical(content.sel(joint=[label]))
+    one = content["mean_gap"].sel(joint=label)
+    np.testing.assert_array_equal(found["mean_gap"].sel(joint=label), one)
+    assert Results.of(found.to_xarray()).attrs == content.attrs
+    with pytest.raises(KeyError):
+        found.sel(joint="nowhere")

@@ -4,6 +4,7 @@ import re
 from types import SimpleNamespace
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 from formula_study import scene_of
@@ -166,7 +167,7 @@ def share_above(m2: float, limit: float = 0.47e-3) -> float:
 def done(carried_out):
     place = carried_out(scene_of(STUDY))
     kinds = ("verification", "contributions")
-    return {kind: dataset.read(place / f"{kind}.nc", kind) for kind in kinds}
+    return {kind: opened.read(place / f"{kind}.nc", kind) for kind in kinds}
 
 
 def test_what_scatters_at_the_recommended_design_makes_all_of_its_scatter(done):

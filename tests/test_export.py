@@ -5,6 +5,7 @@ import re
 from importlib import resources
 
 import numpy as np
+import opened
 import pandas as pd
 import pytest
 import report_data as data
@@ -17,7 +18,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.report.export import FORMATS, export
 from hpcclear.report.tables import to_table
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -97,7 +97,7 @@ def _read(path):
 @pytest.mark.parametrize("kind", ["samples", "response", "verification"])
 def test_what_is_read_back_equals_what_was_written(tmp_path, ideal, kind, ending):
     made = {"samples": data.samples, "response": lambda: ideal, "verification": data.verification}
-    dataset.write(made[kind](), tmp_path / "r.nc")
+    opened.write(made[kind](), tmp_path / "r.nc")
     table = export(tmp_path / "r.nc", tmp_path / f"r{ending}")
     first = (tmp_path / f"r{ending}").read_bytes()
     export(tmp_path / "r.nc", tmp_path / f"r{ending}")  # replaces its own file
@@ -119,7 +119,7 @@ def test_what_is_read_back_equals_what_was_written(tmp_path, ideal, kind, ending
 def test_files_say_their_units_and_their_scene(tmp_path):
     from pyarrow import parquet
 
-    dataset.write(data.samples(), tmp_path / "s.nc")
+    opened.write(data.samples(), tmp_path / "s.nc")
     for ending in (".mat", ".parquet", ".xlsx"):
         export(tmp_path / "s.nc", tmp_path / f"s{ending}", ("mm",))
     content = loadmat(tmp_path / "s.mat", squeeze_me=True)
@@ -138,7 +138,7 @@ def test_text_of_a_cell_is_never_a_formula_nor_markup(tmp_path):
 
     hostile = data.claims()
     hostile["text"][0] = "=1+1 <b>&\x01"
-    dataset.write(hostile, tmp_path / "c.nc")
+    opened.write(hostile, tmp_path / "c.nc")
     export(tmp_path / "c.nc", tmp_path / "c.xlsx")
     cell = load_workbook(tmp_path / "c.xlsx")["data"]["B2"]
     assert (cell.value, cell.data_type) == ("=1+1 <b>& ", "s")
@@ -167,7 +167,7 @@ def test_no_text_of_a_csv_file_is_read_as_a_formula(tmp_path):
 
 
 def test_what_somebody_else_wrote_is_not_replaced(tmp_path):
-    dataset.write(data.samples(), tmp_path / "s.nc")
+    opened.write(data.samples(), tmp_path / "s.nc")
     for ending in FORMATS:
         (tmp_path / f"s{ending}").write_text("mine")
         done = CliRunner().invoke(
@@ -178,7 +178,7 @@ def test_what_somebody_else_wrote_is_not_replaced(tmp_path):
 
 
 def test_the_command_says_what_it_wrote_and_which_formats_there_are(tmp_path):
-    dataset.write(data.samples(), tmp_path / "s.nc")
+    opened.write(data.samples(), tmp_path / "s.nc")
     done = CliRunner().invoke(
         cli, ["export", str(tmp_path / "s.nc"), "-o", str(tmp_path / "s.csv")]
     )
@@ -192,8 +192,8 @@ def test_the_command_says_what_it_wrote_and_which_formats_there_are(tmp_path):
 def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
     for name, failed in (("H7g6", 1), ("H7f7", 3)):
         made = data.samples(200, failed).assign_attrs(sampling="monte-carlo")
-        dataset.write(made, tmp_path / f"{name}.nc")
-    dataset.write(data.timing(), tmp_path / "H7g6.timing.nc")  # fits/*.nc names it too
+        opened.write(made, tmp_path / f"{name}.nc")
+    opened.write(data.timing(), tmp_path / "H7g6.timing.nc")  # fits/*.nc names it too
     files = [str(path) for path in sorted(tmp_path.glob("*.nc"))]
     words = ["--statistics", "--beyond", "0.3 mm", "-o", str(tmp_path / "fits.xlsx")]
     done = CliRunner().invoke(cli, ["export", *files, *words])
@@ -212,7 +212,7 @@ def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
         mean, lower, upper = table.loc[
             "mean of f", [f"{name} {e}" for e in ("value", "lower", "upper")]
         ]
-        known = dataset.read(tmp_path / f"{name}.nc")["objective"]
+        known = opened.read(tmp_path / f"{name}.nc")["objective"]
         per = {"m": 1.0, "mm": 1e3, "um": 1e6}[table.loc["mean of f", "unit"]]
         assert mean == pytest.approx(per * float(known.mean()))
         assert lower < mean < upper
@@ -228,7 +228,7 @@ def test_statistics_of_several_samples_stand_side_by_side(tmp_path):
 
 
 def test_statistics_of_a_response_are_refused_with_how_to_make_samples(ideal, tmp_path):
-    dataset.write(ideal, tmp_path / "one.nc")
+    opened.write(ideal, tmp_path / "one.nc")
     words = [str(tmp_path / "one.nc"), "--statistics", "-o", str(tmp_path / "x.csv")]
     done = CliRunner().invoke(cli, ["export", *words])
     assert "need samples, and it holds a response. Make samples with hpcclear sample" in str(

@@ -6,13 +6,13 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from test_mopso import dtlz2
 
 from hpcclear.base.errors import InputError
 from hpcclear.plugins import SEARCHES
 from hpcclear.ranks.boundary import alone
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.stages import FEWEST
 from hpcclear.statistics.search import foreign
@@ -136,12 +136,12 @@ def test_a_study_searches_with_it_to_the_same_bytes(tmp_path):
         run_study(scene_of(), tmp_path / place, alone(), progress_style="quiet")
     for name in ("front.nc", "verification.nc"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
-    front = dataset.read(tmp_path / "one" / "front.nc", "front")
+    front = opened.read(tmp_path / "one" / "front.nc", "front")
     least = front["m2"].where(front["deviation"] == front["deviation"].min("solution"))
     np.testing.assert_allclose(least.min("solution"), 0.105, atol=0.02)  # as the swarm finds it
     swarm = scene_of().with_({"study.swarm.algorithm": None})
     run_study(swarm, tmp_path / "swarm", alone(), progress_style="quiet")
-    other = dataset.read(tmp_path / "swarm" / "front.nc", "front")
+    other = opened.read(tmp_path / "swarm" / "front.nc", "front")
     assert front["mean"].shape != other["mean"].shape or not front["mean"].equals(other["mean"])
 
 

@@ -8,6 +8,7 @@ import tempfile
 import unicodedata
 from pathlib import Path
 
+import opened
 import pytest
 import report_data as data
 from click.testing import CliRunner
@@ -20,6 +21,7 @@ from hpcclear.base.private import private_folder
 from hpcclear.cli import cli
 from hpcclear.cli.terminal import console, remark, table
 from hpcclear.results import dataset, netcdf
+from hpcclear.results.content import Results
 from hpcclear.results.crate import NAME
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
@@ -33,7 +35,7 @@ def forged(path: Path, scene: str) -> Path:
     """A response that says it was made of such a scene."""
     content = data.response(3)
     content.attrs["scene"] = scene
-    netcdf.save(content, path)
+    opened.save(content, path)
     return path
 
 
@@ -94,7 +96,7 @@ def test_one_damaged_file_does_not_hide_the_others(tmp_path, command):
     data.write_study(tmp_path)
     good = len(dataset.files_in(tmp_path))
     for name in ("aa.nc", "zz.nc"):
-        (tmp_path / name).write_bytes(netcdf.encode(data.timing()))  # without a seal
+        (tmp_path / name).write_bytes(netcdf.encode(Results.of(data.timing())))  # without a seal
     done = CliRunner().invoke(cli, [command, str(tmp_path)], standalone_mode=False)
     assert done.return_value == 1
     assert done.output.count("aa.nc") == done.output.count("zz.nc") == 1
@@ -139,7 +141,7 @@ def evil(tmp_path_factory) -> Path:
         for variable in content.variables.values():
             if isinstance(variable.attrs.get("long_name"), str):
                 variable.attrs["long_name"] += EVIL
-        netcdf.save(content, path)
+        opened.save(content, path)
     return place
 
 

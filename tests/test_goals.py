@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import xarray as xr
 from commands import overrides, run
@@ -15,7 +16,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.answer import answer
 from hpcclear.report.beside import beside_original
-from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.random.replicates import exceedance, quantile
 from hpcclear.statistics.search.infill import proposals
@@ -238,7 +238,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 
 def verified(folder: Path) -> xr.Dataset:
-    return dataset.read(folder / "verification.nc", "verification")
+    return opened.read(folder / "verification.nc", "verification")
 
 
 def test_alpha_and_beta_have_the_least_of_what_was_asked_for(study: tuple[Path, str]) -> None:
@@ -265,7 +265,7 @@ def test_alpha_and_beta_have_the_least_of_what_was_asked_for(study: tuple[Path, 
 
 
 def test_the_front_tells_what_was_searched(study: tuple[Path, str]) -> None:
-    front = dataset.read(study[0] / "front.nc", "front")
+    front = opened.read(study[0] / "front.nc", "front")
     assert list(front["searched"].to_numpy()) == [
         "95th percentile of f, m2 + m3",
         "probability of f above 0.0003 m, standard deviation of f",

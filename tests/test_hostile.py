@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 from click.testing import CliRunner, Result
@@ -30,7 +31,7 @@ from hpcclear.cli import cli
 from hpcclear.ranks.stopping import StopSwitch
 from hpcclear.report.html import guard
 from hpcclear.report.html.page import write_report
-from hpcclear.results import dataset, files, netcdf
+from hpcclear.results import files, netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.table import read_points
 
@@ -98,7 +99,7 @@ def test_figures_and_pages_replace_only_figures_and_pages_of_ours(tmp_path):
         sketch.write_bytes(b"a photograph")
         assert isinstance(drawn(sketch).exception, InputError)
         assert sketch.read_bytes() == b"a photograph"
-    dataset.write(data.response(3), tmp_path / "mine.nc")
+    opened.write(data.response(3), tmp_path / "mine.nc")
     write_report(tmp_path)
     write_report(tmp_path)
     (tmp_path / "report.html").write_text("<p>my own words</p>")
@@ -333,7 +334,7 @@ def forged(path: Path, name: str, value: object) -> None:
         content[name] = (content[name].dims, values, content[name].attrs)
     else:
         content.attrs[name] = value
-    netcdf.save(content, path)
+    opened.save(content, path)
 
 
 FORGERIES = (

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from click.testing import CliRunner
 from commands import finish, overrides, run, start, wait_for_parts
@@ -29,11 +30,12 @@ from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.posterior import sequential
 from hpcclear.identify.settings import Settings
-from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics, series_of
+from hpcclear.identify.signals import ORDERS, Sensor, Spectrum, harmonics
 from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.report.html.page import write_report
 from hpcclear.report.identified import interval, lines, warnings
-from hpcclear.results import dataset
+from hpcclear.results.content import Results
+from hpcclear.results.signals import signals_in
 
 sys.path.insert(0, str(ROOT / "analysis"))
 
@@ -141,7 +143,7 @@ def test_a_point_of_a_linkage_has_an_acceleration():
     joints = ("mechanism.joints.o2", "mechanism.joints.o3")
     rigid = without_clearance("linkages/crank_rocker.toml", *joints, **pins)
     response = hpcclear.simulate(rigid)
-    found = series_of(response, "acceleration_x crank.b")
+    found = signals_in(Results.of(response))["acceleration_x crank.b"].values
     expected = -((2.0 * np.pi * 15.0) ** 2) * response["point_x"].sel(point="crank.b")
     np.testing.assert_allclose(found, expected, atol=1e-3 * float(np.abs(expected).max()))
 
@@ -386,7 +388,7 @@ def record(path: Path, noise: float, samples: int, change: float, form: str, see
 @pytest.mark.nightly
 def test_each_record_is_judged_as_if_it_were_alone(made, scene, tmp_path, monkeypatch):
     """Good ones and one of another machine, beside loose, coarse, dead, free-running ones: verdicts stay to the last bit."""
-    monkeypatch.setattr(answer, "simulated", lambda *_, **__: made[0])
+    monkeypatch.setattr(answer, "ensemble_of", lambda *_, **__: made[0])
     monkeypatch.setattr(answer, "prepare", partial(prepare, members=24))  # enough to compare
     bare = scene.with_({"study": None})
     kinds = {
@@ -473,7 +475,7 @@ def identified(measured, tmp_path_factory):
 
 def test_the_command_prints_intervals_growth_and_advice(identified):
     place, printed, code, _ = identified
-    content = dataset.read(place, "identify")
+    content = opened.read(place, "identify")
     assert code == (0 if content["explained"].all() else 4)
     for words in ("crank_rod", "95 %", "per day", "time to", "by crank_moment", "by frame_force_x"):  # fmt: skip
         assert words in " ".join(printed.split()), printed
@@ -488,7 +490,7 @@ def test_the_page_and_the_figures_show_it(identified, tmp_path):
     page = write_report(place, output=tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Unknowns of the machine" in page
     assert "was left out" not in page
-    content = dataset.read(place)
+    content = opened.read(place)
     for draw in (report.posterior_figure, report.features_figure, report.growth_figure):
         assert draw(content).axes
     assert len(hpcclear.to_table(content)) == 1
@@ -497,7 +499,7 @@ def test_the_page_and_the_figures_show_it(identified, tmp_path):
 
 
 def test_an_answer_is_never_more_certain_than_it_is(identified):
-    content = dataset.read(identified[0]).isel(record=[0])
+    content = opened.read(identified[0]).isel(record=[0])
 
     def said(low, middle, high, explained=1):
         own = content.copy(deep=True)

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import moocore
 import numpy as np
+import opened
 import pytest
 from formula_study import contents, formula, on_two_ranks, scene_of
 
 from hpcclear.ranks.boundary import alone
-from hpcclear.results import dataset
 from hpcclear.scene.domain import box
 from hpcclear.statistics.search import improvement
 from hpcclear.statistics.search.improvement import Known, Space
@@ -195,14 +195,14 @@ def test_a_search_by_statistics_says_what_another_design_may_win():
 
 def test_a_search_by_statistics_ends_at_the_front(done):
     """f rises with both masses: the front ends at their bounds; the swarm's own designs are not verified."""
-    found = dataset.read(done / "verification.nc", "verification")
+    found = opened.read(done / "verification.nc", "verification")
     alpha, beta = (found.sel(design=f"robust {end}") for end in ("alpha", "beta"))
     region = box(study(), ("m2", "m3"))
     np.testing.assert_allclose([float(beta[n]) for n in ("m2", "m3")], region.upper, rtol=1e-3)
     assert float(alpha["first_true"]) == float(found["first_true"].min())
     assert not any("averaged" in name for name in found["design"].to_numpy())
     counted = extent.samples_of(study())
-    samples = dataset.read(done / "samples.nc", "samples")
+    samples = opened.read(done / "samples.nc", "samples")
     assert samples.sizes["sample"] < sum(counted.values())
 
 

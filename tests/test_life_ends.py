@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import tomli_w
 from commands import run
@@ -17,7 +18,6 @@ from hpcclear.dynamics.wear.curves import DEEPEST, curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.life import Plan, Seen, life
 from hpcclear.ensemble.wear import check_worn
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -258,7 +258,7 @@ def written(tmp_path_factory):
 
 def test_the_command_ends_lives_at_their_limit(written):
     folder, _ = written
-    found = dataset.read(folder / "results" / "wear.nc", "wear")
+    found = opened.read(folder / "results" / "wear.nc", "wear")
     expected = np.array([revolutions(k) for k in found.k.values])
     np.testing.assert_allclose(found.ended, expected, rtol=2e-3)
     np.testing.assert_array_equal(found.lifetime, found.ended)

@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import commands
+import opened
 import pytest
 from patience import crowded
-
-from hpcclear.results import dataset
 
 pytestmark = pytest.mark.mpi
 TWO_RANKS = pytest.param(2, marks=pytest.mark.nightly)
@@ -58,13 +57,13 @@ def test_a_full_disk_ends_in_a_message_and_keeps_what_is_there(small_disk, compi
     assert not (small_disk / "samples.nc").exists()
     subprocess.run(["mount", "-o", "remount,size=100m", small_disk], check=True)
     kept = (
-        sum(dataset.read(p, "samples").sizes["sample"] for p in commands.result_files(small_disk))
+        sum(opened.read(p, "samples").sizes["sample"] for p in commands.result_files(small_disk))
         - 64
     )
     code, output = commands.run([*words[:-1], "log"], ranks)
     assert code == 0, output
     assert 0 < kept < 20_000
-    assert dataset.read(small_disk / "samples.nc", "samples").sizes["sample"] == 20_000
+    assert opened.read(small_disk / "samples.nc", "samples").sizes["sample"] == 20_000
 
 
 def limited(kind: int, amount: int, words: list[str], ranks: int = 2) -> tuple[int, str]:

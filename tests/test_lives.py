@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from commands import kill_once_it_saved, overrides, run
 from running import scene_with
@@ -20,7 +21,6 @@ from hpcclear.dynamics.wear.law import Joints, joints_of
 from hpcclear.dynamics.wear.life import Plan, Seen, _drift, life
 from hpcclear.ensemble.wear import check_worn
 from hpcclear.report import fan_figure, survival_figure
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.survival import share_interval
 
@@ -249,7 +249,7 @@ def test_a_linkage_wears_as_the_closed_form_says(tmp_path):
     file.write_text(tomli_w.dumps(content), encoding="utf-8")
     code, output = run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
     assert code == 0, output
-    found = dataset.read(tmp_path / "out.nc", "wear")
+    found = opened.read(tmp_path / "out.nc", "wear")
     slope, softness = 1e-15 / (2.0 * math.pi * 0.02 * 0.02), 2.0 * (1.0 - 0.3**2) / 2e11
 
     def speed(_, c):
@@ -284,7 +284,7 @@ def test_ranks_and_a_kill_change_no_byte(tmp_path):
     code, output = run(words(out), 2)
     assert code == 0, output
     assert out.read_bytes() == files[0]
-    found = dataset.read(out, "wear")
+    found = opened.read(out, "wear")
     check(found)
     assert fan_figure(found) is not None
     assert survival_figure(found) is not None
@@ -315,12 +315,12 @@ def test_a_motion_that_has_not_settled_is_told(tmp_path):
     code, output = run(short, 0)
     assert code == 0, output
     assert "raise numerics.transient_revolutions" in " ".join(output.split())
-    found = dataset.read(tmp_path / "wear.nc", "wear")
+    found = opened.read(tmp_path / "wear.nc", "wear")
     assert (found.drift > 0.01).any()
     code, output = run([*short, "--fresh", "--set", "numerics.transient_revolutions=5"], 0)
     assert code == 0, output
     assert "transient_revolutions" not in output
-    assert (dataset.read(tmp_path / "wear-2.nc", "wear").drift < 0.01).all()
+    assert (opened.read(tmp_path / "wear-2.nc", "wear").drift < 0.01).all()
 
 
 def test_lives_that_fail_are_told_and_end_the_command(tmp_path):
@@ -328,7 +328,7 @@ def test_lives_that_fail_are_told_and_end_the_command(tmp_path):
     code, output = run(words(out, "numerics.max_steps=50"), 0)
     assert code == 1
     assert "step_cap" in output
-    found = dataset.read(out, "wear")
+    found = opened.read(out, "wear")
     assert (found.ending == Status.STEP_CAP).all()
     assert np.isnan(found.clearance).all()
     assert np.isnan(found.lifetime).all()

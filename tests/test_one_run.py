@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import opened
 import pytest
 import report_data as data
 from click.testing import CliRunner
@@ -125,7 +126,7 @@ def planted(path: Path, **attributes: str) -> Path:
     """Samples of another run."""
     content = data.samples(6, 0)
     content.attrs |= {KEY: json.dumps({"command": "sample", "study.seed": "99"}), **attributes}
-    netcdf.save(content, path)
+    opened.save(content, path)
     return path
 
 

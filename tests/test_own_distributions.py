@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from commands import CHEAP, MPIEXEC, overrides
 from scipy import stats
@@ -13,7 +14,6 @@ from test_plugins import install
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.identity import run_key
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.plugged import UntrustedSource
@@ -168,7 +168,7 @@ def test_results_carry_the_source_and_reproduce_runs_it_only_when_trusted(scene_
         done = _command("sample", str(scene_file), "-o", str(result), *sets, ranks=ranks)
         assert done.returncode == 0, done.stderr
     assert results[0].read_bytes() == results[2].read_bytes()
-    clearance = dataset.read(results[0])["C"].to_numpy()
+    clearance = opened.read(results[0])["C"].to_numpy()
     assert ((clearance > 4e-4) & (clearance < 7e-4)).all()
     (tmp_path / "mylaws.py").unlink()
     refused = _command("reproduce", str(results[0].parent))

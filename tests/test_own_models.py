@@ -5,13 +5,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from formula_study import PROGRAMS, contents, formula
 
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.figures import fits
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import asking
@@ -84,11 +84,11 @@ def results(tmp_path_factory):
 
 
 def test_quality_is_reported_and_the_file_is_read_back(results):
-    found = dataset.read(results / "out" / "kriging.nc", "kriging")
+    found = opened.read(results / "out" / "kriging.nc", "kriging")
     assert found["surrogate"].to_numpy().tolist() == ["mymodels:Model"]
     assert "mymodels:Model" in found.attrs["title"]
     assert 0.3 < float(found["r2"][0]) < 1.0
-    (model,) = models_in(found).values()
+    (model,) = models_in(found.variables).values()
     (leaf,) = model.leaves
     assert leaf.leave_one_out().tolist() == found["cross_validated"][0].to_numpy().tolist()
     apart = np.corrcoef(leaf.leave_one_out(), leaf.values)[0, 1]
@@ -97,7 +97,7 @@ def test_quality_is_reported_and_the_file_is_read_back(results):
         model.predict(leaf.inputs[:1])
     found["r2"][0] = 0.6
     assert fits.warnings("kriging", found)[0].startswith("surrogate in m2, m3")
-    front = dataset.read(results / "out" / "front.nc", "front")
+    front = opened.read(results / "out" / "front.nc", "front")
     assert np.isfinite(front["deviation"]).any()
 
 
@@ -287,5 +287,5 @@ def test_an_algorithm_of_pymoo_with_settings_of_ones_own_is_a_search(tmp_path):
     text = "from pymoo.algorithms.moo.nsga2 import NSGA2\nRandom = NSGA2(pop_size=10)\n"
     scene = load_scene(written(tmp_path / "scene", search=text))
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
-    front = dataset.read(tmp_path / "out" / "front.nc", "front")
+    front = opened.read(tmp_path / "out" / "front.nc", "front")
     assert np.isfinite(front["mean"]).sum() > 4

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import commands
 import numpy as np
+import opened
 import pytest
 import tomli_w
 from scipy.integrate import simpson
@@ -15,7 +16,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import Objective
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.identity import run_key
-from hpcclear.results import dataset
 
 ROOT = Path(__file__).parents[1]
 GOALS = Path(__file__).parent / "data" / "mygoals.py"
@@ -155,7 +155,7 @@ def test_samples_on_two_ranks_have_the_same_bytes(tmp_path):
         written.append(output.read_bytes())
     assert written[0] == written[1]
     assert b"def loss(" in written[0]
-    found = dataset.read(output, "samples")
+    found = opened.read(output, "samples")
     np.testing.assert_array_equal(found["objective"], found["rate_of_objective"].sum("joint"))
 
 

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 import xarray as xr
@@ -24,7 +25,7 @@ from hpcclear.report.figures.animation import RATE, animate
 from hpcclear.report.figures.catalogue import drawings
 from hpcclear.report.figures.portraits import CROSSINGS
 from hpcclear.report.html.page import write_report
-from hpcclear.results import dataset
+from hpcclear.results.content import Results
 
 SCENE = "jobs/slider_crank.toml"
 SHORT = ["numerics.transient_revolutions=0", "numerics.averaged_revolutions=1"]
@@ -63,7 +64,7 @@ def cells(*shape: int) -> xr.Dataset:
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_a_figure_is_drawn_by_its_name(tmp_path, ending):
-    dataset.write(data.response(), tmp_path / "r.nc")
+    opened.write(data.response(), tmp_path / "r.nc")
     done = run("plot", tmp_path / "r.nc", "--figure", "orbit", "-o", tmp_path / f"o.{ending}")
     assert done.exit_code == 0, done.output
     signs = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -71,8 +72,8 @@ def test_a_figure_is_drawn_by_its_name(tmp_path, ending):
 
 
 def test_without_an_output_the_figures_are_listed_and_with_a_directory_all_are_drawn(tmp_path):
-    dataset.write(data.sensitivity(), tmp_path / "sensitivity.nc")
-    dataset.write(data.response(), tmp_path / "r.nc")
+    opened.write(data.sensitivity(), tmp_path / "sensitivity.nc")
+    opened.write(data.response(), tmp_path / "r.nc")
     listed = run("plot", tmp_path).output.partition(": ")[2].strip().split(", ")
     assert {"sensitivities", "sobol", "orbit"} <= set(listed)
     assert not {"samples", "front", "comparison"} & set(listed)
@@ -85,20 +86,20 @@ def test_without_an_output_the_figures_are_listed_and_with_a_directory_all_are_d
 
 
 def test_a_figure_that_results_do_not_allow_is_refused_with_the_nearest(tmp_path):
-    dataset.write(data.response(), tmp_path / "r.nc")
+    opened.write(data.response(), tmp_path / "r.nc")
     done = run("plot", tmp_path / "r.nc", "--figure", "orbits", "-o", tmp_path / "o.png")
     assert "Did you mean 'orbit'?" in str(done.exception)
     done = run("plot", tmp_path / "r.nc", "--animation", tmp_path / "o.avi")
     assert ".gif or .mp4" in str(done.exception)
-    dataset.write(data.samples(), tmp_path / "s.nc")
+    opened.write(data.samples(), tmp_path / "s.nc")
     done = run("plot", tmp_path / "s.nc", "--animation", tmp_path / "o.gif")
     assert "no response" in str(done.exception)
 
 
 def test_a_report_is_made_of_chosen_files(tmp_path):
-    dataset.write(data.claims(), tmp_path / "c.nc")
-    dataset.write(data.timing(), tmp_path / "t.nc")
-    dataset.write(data.samples(), tmp_path / "other.nc")
+    opened.write(data.claims(), tmp_path / "c.nc")
+    opened.write(data.timing(), tmp_path / "t.nc")
+    opened.write(data.samples(), tmp_path / "other.nc")
     done = run("report", tmp_path / "c.nc", tmp_path / "t.nc", "-o", tmp_path / "page.html")
     assert done.exit_code == 0, done.exception
     page = (tmp_path / "page.html").read_text()
@@ -150,11 +151,11 @@ def test_an_mp4_plays(tmp_path):
 
 def test_a_map_is_drawn_in_readable_units_and_shown_on_the_page(tmp_path):
     line, plane = (report.map_figure(cells(*shape)) for shape in ((6,), (4, 3)))
-    assert line.axes[-1].get_xlabel() == "C (mm)"
-    assert plane.axes[0].get_ylabel() == "drive.speed (rpm)"
+    assert line.axes[-1].get_xlabel() == "clearance $C$ (mm)"
+    assert plane.axes[0].get_ylabel() == "speed of the drive (rpm)"
     with pytest.raises(InputError, match="no map"):
         report.map_figure(data.samples())
-    dataset.write(cells(6), tmp_path / "map.nc")
+    opened.write(cells(6), tmp_path / "map.nc")
     page = write_report(tmp_path).read_text()
     assert "Largest Lyapunov exponent" in page
     assert "samples.nc" not in page
@@ -165,14 +166,18 @@ def test_a_map_is_drawn_in_readable_units_and_shown_on_the_page(tmp_path):
     [
         ("objective", "m", "mean gap of each revolution"),
         ("slider_velocity", "m/s", "slider velocity, at crank angle 90 deg"),
-        ("max contact_force rod_slider", "N", "contact force rod_slider, max of each revolution"),
+        (
+            "max contact_force rod_slider",
+            "N",
+            "contact force of rod_slider, max of each revolution",
+        ),
     ],
 )
 def test_an_observation_is_one_value_of_each_revolution(name, unit, words):
-    response = data.response(4)
+    response = Results.of(data.response(4))
     seen = Observation(name, np.pi / 2, 1, 3)
     what = seen.described(response)
-    assert (what.unit, what.words.replace("rod slider", "rod_slider")) == (unit, words)
+    assert (what.unit, what.words) == (unit, words)
     values = seen(hpcclear.load_scene(SCENE), response)
     assert values.shape == (3,)
     expected = {
@@ -181,8 +186,8 @@ def test_an_observation_is_one_value_of_each_revolution(name, unit, words):
         "max contact_force rod_slider": np.full(3, 0.7 * 3e7 * 0.2 * 3e-4),
     }[name]
     np.testing.assert_allclose(values, expected, rtol=1e-9)
-    failed = response.assign(status=1)
-    assert np.isnan(seen(hpcclear.load_scene(SCENE), failed)).all()
+    response["status"].values[...] = 1
+    assert np.isnan(seen(hpcclear.load_scene(SCENE), response)).all()
 
 
 @pytest.mark.parametrize(
@@ -195,7 +200,7 @@ def test_an_observation_is_one_value_of_each_revolution(name, unit, words):
 )
 def test_a_series_that_is_none_is_refused(name, remedy):
     with pytest.raises(InputError, match=remedy):
-        Observation(name).described(data.response())
+        Observation(name).described(Results.of(data.response()))
 
 
 def test_a_bifurcation_over_a_speed_is_simulated_written_found_again_and_drawn(tmp_path):
@@ -203,16 +208,16 @@ def test_a_bifurcation_over_a_speed_is_simulated_written_found_again_and_drawn(t
     seen = Observation("slider_position", 0.0, 0, 2)
     words = (scene, "drive.speed=1000 rpm:3000 rpm:3", tmp_path / "b.nc", alone(), seen)
     found = run_bifurcation(*words)
-    content = dataset.read(tmp_path / "b.nc", "bifurcation")
+    content = opened.read(tmp_path / "b.nc", "bifurcation")
     assert content["observed"].shape == (3, 2)
     speed = content["drive_speed"].values[1]
     changed = scene.with_({"drive.speed": speed, "numerics.averaged_revolutions": 2})
     direct = motion.section(hpcclear.simulate(changed), "slider_position")[1:]
     np.testing.assert_allclose(content["observed"][1], direct, rtol=1e-12)
-    xr.testing.assert_identical(run_bifurcation(*words).content, content)
+    xr.testing.assert_identical(run_bifurcation(*words).content.to_xarray(), content)
     assert found.content["observed"].attrs["units"] == "m"
     axes = report.bifurcation_figure(content).axes[0]
-    assert axes.get_xlabel() == "drive.speed (rpm)"
+    assert axes.get_xlabel() == "speed of the drive (rpm)"
     np.testing.assert_allclose(axes.lines[0].get_xdata(), np.repeat([1000, 2000, 3000], 2))
     assert len(hpcclear.to_table(content)) == 6
     with pytest.raises(InputError, match="no bifurcation"):

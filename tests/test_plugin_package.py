@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from click.testing import CliRunner
 from test_own_models import written
@@ -14,7 +15,6 @@ from hpcclear import evaluate, load_scene
 from hpcclear.cli import cli
 from hpcclear.plugins import KINDS
 from hpcclear.ranks.boundary import alone
-from hpcclear.results import dataset
 from hpcclear.study import run_study
 
 sys.path.insert(0, str(Path(__file__).parent / "mpi_programs"))
@@ -140,9 +140,9 @@ def test_distribution_surrogate_and_search_of_a_package_make_a_study(
     path.write_text(text.replace(uniform, straight))
     scene = load_scene(path, ["study.surrogate.model=plane", "study.swarm.algorithm=anywhere"])
     run_study(scene, tmp_path / "out", alone(), progress_style="quiet")
-    found = dataset.read(tmp_path / "out" / "kriging.nc", "kriging")
+    found = opened.read(tmp_path / "out" / "kriging.nc", "kriging")
     assert found["surrogate"].to_numpy().tolist() == ["plane"]
-    front = dataset.read(tmp_path / "out" / "front.nc", "front")
+    front = opened.read(tmp_path / "out" / "front.nc", "front")
     assert np.isfinite(front["mean"]).sum() > 2
     assert load_scene(path).resolved()["plugins"]["packages"] == FROM
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import opened
 import pytest
 import report_data
 import test_own_objectives as goals
@@ -18,7 +19,6 @@ from hpcclear.cli import cli
 from hpcclear.cli.options import remarked
 from hpcclear.ensemble.identity import run_key
 from hpcclear.plugins import Registry, run_source, trusting, using
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.plugged import UntrustedSource
@@ -174,7 +174,7 @@ def test_a_result_runs_no_code_in_any_command_unless_trusted(tmp_path, monkeypat
     made = report_data.samples().assign_attrs(scene=tomli_w.dumps(content))
     monkeypatch.chdir(tmp_path)
     for command, words in READING.items():
-        dataset.write(made, tmp_path / "s.nc")
+        opened.write(made, tmp_path / "s.nc")
         CliRunner().invoke(cli, [*command.split(), *words])
         assert not ran.exists(), command
     CliRunner().invoke(cli, ["reproduce", "s.nc", "--trust"])

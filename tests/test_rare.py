@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import opened
 import pytest
 from formula_study import contents, formula, on_two_ranks, scene_of
 from margins import at_least, at_most, fewest
@@ -12,7 +13,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
-from hpcclear.results import dataset
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random import indices, tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare, reach
@@ -228,7 +228,7 @@ def share_above(values: np.ndarray, m2: float, m3: float) -> float:
 @pytest.fixture(scope="module")
 def done(carried_out):
     scene = scene_of(STUDY)
-    return scene, dataset.read(carried_out(scene) / "verification.nc", "verification")
+    return scene, opened.read(carried_out(scene) / "verification.nc", "verification")
 
 
 def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
@@ -290,7 +290,7 @@ def test_few_simulations_still_show_a_design_at_the_edge(carried_out, shift):
 
     scene = scene_of(FEW, f"study.seed={3 + shift}")
     c = scene.required_study.random_input("C").law((np.arange(400_000) + 0.5) / 400_000)
-    found = dataset.read(carried_out(scene, objective=rough) / "verification.nc", "verification")
+    found = opened.read(carried_out(scene, objective=rough) / "verification.nc", "verification")
     codes = found["constraint_verdict"].to_numpy()[:, 0]
     verdicts = dict(zip(found["design"].to_numpy(), codes, strict=True))
     mass = {name: float(found["m3"].sel(design=name)) for name in verdicts}

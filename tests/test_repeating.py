@@ -1,6 +1,7 @@
 """The `reproduce` command: results that are what their scenes come to here, and such that are not."""
 
 import numpy as np
+import opened
 import pytest
 from click.testing import CliRunner
 from commands import CHEAP, SCENE
@@ -9,7 +10,6 @@ from hpcclear import evaluate, load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.ensemble.repeating import repeated
-from hpcclear.results import dataset
 from hpcclear.results.crate import write_crate
 
 
@@ -24,8 +24,8 @@ def made(tmp_path_factory):
     place = tmp_path_factory.mktemp("made")
     scene = load_scene(SCENE, CHEAP)
     clearances = np.linspace(1e-4, 9e-4, 12)
-    dataset.write(evaluate(scene, {"C": clearances, "m2": clearances * 500}), place / "samples.nc")
-    dataset.write(simulate(scene), place / "response.nc")
+    opened.write(evaluate(scene, {"C": clearances, "m2": clearances * 500}), place / "samples.nc")
+    opened.write(simulate(scene), place / "response.nc")
     return place
 
 
@@ -35,9 +35,9 @@ def said(*words: str):
 
 def changed(made, tmp_path, name: str, change) -> dict[str, object]:
     """What is found in a copy of one file that `change` was let at."""
-    content = dataset.read(made / name)
+    content = opened.read(made / name)
     change(content)
-    dataset.write(content, tmp_path / name)
+    opened.write(content, tmp_path / name)
     (found,) = repeated(tmp_path, 5)
     return vars(found)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 from browser import Browser
@@ -22,7 +23,6 @@ from hpcclear.ensemble.session import command_line
 from hpcclear.report.html import markup, picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
-from hpcclear.results import dataset
 
 
 class Tree(HTMLParser):
@@ -125,8 +125,8 @@ def test_every_figure_leads_to_itself_enlarged_and_back(tree: Tree) -> None:
 
 
 def test_sampled_results_alone_make_a_report(tmp_path: Path) -> None:
-    dataset.write(data.samples(), tmp_path / "quickstart.nc")
-    dataset.write(data.timing(), tmp_path / "timing.nc")
+    opened.write(data.samples(), tmp_path / "quickstart.nc")
+    opened.write(data.timing(), tmp_path / "timing.nc")
     (tmp_path / "broken.nc").write_bytes(b"not a NetCDF file")
     tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
     assert [t for t, _ in tree.elements].count("img") == 2
@@ -137,14 +137,14 @@ def test_sampled_results_alone_make_a_report(tmp_path: Path) -> None:
 
 
 def test_one_response_makes_a_report(tmp_path: Path) -> None:
-    dataset.write(data.response(3), tmp_path / "mine.nc")
+    opened.write(data.response(3), tmp_path / "mine.nc")
     tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "nothing was sampled" in tree.text
     assert list(json.loads(tree.content["content"])["motions"]) == ["mine"]
 
 
 def test_all_samples_failed_is_reported(tmp_path: Path) -> None:
-    dataset.write(data.samples(20, failed=20), tmp_path / "samples.nc")
+    opened.write(data.samples(20, failed=20), tmp_path / "samples.nc")
     tree = Tree(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "20 failed" in tree.text
     assert "nan" not in tree.text.lower().replace("nanj", "")
@@ -160,18 +160,18 @@ def test_all_samples_failed_is_reported(tmp_path: Path) -> None:
 )
 def test_a_scene_is_shown_whatever_it_is(tmp_path: Path, scene: str, words: str) -> None:
     claims = data.claims().assign_attrs(scene=scene)
-    dataset.write(claims, tmp_path / "claims.nc")
+    opened.write(claims, tmp_path / "claims.nc")
     assert words in Tree(write_report(tmp_path).read_text(encoding="utf-8")).text
 
 
 def test_results_of_different_scenes_are_not_mixed_silently(tmp_path: Path) -> None:
-    dataset.write(data.samples(), tmp_path / "samples.nc")
-    dataset.write(data.claims().assign_attrs(scene_hash="1" * 64), tmp_path / "claims.nc")
+    opened.write(data.samples(), tmp_path / "samples.nc")
+    opened.write(data.claims().assign_attrs(scene_hash="1" * 64), tmp_path / "claims.nc")
     assert any("different scenes" in trouble for trouble in read(tmp_path).troubles)
 
 
 def test_equal_results_give_equal_pages(tmp_path: Path) -> None:
-    dataset.write(data.samples(), tmp_path / "samples.nc")
+    opened.write(data.samples(), tmp_path / "samples.nc")
     first = write_report(tmp_path).read_bytes()
     assert write_report(tmp_path).read_bytes() == first
 
@@ -181,7 +181,7 @@ def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         write_report(tmp_path / "nowhere")
     with pytest.raises(InputError, match="no result file"):
         write_report(tmp_path)
-    dataset.write(data.samples(), tmp_path / "samples.nc")
+    opened.write(data.samples(), tmp_path / "samples.nc")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(InputError, match=r"pip install 'matplotlib>=3\.9'"):
         write_report(tmp_path)

@@ -4,6 +4,7 @@ import contextlib
 import time
 from pathlib import Path
 
+import opened
 import pytest
 from commands import CHEAP, SCENE, kill, overrides, run, sample, start
 from patience import crowded
@@ -13,7 +14,6 @@ from hpcclear.ensemble.samples import design, run_merge, run_sample
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.split import Part
 from hpcclear.ranks.boundary import alone
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
 pytestmark = pytest.mark.timeout(900)
@@ -139,7 +139,7 @@ def test_parts_of_another_run_or_division_and_damaged_ones_are_refused(tmp_path,
     with pytest.raises(InputError, match="different divisions"):
         merged(small, output)
     third.unlink()
-    content = dataset.read(second)
+    content = opened.read(second)
     assert len(content["sample"]) == 6
     merged(small, output)
     with contextlib.suppress(FileNotFoundError):

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import report_data as data
 import xarray as xr
@@ -13,7 +14,6 @@ from hpcclear.base.objectives import MEAN_GAP, OURS
 from hpcclear.base.outcome import Flag
 from hpcclear.report import spread
 from hpcclear.report.html.page import write_report
-from hpcclear.results import dataset
 from hpcclear.statistics.random.survival import fewest, order_interval
 
 
@@ -146,7 +146,7 @@ def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
     scene = Path("jobs/quickstart.toml").read_text()
     case = '[study.cases.rare]\nrandom = ["C"]\nobjectives = ["mean", { statistic = "exceedance", limit = "0.5 mm" }]'
     scene = re.sub(r"\[study.cases\].*?\n\n", f"{case}\n\n", scene, flags=re.S)
-    dataset.write(drawn(500, scene=scene), tmp_path / "samples.nc")
+    opened.write(drawn(500, scene=scene), tmp_path / "samples.nc")
     page = write_report(tmp_path).read_text()
     assert "Statistics of the samples" in page
     assert "P99 of f" in page
@@ -156,8 +156,8 @@ def test_the_page_has_the_statistics_and_thresholds_of_the_study(tmp_path):
 
 def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_path):
     for name, failed in (("H7g6", 5), ("H7f7", 1)):
-        dataset.write(drawn(100, failed), tmp_path / f"{name}.nc")
-    dataset.write(data.timing(), tmp_path / "H7g6.timing.nc")
+        opened.write(drawn(100, failed), tmp_path / f"{name}.nc")
+    opened.write(data.timing(), tmp_path / "H7g6.timing.nc")
     chosen = [tmp_path / f"{name}.nc" for name in ("H7f7", "H7g6")]
     for page in (write_report(tmp_path), write_report(*chosen, output=tmp_path / "chosen.html")):
         text = page.read_text()

@@ -6,11 +6,11 @@ import subprocess
 import sys
 
 import numpy as np
+import opened
 import pytest
 from patience import crowded
 
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.domain import box, to_coordinates
 from hpcclear.scene.sampling import latin_hypercube
@@ -72,7 +72,7 @@ def test_the_quickstart_on_two_ranks_is_the_quickstart_on_one(tmp_path):
         files = [path for path in sorted(place.rglob("*.nc")) if path.name != "timing.nc"]
         contents.append({str(path.relative_to(place)): path.read_bytes() for path in files})
     assert contents[0] == contents[1]
-    table = dataset.read(tmp_path / "on_1" / "verification.nc")
+    table = opened.read(tmp_path / "on_1" / "verification.nc")
     names = table["design"].to_numpy()
     for case in ("deterministic", "robust"):
         assert sum(str(name).startswith(f"{case} front") for name in names) >= 10

@@ -11,11 +11,10 @@ import commands
 import kills
 import losses
 import numpy as np
+import opened
 import pytest
 from kills import COMMANDS, OPTIONS, Undisturbed, files
 from patience import crowded
-
-from hpcclear.results import dataset
 
 sys.path.insert(0, str(commands.PROGRAM.parent))
 
@@ -222,7 +221,7 @@ def test_results_of_an_interrupted_run_are_datasets_of_their_own(tmp_path, undis
     time.sleep(1.0)
     commands.kill(job.pid, signal.SIGTERM)
     assert commands.finish(job)[0] == 3
-    parts = [dataset.read(path, "samples") for path in commands.result_files(tmp_path)]
+    parts = [opened.read(path, "samples") for path in commands.result_files(tmp_path)]
     numbers = np.concatenate([part["sample"] for part in parts])
     assert numbers.size == np.unique(numbers).size > 100
     assert all(np.isfinite(part["m2"]).all() for part in parts)

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 import xarray as xr
 from browser import Browser, needed
@@ -21,7 +22,6 @@ from hpcclear.report.beside import beside_original
 from hpcclear.report.html import designs, picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
-from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import run_study
@@ -89,7 +89,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def verified(place: Path) -> xr.Dataset:
-    return dataset.read(place / "verification.nc", "verification")
+    return opened.read(place / "verification.nc", "verification")
 
 
 def chosen(found: xr.Dataset) -> xr.Dataset:
@@ -151,7 +151,7 @@ def test_the_front_is_the_octant_and_covers_it(study: Path) -> None:
 
 
 def test_each_solution_knows_all_three(study: Path) -> None:
-    front = dataset.read(study / "front.nc", "front")
+    front = opened.read(study / "front.nc", "front")
     assert front["searched"].item() == f"mean of f, standard deviation of f, {THIRD}"
     known = np.isfinite(front["searched_third"].to_numpy())
     assert known.sum() == np.isfinite(front["searched_first"]).sum() == 120
@@ -189,7 +189,7 @@ def test_the_number_of_ranks_changes_no_byte(tmp_path: Path) -> None:
     for name in ("front.nc", "verification.nc", "samples.nc"):
         one, two = ((tmp_path / ranks / name).read_bytes() for ranks in ("1", "2"))
         assert one == two, name
-    found = dataset.read(tmp_path / "1" / "verification.nc")
+    found = opened.read(tmp_path / "1" / "verification.nc")
     assert float(found["third_true"].sel(design="light gamma")) == pytest.approx(0.175, abs=2e-3)
 
 
@@ -228,7 +228,7 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
         best = five.sel(design=f"five {end}")
         assert float(best["m2"]) <= 0.3
         assert float(best[f"{name}_lower"]) <= float(kept[f"{name}_upper"].min())
-    front = dataset.read(place / "front.nc", "front")
+    front = opened.read(place / "front.nc", "front")
     own = front.sel(case="five")
     assert float(own["m2"].max()) <= 0.3
     assert float(own["searched_third"].max()) > 0.8  # which no constraint is about

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import formula_study
 import numpy as np
+import opened
 import pytest
 from formula_study import contents, formula, on_two_ranks
 
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.boundary import alone
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.pooled import together
 from hpcclear.study import extent, run_study, simulations, tolerance, truth
@@ -139,7 +139,7 @@ def exact(m2):
 
 
 def test_limits_hold_the_tolerance_and_the_truth(done):
-    found = dataset.read(done[0] / "verification.nc")
+    found = opened.read(done[0] / "verification.nc")
     for k in range(found.sizes["design"]):
         one = found.isel(design=k)
         for name, true, asked in zip(
@@ -169,7 +169,7 @@ def test_limits_hold_the_truth_where_designs_differ_in_what_the_tolerance_takes(
         bare = scene_of().with_({"study.accuracy": None, "study.seed": 5 + seed}).to_toml()
         scene = load_scene(tomllib.loads(bare), ["study.verification.designs=12"])
         run_study(scene, tmp_path / str(seed), alone(), progress_style="quiet")
-        found = dataset.read(tmp_path / str(seed) / "verification.nc")
+        found = opened.read(tmp_path / str(seed) / "verification.nc")
         found = found.isel(design=np.unique(found["m2"], return_index=True)[1])
         share = found["mean_tolerance"]
         assert share.max() > 2.0 * share.min()
@@ -207,7 +207,7 @@ def test_a_tolerance_that_dominates_is_named_with_a_better_one(tmp_path, monkeyp
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet", notify=told.append)
     (remark,) = [text for text in told if "tolerance dominates" in text]
     assert "Lower numerics.rtol, to 1e-07 say" in remark  # 1.3 % of 0.25 % by halves
-    found = dataset.read(tmp_path / "it" / "verification.nc")
+    found = opened.read(tmp_path / "it" / "verification.nc")
     assert (found["mean_within"] > 0.01).all()
     assert remark in found.attrs["remarks"]
 
@@ -216,7 +216,7 @@ def test_each_design_has_its_own_share(tmp_path, monkeypatch):
     """Half of alpha's samples scatter beyond the largest m2, where f is ten times as wrong."""
     monkeypatch.setattr(formula, "worse", lambda mass, play: np.where(mass > 0.42, 10.0, 1.0))
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
-    found = dataset.read(tmp_path / "it" / "verification.nc")
+    found = opened.read(tmp_path / "it" / "verification.nc")
     inner = found["m2"] < 0.41
     assert float(found["m2"].sel(design="play alpha")) == pytest.approx(0.42, abs=1e-3)
     assert (found["mean_tolerance"][~inner.values] > 4.0 * SHARE).all()
@@ -245,7 +245,7 @@ def made(monkeypatch):
 
 def test_pairs_are_of_points_that_are_verified_anyway(tmp_path, made):
     run_study(scene_of(), tmp_path / "it", alone(), progress_style="quiet")
-    found = dataset.read(tmp_path / "it" / "verification.nc")
+    found = opened.read(tmp_path / "it" / "verification.nc")
     ends = found["samples"].sel(design=["play alpha", "play beta"]).sum()
     once = found["samples"].sum() - ends  # they are ends of the swarm too, and stand there twice
     assert made["verification", 1e-4] == once
@@ -263,7 +263,7 @@ def test_without_an_accuracy_limits_hold_the_tolerance_too(tmp_path, made, overr
     pairs = sum(count for (stage, _), count in made.items() if stage == "pairs")
     assert 0 < pairs <= extent.samples_of(scene)["pairs"]
     assert pairs < 0.04 * sum(made.values())
-    found = dataset.read(tmp_path / "it" / "verification.nc")
+    found = opened.read(tmp_path / "it" / "verification.nc")
     np.testing.assert_allclose(found["mean_tolerance"], SHARE, rtol=1e-3)
     half = (found["mean_upper"] - found["mean_lower"]) / 2.0
     assert (half > SHARE * found["mean_true"]).all()

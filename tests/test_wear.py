@@ -5,6 +5,7 @@ from pathlib import Path
 
 import commands
 import numpy as np
+import opened
 import pytest
 from margins import at_most, bootstrap
 from oracle import SliderCrank
@@ -14,7 +15,6 @@ import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.setup.problem import effects_of
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
 WEAR = {"length": "20 mm", "bearing": {"coefficient": 1e-15}}
@@ -127,7 +127,7 @@ def test_bushings_of_a_textbook_wear_as_its_solutions_say(changes, life, tmp_pat
     file.write_text(load_scene(BUSHING).with_(changes).to_toml(), encoding="utf-8")
     code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
     assert code == 0, output
-    found = dataset.read(tmp_path / "out.nc", "wear")
+    found = opened.read(tmp_path / "out.nc", "wear")
     assert float(found.lifetime[0]) == pytest.approx(life, rel=0.005)
 
 

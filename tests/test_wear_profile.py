@@ -7,6 +7,7 @@ from pathlib import Path
 
 import commands
 import numpy as np
+import opened
 import pytest
 import tomli_w
 from oracle import SliderCrank
@@ -29,7 +30,6 @@ from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.life import Plan, Seen, life
 from hpcclear.dynamics.wear.relief import Relief, kernel
 from hpcclear.report import profile_figure
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 
 SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
@@ -361,7 +361,7 @@ def test_an_angular_life_of_a_turning_journal(tmp_path):
     code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
     assert code == 0, output
     assert "with uniform wear" in " ".join(output.split())
-    found = dataset.read(tmp_path / "out.nc", "wear")
+    found = opened.read(tmp_path / "out.nc", "wear")
     np.testing.assert_allclose(found.clearance, found.even_clearance, rtol=1e-5)
     end = found.isel(cycle=-1, joint=0, quantile=2)
     assert float(end.bearing_depth[0]) > 1e-5
@@ -399,6 +399,6 @@ def test_ranks_and_a_kill_change_no_byte_of_profiles(tmp_path):
     code, output = commands.run(words(out), 2)
     assert code == 0, output
     assert out.read_bytes() == files[0]
-    found = dataset.read(out, "wear")
+    found = opened.read(out, "wear")
     assert not (found.local_clearance < found.clearance).any()  # NaN where a life is over
     assert (found.lifetime < found.even_lifetime).all()

@@ -4,6 +4,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import opened
 import pytest
 from commands import finish, kill, overrides, ranks_of, run, start
 from patience import crowded
@@ -13,7 +14,6 @@ import hpcclear
 from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import Samples
 from hpcclear.ensemble.samples import design
-from hpcclear.results import dataset
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.statistics.random import rules
@@ -157,8 +157,8 @@ def study(tmp_path_factory) -> Path:
 
 def test_designs_are_judged_by_the_clearances_of_lives(study):
     """Mean and deviation of the original against an independent draw of its own from the file of lives."""
-    found = dataset.read(study / "verification.nc").sel(design="worn original")
-    last = dataset.read(study / "wear.nc").sel(cycle=1e6)
+    found = opened.read(study / "verification.nc").sel(design="worn original")
+    last = opened.read(study / "wear.nc").sel(cycle=1e6)
     assert last.sizes["life"] == 12
     scene, rng, count = load_scene(SCENE), np.random.default_rng(6), 4000
     designs = {
@@ -175,7 +175,7 @@ def test_designs_are_judged_by_the_clearances_of_lives(study):
 
 def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
     """Against the same lives by the other command, their f averaged by a finer rule."""
-    found = dataset.read(study / "verification.nc").sel(design="worn alpha")
+    found = opened.read(study / "verification.nc").sel(design="worn alpha")
     masses = (
         f"mechanism.rod.mass={float(found.m2)!r}",
         f"mechanism.slider.mass={float(found.m3)!r}",
@@ -183,9 +183,9 @@ def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
     words = ["wear", str(SCENE), "-o", str(tmp_path / "own.nc"), *overrides(*SMALL, *masses)]
     code, output = run(words, 0)
     assert code == 0, output
-    own = dataset.read(tmp_path / "own.nc")
+    own = opened.read(tmp_path / "own.nc")
     np.testing.assert_array_equal(
-        own.objective, dataset.read(study / "lives" / "worn_alpha.nc").objective
+        own.objective, opened.read(study / "lives" / "worn_alpha.nc").objective
     )
     each = own.objective.interp(cycle=np.linspace(0.0, 1e6, 4001))
     assert float(found.life_mean) == pytest.approx(float(each.mean()), rel=1e-3)
@@ -193,7 +193,7 @@ def test_designs_are_told_over_lives_of_their_own(study, tmp_path):
     lives_ = each.mean("cycle").values
     half = stats.t.ppf(0.975, 11) * lives_.std(ddof=1) / np.sqrt(12)
     assert float(found.life_mean_upper - found.life_mean) == pytest.approx(half, rel=0.01)
-    others = dataset.read(study / "verification.nc")
+    others = opened.read(study / "verification.nc")
     assert np.isfinite(others.life_mean.sel(design="worn original"))
     told = [
         str(name) for name in others.design.values if np.isfinite(others.life_mean.sel(design=name))

@@ -5,7 +5,6 @@ from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.accuracy import averaging, integration, parallel, random_inputs, spending, surrogate
 from hpcclear.accuracy.looked_at import quantities_of
@@ -18,6 +17,7 @@ from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ensemble.session import command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
@@ -69,7 +69,7 @@ class Panels:
         profile: Profile,
         notify: Notify,
         store: Store,
-        show: Callable[[xr.Dataset], object],
+        show: Callable[[Results], object],
     ) -> None:
         self.scene, self.ranks, self.profile = scene, ranks, profile
         self._store, self._show = store, show
@@ -104,7 +104,7 @@ class Panels:
         self.values.update(self.kept(name, work))
         self._show(self.content(whole=False))
 
-    def content(self, *, whole: bool = True) -> xr.Dataset:
+    def content(self, *, whole: bool = True) -> Results:
         """Kind ``accuracy``, of all that is there."""
         known = KINDS["accuracy"].coords
         coords = {name: value for name, value in self.values.items() if name in known}

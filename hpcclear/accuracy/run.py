@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import xarray as xr
-
 from hpcclear.accuracy import surrogate
 from hpcclear.accuracy.panels import Notify, Nowhere, Panels, Store
 from hpcclear.accuracy.profile import Profile
@@ -14,6 +12,7 @@ from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Place, Session
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 
 FILE = "accuracy.nc"
@@ -25,8 +24,8 @@ def measure(
     profile: Profile,
     notify: Notify = lambda text: None,
     store: Store | None = None,
-    show: Callable[[xr.Dataset], object] = lambda content: None,
-) -> xr.Dataset:
+    show: Callable[[Results], object] = lambda content: None,
+) -> Results:
     """Measure what accuracy costs for a scene; on root.
 
     Parameters
@@ -79,7 +78,7 @@ def run_accuracy(
     profile: Profile,
     notify: Notify,
     options: Options = DEFAULT_OPTIONS,
-) -> tuple[xr.Dataset, dict[str, Path]]:
+) -> tuple[Results, dict[str, Path]]:
     """Measure, write ``accuracy.nc`` and the figures; the dataset and the files by what they show.
 
     Each figure is written as soon as its panel is measured, and what is measured is kept: the same command goes on from
@@ -96,16 +95,16 @@ def run_accuracy(
     place = Place.of_directory(directory, options.fresh)
     key = {**run_key(scene, "accuracy"), "profile": profile.name}
     drawn: dict[str, Path] = {}
-    shown: dict[str, xr.Dataset] = {}
+    shown: dict[str, list[bytes]] = {}
 
-    def draw(content: xr.Dataset) -> None:
+    def draw(content: Results) -> None:
         """Figures of what is there, and was not when they were drawn."""
         for name, figure in accuracy_figures.FIGURES.items():
             first, *more = accuracy_figures.MAIN[name]
             if first not in content:
                 continue
-            found = content[[first, *(one for one in more if one in content)]]
-            if not (name in shown and found.equals(shown[name])):
+            found = [content[one].values.tobytes() for one in (first, *more) if one in content]
+            if found != shown.get(name):
                 drawn[name] = style.save(figure(content), place.output / f"{name}.png")
                 shown[name] = found
 

@@ -2,7 +2,6 @@
 
 import difflib
 import errno
-import importlib.util
 import os
 import platform
 import re
@@ -150,13 +149,10 @@ class LimitError(RuntimeError):
     """The machine, or a limit that was set for the process, is too small for the work. Exit code 1."""
 
 
-_PYARROW = 200 if importlib.util.find_spec("pyarrow") else 0
-"""MB more where pyarrow is installed (the extra ``tables``): pandas, which xarray needs, then loads it."""
-
-LEAST_ADDRESS_SPACE = 800 + _PYARROW
+LEAST_ADDRESS_SPACE = 800
 """MB of it that one process takes to load the program and a compiled kernel, and some 100 more: libraries differ."""
 
-LEAST_BESIDE_OTHERS = 1050 + _PYARROW
+LEAST_BESIDE_OTHERS = 1050
 """MB that each takes under an MPI launcher: the library maps buffers that it shares with the ranks of its node."""
 
 

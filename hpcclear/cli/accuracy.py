@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 from rich import box
 from rich.table import Table
 
@@ -12,11 +11,12 @@ from hpcclear.accuracy.integration import MARGIN
 from hpcclear.cli.terminal import console, fitting, table
 from hpcclear.report import targets
 from hpcclear.report.figures.accuracy import AIM
+from hpcclear.results.content import Results, Variable
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
 
-def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
+def describe(found: Results, files: dict[str, Path]) -> None:
     """Print every panel as a table, the cheapest settings, and where the files are."""
     out = console()
     for text in targets.sentences(found):
@@ -41,7 +41,7 @@ def describe(found: xr.Dataset, files: dict[str, Path]) -> None:
     out.print(f"steady mean    {result(found)}", soft_wrap=True)
 
 
-def _integration(found: xr.Dataset) -> Table:
+def _integration(found: Results) -> Table:
     made = _grid("One revolution: error of f, force evaluations, time")
     for name in ("integrator", "order", "rtol or step", "error of f", "evaluations", "ms"):
         made.add_column(name, no_wrap=True, justify="left" if name == "integrator" else "right")
@@ -59,7 +59,7 @@ def _integration(found: xr.Dataset) -> Table:
     return made
 
 
-def _spending(found: xr.Dataset) -> Table:
+def _spending(found: Results) -> Table:
     """A row a tolerance."""
     made = _grid("Steady mean: relative bias and variance of f, and run time, by tolerance")
     for name in ("rtol", "bias of f", "± 2 s.e.", "variance/rev.", "ms/rev.", "error/formula"):
@@ -79,20 +79,20 @@ def _spending(found: xr.Dataset) -> Table:
     return made
 
 
-def _known(value: xr.DataArray, digits: str) -> str:
+def _known(value: Variable, digits: str) -> str:
     """A number, a dash where there is none: at the reference."""
     return format(float(value), digits) if np.isfinite(float(value)) else "–"
 
 
-def _cheapest(found: xr.Dataset) -> list[tuple[str, str]]:
+def _cheapest(found: Results) -> list[tuple[str, str]]:
     wait = f"the {float(found['spin_up']):.0f} transient revolutions of {spending.COPIES} replicas"
     rows = [(f"{aim:.1%}", cheapest(found, float(aim))) for aim in found["aim"].to_numpy()]
     return [*rows, ("time", f"averaged revolutions and {wait}")]
 
 
-def cheapest(found: xr.Dataset, aim: float) -> str:
+def cheapest(found: Results, aim: float) -> str:
     """Tolerance, revolutions and core time that reach a relative standard error at the least cost."""
-    here = found.sel(aim=aim, method="nearest")
+    here = found.isel(aim=int(np.abs(found["aim"].to_numpy() - aim).argmin()))
     seconds = float(here["cheapest_seconds"])
     if not np.isfinite(seconds):
         return "not resolved by the measured revolutions"
@@ -101,7 +101,7 @@ def cheapest(found: xr.Dataset, aim: float) -> str:
     return f"rtol {float(here['cheapest_tolerance']):.0e}, {count}, {seconds:.2g} s"
 
 
-def result(found: xr.Dataset) -> str:
+def result(found: Results) -> str:
     """The cheapest settings for one error, in one line."""
     return f"cheapest settings for a standard error of {AIM:.0%}, all replicas together: {cheapest(found, AIM)} of one core"
 
@@ -110,7 +110,7 @@ def _grid(title: str) -> Table:
     return Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
 
 
-def advice(found: xr.Dataset) -> list[tuple[str, str]]:
+def advice(found: Results) -> list[tuple[str, str]]:
     """The cheapest method and setting for each target error of f, and what the reference resolves."""
     here = found.sel(quantity="objective")
     error, seconds = here["error"].to_numpy(), here["seconds"].to_numpy()
@@ -127,28 +127,28 @@ def advice(found: xr.Dataset) -> list[tuple[str, str]]:
     return [*rows, ("reference", resolution(found))]
 
 
-def resolution(found: xr.Dataset, quantity: str = "objective") -> str:
+def resolution(found: Results, quantity: str = "objective") -> str:
     """What the reference of one quantity can distinguish, in words."""
     own = float(found["reference_error"].sel(quantity=quantity))
-    least = float(found["error"].sel(quantity=quantity).min())
+    least = float(np.nanmin(found["error"].sel(quantity=quantity)))
     if own * MARGIN <= least:
         return f"its own error is {own:.0e}, {MARGIN:.0f} times below all errors shown"
     return f"its own error is {own:.0e}: errors below {MARGIN * own:.0e} are not resolved"
 
 
-def _averaging(found: xr.Dataset) -> list[tuple[str, str]]:
+def _averaging(found: Results) -> list[tuple[str, str]]:
     error, floor = found["averaging_error"], float(found["averaging_floor"])
     rows = []
     for transient in (0, 2, 8):
         for averaged in (1, 8):
-            if transient in error["transient"] and averaged in error["averaged"]:
+            if transient in found["transient"].values and averaged in found["averaged"].values:
                 value = float(error.sel(transient=transient, averaged=averaged))
                 rows.append((f"{transient} + {averaged} revolutions", f"error of f {value:.1e}"))
     text = f"{floor:.1e}: scatter of long averages between replicas, which no average removes"
     return [*rows, ("lower bound", text)]
 
 
-def _surrogates(found: xr.Dataset) -> Table:
+def _surrogates(found: Results) -> Table:
     made = _grid("Surrogates")
     for name in ("surrogate", "samples", "simulation", "R2", "RMAE", "leave-one-out"):
         made.add_column(name, no_wrap=True, justify="left" if name == "surrogate" else "right")
@@ -161,7 +161,7 @@ def _surrogates(found: xr.Dataset) -> Table:
     return made
 
 
-def _random(found: xr.Dataset) -> list[tuple[str, str]]:
+def _random(found: Results) -> list[tuple[str, str]]:
     rows = []
     for estimate in found["estimate"].to_numpy():
         error = found["moment_error"].sel(estimate=estimate)
@@ -183,7 +183,7 @@ def _random(found: xr.Dataset) -> list[tuple[str, str]]:
     return [*rows, ("quadrature", text)]
 
 
-def _ranks(found: xr.Dataset) -> list[tuple[str, str]]:
+def _ranks(found: Results) -> list[tuple[str, str]]:
     strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()
     rows = []
     for number, one, other in zip(found["ranks"].to_numpy(), strong, weak, strict=True):

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import tomli_w
-import xarray as xr
 from rich import box
 from rich.table import Table
 
@@ -27,6 +26,7 @@ from hpcclear.report.figures.effects import (
 )
 from hpcclear.report.figures.labels import paired
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import parse
 
@@ -69,7 +69,7 @@ def describe(found: "Finished", scene: Scene, file: Path) -> int:
             "confidence",
             f"{float(content.attrs['confidence']):.0%} intervals, from averages over the same points",
         ),
-        ("samples", f"{int(content['samples'].sum())}, {_failed(content)} failed"),
+        ("samples", f"{int(np.sum(content['samples']))}, {_failed(content)} failed"),
         ("time", _rounds(saving(content, 1, seconds).rounds)),
     ]
     out.print(table("Effect screening", rows))
@@ -85,19 +85,19 @@ def _rounds(count: int) -> str:
     return f"processor time of a sample, 95 % intervals from {count} paired measurements"
 
 
-def _times(place: Path) -> xr.Dataset | None:
+def _times(place: Path) -> Results | None:
     try:
         return dataset.read(place, "timing")
     except InputError:
         return None  # or written over by another command: savings are estimated from evaluations
 
 
-def _failed(content: xr.Dataset) -> str:
-    count = int(content["failed"].sum())
+def _failed(content: Results) -> str:
+    count = int(np.sum(content["failed"]))
     return str(count) if count else "none"
 
 
-def _changes(content: xr.Dataset, seconds: Times, tolerance: str) -> Table:
+def _changes(content: Results, seconds: Times, tolerance: str) -> Table:
     """A row a variant: what is off, changes with confidence intervals, time, verdict."""
     what = f"Changes in % with effects disabled, against all enabled; tolerance {tolerance}"
     made = Table(title=what, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
@@ -134,12 +134,12 @@ def _longer(saved: Saving) -> str:
     return text if text.startswith("-") else f"+{text}"
 
 
-def _is_reported(content: xr.Dataset, response: int) -> bool:
+def _is_reported(content: Results, response: int) -> bool:
     return bool(np.isfinite(content["change"].isel(response=response)[1:]).any())
 
 
 def recommendation(
-    content: xr.Dataset, scene: Scene, file: Path, tolerance: str, seconds: Times
+    content: Results, scene: Scene, file: Path, tolerance: str, seconds: Times
 ) -> str:
     """The tables of the scene that change, as TOML to paste, with what they save."""
     chosen = int(np.argmax(content["recommended"].to_numpy()))

@@ -258,7 +258,7 @@ def is_root() -> bool:
 SIMULATING = ("hpcclear.base.jit", "hpcclear.scene", "hpcclear.dynamics.evaluation")
 """What every rank of every such command loads, in pieces: between two it hears what root says."""
 
-STUDYING = (*SIMULATING, "xarray", "hpcclear.ensemble.compiling", "hpcclear.study")
+STUDYING = (*SIMULATING, "hpcclear.ensemble.compiling", "hpcclear.study")
 
 
 @contextlib.contextmanager

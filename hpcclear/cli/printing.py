@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from rich import box
 from rich.table import Table
 
@@ -19,6 +18,7 @@ from hpcclear.report.failures import explained
 from hpcclear.report.figures import labels
 from hpcclear.report.parts import LinesOf, declared
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
@@ -35,7 +35,7 @@ def describe_statistics(found: "Finished") -> None:
     """Print mean and standard deviation of f, the error of the mean, failures and load of a streamed Monte Carlo."""
     out, content = console(), found.content
     by_status = content["samples_by_status"]
-    total, good = int(by_status.sum()), int(by_status.sel(outcome=int(Status.OK)))
+    total, good = int(np.sum(by_status)), int(by_status.sel(outcome=int(Status.OK)))
     rows = [("simulated", f"{good} of {total} without failure")]
     if int(content["objective_count"]) > 1:
         mean, deviation = (float(content[f"objective_{n}"]) for n in ("mean", "deviation"))
@@ -74,7 +74,7 @@ def describe_study(place: Path) -> None:
     lines = [(line.label, fitting(line.text)) for line in answer(found, str(place))]
     timing = found["timing"]
     spent = np.sum(
-        [timing[name].sum("stage") for name in ("busy", "idle", "compile", "write")], axis=0
+        [timing[name].to_numpy().sum(1) for name in ("busy", "idle", "compile", "write")], axis=0
     )
     lines.append(("run time", f"{duration(float(spent.max()))} on {counted(timing.sizes['rank'])}"))
     out.print(table("Result", lines))
@@ -109,7 +109,7 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
     if "target_error_reached" in samples.attrs:
         rows.append(("target error", str(samples.attrs["target_error_reached"])))
     speed, busy = [], found.spent[:, 0]
-    evaluations = int(samples["rhs_evaluations"].sum())
+    evaluations = int(np.sum(samples["rhs_evaluations"]))
     if busy.sum() > 0.0:
         throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
         if evaluations:  # without clearance there is nothing to integrate
@@ -127,11 +127,11 @@ def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()
             out.print(f"{what:8} {path}")
 
 
-def _half_widths(samples: xr.Dataset) -> str:
+def _half_widths(samples: Results) -> str:
     """Median and largest half-width of f over f, or "not checked"."""
     name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
-    good = (samples["status"] == Status.OK).to_numpy()
-    shares = (samples[name] / abs(samples["objective"])).to_numpy()[good]
+    good = samples["status"].to_numpy() == Status.OK
+    shares = (samples[name].to_numpy() / abs(samples["objective"].to_numpy()))[good]
     if not np.isfinite(shares).any():
         if "objective" in samples.attrs:
             return f"{labels.NOT_CHECKED}; a response has one (hpcclear simulate)"
@@ -142,10 +142,10 @@ def _half_widths(samples: xr.Dataset) -> str:
 def describe_map(found: "Finished") -> None:
     """Print how many cells are of which kind, and the load."""
     out, content = console(), found.content
-    good = (content["status"] == Status.OK).to_numpy()
+    good = content["status"].to_numpy() == Status.OK
     rows = [("cells", f"{int(good.sum())} of {len(good)} without failure")]
     for regime in Regime:
-        count = int(((content["regime"] == regime).to_numpy() & good).sum())
+        count = int(((content["regime"].to_numpy() == regime) & good).sum())
         if count and regime is not Regime.UNJUDGED:
             name, _, meaning = regime.meaning.partition(": ")
             rows.append((name, f"{count} cells: {meaning}"))
@@ -166,14 +166,15 @@ def describe_map(found: "Finished") -> None:
 def describe_bifurcation(found: "Finished") -> None:
     """Print what was observed, its range, failures and load."""
     out, seen = console(), found.content["observed"]
-    failed = int(seen.isnull().all("crossing").sum())
+    count, crossings = seen.shape
+    failed = int(np.isnan(seen).all(axis=1).sum())
     rows = [
-        ("values", f"{seen.sizes['value'] - failed} of {seen.sizes['value']} without failure"),
-        ("observed", f"{seen.attrs['long_name']}, {seen.sizes['crossing']} revolutions each"),
+        ("values", f"{count - failed} of {count} without failure"),
+        ("observed", f"{seen.attrs['long_name']}, {crossings} revolutions each"),
     ]
-    if failed < seen.sizes["value"]:
+    if failed < count:
         unit = str(seen.attrs["units"])
-        low, high = (quantity(float(end), unit) for end in (seen.min(), seen.max()))
+        low, high = (quantity(float(end), unit) for end in (np.nanmin(seen), np.nanmax(seen)))
         rows.append(("range", f"{low} to {high}"))
     out.print(table("Bifurcation", rows))
     out.print(table("Run", _load(found)))

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.outcome import Status
 from hpcclear.cli.options import say
@@ -12,6 +11,7 @@ from hpcclear.cli.terminal import console, table
 from hpcclear.ensemble.lives import HOUR, doubts
 from hpcclear.ranks.stopping import Exit
 from hpcclear.report.figures.labels import quantity
+from hpcclear.results.content import Results
 from hpcclear.statistics.random.survival import order_interval, quantiles
 
 if TYPE_CHECKING:
@@ -52,14 +52,14 @@ REASONS = {
 """How lives end, by what the file has as their reason; failures have rows of their own."""
 
 
-def _endings(content: xr.Dataset) -> list[str]:
+def _endings(content: Results) -> list[str]:
     """How many lives ended in which way."""
     reasons = content["end_reason"].to_numpy()
     counts = {name: int((reasons == name).sum()) for name in REASONS}
     return [f"{count} {REASONS[name]}" for name, count in counts.items() if count]
 
 
-def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
+def _ends(content: Results) -> list[tuple[str, str]]:
     """Clearances of new and of worn joints."""
     rows = []
     at_end = quantiles(content["end_clearance"].to_numpy(), np.array([0.05, 0.5, 0.95]))
@@ -73,7 +73,7 @@ def _ends(content: xr.Dataset) -> list[tuple[str, str]]:
     return rows
 
 
-def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
+def _spread(content: Results, name: str, beyond: float) -> str:
     """Median and nine tenths of lives, each with its confidence interval; lives that failed may be of any length."""
     lives = content[name].to_numpy()
     known = lives[~np.isnan(lives)]
@@ -91,7 +91,7 @@ def _spread(content: xr.Dataset, name: str, beyond: float) -> str:
     return f"median {shown[0]}; 5th percentile {shown[1]}; 95th percentile {shown[2]}"
 
 
-def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
+def _lifetimes(content: Results) -> list[tuple[str, str]]:
     """How long lives last, where a limit was given, and the share that is above the clearance's limit."""
     cycles, last = float(content["cycle"][-1]), content.isel(cycle=-1)
     each = content["revolution_time"].to_numpy() / HOUR
@@ -128,7 +128,7 @@ def _lifetimes(content: xr.Dataset) -> list[tuple[str, str]]:
     return rows
 
 
-def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
+def _profiles(content: Results) -> list[tuple[str, str]]:
     """What it makes that surfaces wear where they touch: the largest clearance around, and lives, beside even wear."""
     if "local_clearance" not in content:
         return []
@@ -151,7 +151,7 @@ def _profiles(content: xr.Dataset) -> list[tuple[str, str]]:
     return rows
 
 
-def _causes(content: xr.Dataset) -> list[tuple[str, str]]:
+def _causes(content: Results) -> list[tuple[str, str]]:
     """Which random input decides how fast a joint wears, where one does."""
     rows = []
     for name in content["joint"].to_numpy():

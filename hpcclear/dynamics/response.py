@@ -40,7 +40,7 @@ from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import PrescribedSamples
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.results import dataset
-from hpcclear.results.content import Content
+from hpcclear.results.content import Results
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -105,7 +105,7 @@ def simulate(
 
 def simulated(
     scene: Scene, objective: Objective | None = None, copy: int = 0, *, checked: bool = True
-) -> Content:
+) -> Results:
     """Simulate a scene as `simulate` does; the content of its file."""
     steady = _steady(scene)
     named, scene = scene, scene if steady is None else _shown(scene, steady)
@@ -126,7 +126,7 @@ def simulated(
 
 def simulate_together(
     scenes: Sequence[Scene], copies: Sequence[int]
-) -> Iterator[tuple[int, xr.Dataset]]:
+) -> Iterator[tuple[int, Results]]:
     """Simulate scenes that differ in numbers only in one batch; yield their places in the sequence and responses, in any order.
 
     Every response has the bytes of ``simulate(scene, copy=..., checked=False)``, with a number of `copies` for each. A scene
@@ -139,7 +139,7 @@ def simulate_together(
     for numbers in groups.values():
         if len(numbers) == 1:
             (k,) = numbers
-            yield k, simulate(scenes[k], copy=copies[k], checked=False)
+            yield k, simulated(scenes[k], copy=copies[k], checked=False)
             continue
         first, *others = (scenes[k] for k in numbers)
         recording = Recording(first, [copies[k] for k in numbers], beside=others)
@@ -152,7 +152,7 @@ def simulate_together(
         for slot, k in enumerate(numbers):
             scene, record = scenes[k], recording.record()[slot : slot + 1]
             found, collected[slot] = collected[slot].finish(record), None  # type: ignore[call-overload]
-            yield k, _response(scene, scene, found, scene.objective).to_xarray()
+            yield k, _response(scene, scene, found, scene.objective)
 
 
 def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
@@ -173,7 +173,7 @@ Found = tuple[Array, dict[str, Any], Records]
 
 def _response(
     named: Scene, scene: Scene, found: Found, objective: Objective, steady: Records | None = None
-) -> Content:
+) -> Results:
     """The content of the file of a scene `named` by a user, whose series are those of `scene`."""
     times, data, record = found
     still = coordinate_count(scene) == 0

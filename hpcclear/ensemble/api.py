@@ -1,10 +1,11 @@
 """What a script or notebook calls beside `load_scene` and `simulate`: many designs at once, in this process."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
@@ -17,6 +18,9 @@ from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import check_points
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def as_points(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> Points:
@@ -84,4 +88,4 @@ def evaluate(scene: Scene, points: Points | Mapping[Any, ArrayLike]) -> xr.Datas
     records = asked(evaluate_records(scene, designs), scene.objective)
     made = provenance(scene.text or scene.to_toml(), scene.hash, scene.references)
     attributes = made | recorded(scene, records)
-    return samples_of(designs, records, attributes, scene.objective, scene.joint_labels)
+    return samples_of(designs, records, attributes, scene.objective, scene.joint_labels).to_xarray()

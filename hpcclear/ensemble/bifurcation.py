@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
@@ -20,10 +18,15 @@ from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
+from hpcclear.results.signals import Signal, is_counted, signal
 from hpcclear.scene import Scene
 
-REDUCED: "dict[str, Callable[[Array], float]]" = {"max": np.max, "min": np.min, "mean": np.mean}
-"""What may stand before the name of a series: of a revolution, at the stored instants, in place of a section."""
+REDUCED: "dict[str, Callable[[Array], float]]" = {
+    "max": np.max, "min": np.min, "mean": np.mean, "number": np.sum
+}  # fmt: skip
+"""What may stand before the name of a signal: of a revolution, at the stored instants, in place of a section; of events it is
+their number unless another word stands there."""
 
 OBJECTIVE = "objective"
 """Name of the mean gap, f of eq. 13, of each revolution."""
@@ -34,39 +37,34 @@ class Observation:
     """What is observed once a revolution."""
 
     name: str = OBJECTIVE
-    """``objective``, a series of the response ("slider_velocity", "contact_force o2"), or "max ", "min ", "mean " and one."""
+    """``objective``, a signal (`hpcclear.results.signals`) such as "slider_velocity", or a word of `REDUCED` and one."""
     section: float = 0.0
     """Crank angle at which a series is taken, rad."""
     transient: int = 60
     revolutions: int = 60
     """transient and revolutions: how many are left out and observed."""
 
-    def of(self, response: xr.Dataset) -> xr.DataArray:
-        """The series that is observed; raises InputError where the response lacks this name."""
-        found = motion.series(response)
-        word, _, rest = self.name.partition(" ")
-        name = rest if word in REDUCED else self.name
-        if name not in found:
-            names = [OBJECTIVE, *found]
-            alike = [one for one in found if one.startswith(f"{name} ")]
-            remedy = f"Use one of: {', '.join(alike)}" if alike else nearest(name, names)
-            raise InputError("--observe", self.name, "responses have no such series", remedy)
-        return found[name]
+    @property
+    def reduced(self) -> str:
+        """What is made of the instants of a revolution: a word of `REDUCED`; "" at the section."""
+        word = self.name.partition(" ")[0]
+        return word if word in REDUCED else "number" if is_counted(self.name) else ""
 
-    def described(self, response: xr.Dataset) -> Objective:
+    def of(self, response: Results) -> Signal:
+        """The signal that is observed; raises InputError where the response lacks this name."""
+        word, _, rest = self.name.partition(" ")
+        return signal(response, rest if word in REDUCED else self.name, "--observe")
+
+    def described(self, response: Results) -> Objective:
         """Its unit and words, of a short response."""
         if self.name == OBJECTIVE:
             return replace(MEAN_GAP, name=OBJECTIVE, words="mean gap of each revolution")
-        series = self.of(response)
-        word = self.name.partition(" ")[0]
+        seen, word = self.of(response), self.reduced
         at = f"at crank angle {np.degrees(self.section):g} deg"
-        how = f"{word} of each revolution" if word in REDUCED else at
-        name = self.name.removeprefix(f"{word} ") if word in REDUCED else self.name
-        quantity, blank, place = name.partition(" ")
-        words = f"{quantity.replace('_', ' ')}{blank}{place}, {how}"
-        return replace(MEAN_GAP, name=self.name, unit=str(series.attrs["units"]), words=words)
+        words = f"{seen.label}, {f'{word} of each revolution' if word else at}"
+        return replace(MEAN_GAP, name=self.name, unit=seen.unit, words=words)
 
-    def __call__(self, scene: Scene, response: xr.Dataset) -> Array:
+    def __call__(self, scene: Scene, response: Results) -> Array:
         """Values (revolutions,), NaN of a failed simulation."""
         nothing = np.full(self.revolutions, np.nan)
         if not Status(int(response["status"])).valid:
@@ -74,12 +72,11 @@ class Observation:
         shown = motion.steady(response, self.revolutions)
         if self.name == OBJECTIVE:
             return motion.objective_by_turn(shown)[-self.revolutions :]
-        series, word = self.of(shown), self.name.partition(" ")[0]
-        if word not in REDUCED:
-            return motion.section(shown, series, self.section)[-self.revolutions :]
+        values, word = self.of(shown).values, self.reduced
+        if not word:
+            return motion.section(shown, values, self.section)[-self.revolutions :]
         turn = motion.turns(shown) - motion.turns(shown)[-1] + self.revolutions
         place = np.clip(np.floor(turn + 1e-9).astype(int), 0, self.revolutions - 1)
-        values = series.to_numpy()
         return np.array([REDUCED[word](values[place == k]) for k in range(self.revolutions)])
 
 
@@ -140,7 +137,7 @@ def _variant(paths: tuple[str, ...], value: float) -> Mapping[str, float]:
     return dict.fromkeys(paths, float(value))
 
 
-def _short(scene: Scene, variant: Mapping[str, float]) -> xr.Dataset:
+def _short(scene: Scene, variant: Mapping[str, float]) -> Results:
     """A response of one revolution, for the names and units of its series."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    return simulate(scene.with_({**variant, **short}), checked=False)
+    return simulated(scene.with_({**variant, **short}), checked=False)

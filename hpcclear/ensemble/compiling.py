@@ -13,7 +13,7 @@ import numpy as np
 
 from hpcclear.base.quantiles import Uniform
 from hpcclear.dynamics.evaluation.evaluator import Evaluator
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
@@ -52,7 +52,7 @@ def _ensemble(payload: Mapping[str, Any]) -> None:
 def _response(payload: Mapping[str, Any]) -> None:
     """The kernel for one response."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    simulate(load_scene(payload["scene"], trust=True).with_(short))
+    simulated(load_scene(payload["scene"], trust=True).with_(short))
 
 
 def _statistics(payload: Mapping[str, Any]) -> None:

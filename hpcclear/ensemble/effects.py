@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
@@ -24,6 +23,7 @@ from hpcclear.ensemble.session import Finished, Options, Place, Session
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
@@ -80,7 +80,7 @@ def run_effects(
     return session.finished(content, began)
 
 
-def _certified(trial: Trial, plan: Plan, session: Session) -> xr.Dataset:
+def _certified(trial: Trial, plan: Plan, session: Session) -> Results:
     points = trial.drawn.points(0, 1)
     units = dict(zip(points.names, points.units, strict=True))
     checkpoint = session.opened(points.names, units)
@@ -114,7 +114,7 @@ def times_of(seconds: Mapping[str, Sequence[float]]) -> dict[str, str]:
     return {SECONDS_PER_SAMPLE: json.dumps(medians), SECONDS_BY_ROUND: json.dumps(seconds)}
 
 
-def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, str]) -> xr.Dataset:
+def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, str]) -> Results:
     """An effect screening as a dataset of kind ``effects``.
 
     Raises

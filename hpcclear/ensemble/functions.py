@@ -1,19 +1,23 @@
 """Commands as functions of a script or notebook: in this process, a dataset for what they would write."""
 
+from __future__ import annotations
+
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
 from hpcclear.ensemble.maps import grid, number_of, run_map
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.wear import run_wear
 from hpcclear.ranks.boundary import alone
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @contextmanager
@@ -27,12 +31,12 @@ def _place(output: str | Path | None) -> Iterator[Path]:
 
 
 def in_process(
-    run: "Callable[[Path, Any, Any], Any]", output: str | Path | None, progress: Any
+    run: Callable[[Path, Any, Any], Any], output: str | Path | None, progress: Any
 ) -> xr.Dataset:
     """What a command writes, carried out in this process: `run` gets the place, this process, and options."""
     with _place(output) as place:
-        content: xr.Dataset = run(place, alone(), Options(style=progress)).content
-    return content
+        content: Results = run(place, alone(), Options(style=progress)).content
+    return content.to_xarray()
 
 
 def map(

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag, Status
@@ -15,6 +14,7 @@ from hpcclear.dynamics.wear.law import Joints
 from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.survival import quantiles, rank_correlation, share_interval
@@ -65,7 +65,7 @@ def lives_dataset(
     lives: list[Life],
     attributes: dict[str, str],
     even: list[Life] | None = None,
-) -> xr.Dataset:
+) -> Results:
     """Lives and their statistics as a dataset of kind ``wear``; `even`: the same worn evenly, where profiles were followed."""
     assert scene.wear is not None
     cycles, relief = ages_of(scene, [*lives, *(even or ())]), relief_of(scene)
@@ -186,11 +186,11 @@ def _evenly(
     }
 
 
-def doubts(content: xr.Dataset) -> list[str]:
+def doubts(content: Results) -> list[str]:
     """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
     state."""
     texts = []
-    unsure = int((content["flags"] == Flag.TARGET_MISSED).sum())
+    unsure = int((content["flags"].to_numpy() == Flag.TARGET_MISSED).sum())
     if unsure:
         texts.append(
             f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
@@ -204,7 +204,7 @@ def doubts(content: xr.Dataset) -> list[str]:
             "raise numerics.transient_revolutions"
         )
     if "sharpest" in content:
-        narrow = int((content["sharpest"] > 1.0).sum())
+        narrow = int((content["sharpest"].to_numpy() > 1.0).sum())
         if narrow:
             texts.append(
                 f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges; "

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.api import as_points
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
@@ -66,7 +66,7 @@ def repeated(place: Path, count: int) -> Iterator[Repeated]:
             yield Repeated(name, f"not simulated: {error.reason}", unread=True)
 
 
-def _repeated(content: xr.Dataset | InputError, name: str, count: int) -> Iterator[Repeated]:
+def _repeated(content: Results | InputError, name: str, count: int) -> Iterator[Repeated]:
     if isinstance(content, InputError):
         raise content
     kind = str(content.attrs["hpcclear_kind"])
@@ -74,7 +74,7 @@ def _repeated(content: xr.Dataset | InputError, name: str, count: int) -> Iterat
         yield _compared(name, content, kind, count)
 
 
-def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated:
+def _compared(name: str, content: Results, kind: str, count: int) -> Repeated:
     scene = scene_of_text(str(content.attrs.get("scene", "")), name)
     changed = tuple(_changed(content, scene))
     if content.attrs.get("scene_hash") != scene.hash:
@@ -93,7 +93,7 @@ def _compared(name: str, content: xr.Dataset, kind: str, count: int) -> Repeated
     return Repeated(name, extent, tuple(_differing(ours, theirs)), changed)
 
 
-def _samples(content: xr.Dataset, scene: Scene) -> xr.Dataset:
+def _samples(content: Results, scene: Scene) -> Results:
     """The same designs, simulated here."""
     rows = {
         str(name): one
@@ -111,16 +111,14 @@ def _samples(content: xr.Dataset, scene: Scene) -> xr.Dataset:
     )
 
 
-def _series(content: xr.Dataset, scene: Scene) -> tuple[xr.Dataset, xr.Dataset]:
+def _series(content: Results, scene: Scene) -> tuple[Results, Results]:
     """Series over time here and there; a study keeps those after the transient."""
-    names = [name for name, one in content.data_vars.items() if "time" in one.dims]
-    ours = simulate(scene, checked=False)
-    return ours.isel(time=slice(ours.sizes["time"] - content.sizes["time"], None))[names], content[
-        names
-    ]
+    ours = simulated(scene, checked=False)
+    kept = {name: one for name, one in content.data_vars.items() if "time" in one.dims}
+    return ours.isel(time=slice(ours.sizes["time"] - content.sizes["time"], None)), Results(kept)
 
 
-def _differing(ours: xr.Dataset, theirs: xr.Dataset) -> Iterator[str]:
+def _differing(ours: Results, theirs: Results) -> Iterator[str]:
     """Variables that are not the same to the last bit, and how far off."""
     for name, there in theirs.data_vars.items():
         if name not in ours:
@@ -135,7 +133,7 @@ def _differing(ours: xr.Dataset, theirs: xr.Dataset) -> Iterator[str]:
             yield f"{name} ({off / max(np.nanmax(np.abs(second), initial=0.0), 1e-300):.1e})"
 
 
-def _changed(content: xr.Dataset, scene: Scene) -> Iterator[str]:
+def _changed(content: Results, scene: Scene) -> Iterator[str]:
     """What the file says of programs and processor, where that is not what is here."""
     now = provenance("", scene.hash)
     for name in ("hpcclear_version", "processor"):

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
@@ -24,6 +23,7 @@ from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, expanded
@@ -105,7 +105,7 @@ def run_sample(
     return session.finished(samples, began)
 
 
-def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.Dataset:
+def _simulate(scene: Scene, points: Points, session: Session, first: int) -> Results:
     """Simulate what is not finished yet, and write the dataset; the samples are numbered from `first`."""
     units = dict(zip(points.names, points.units, strict=True))
     session.describe(scene)
@@ -122,7 +122,7 @@ def _simulate(scene: Scene, points: Points, session: Session, first: int) -> xr.
         return _write(session, scene, points, records)
 
 
-def _write(session: Session, scene: Scene, points: Points, records: Records) -> xr.Dataset:
+def _write(session: Session, scene: Scene, points: Points, records: Records) -> Results:
     """Write the file of samples; returns what was written."""
     attributes = session.attributes | recorded(scene, records)
     content = samples_of(points, records, attributes, scene.objective, session.joints)
@@ -137,7 +137,7 @@ def samples_of(
     attributes: Mapping[str, str],
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
-) -> xr.Dataset:
+) -> Results:
     """A dataset of kind ``samples`` of points and what became of them, a record each."""
     drawn = {"sampling": points.sampling} if points.sampling else {}
     return dataset.samples_dataset(

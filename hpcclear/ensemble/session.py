@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 
@@ -33,14 +33,12 @@ from hpcclear.results.checkpoint import (
     discard,
     unfinished,
 )
+from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key, key_attribute, key_of
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.record import record_of
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ def _occupied(folder: Path, key: Mapping[str, str]) -> str:
 class Finished:
     """A command's results, for whoever prints them."""
 
-    content: xr.Dataset
+    content: Results
     output: Path
     timing: Path
     """output and timing: files of the content and of the times."""
@@ -256,7 +254,7 @@ class Session:
     def __exit__(self, *error: object) -> None:
         self._lock.release()
 
-    def found(self, kind: str) -> xr.Dataset | None:
+    def found(self, kind: str) -> Results | None:
         """The file of an earlier run of the same command, if it is there; another run's is refused."""
         if not self.place.output.exists():
             return None
@@ -268,7 +266,7 @@ class Session:
         """Whether all these files of the directory are there; another run's are refused."""
         there = [path for name in names if (path := self.place.output / name).exists()]
         for path in there:
-            check_key(dataset.content_in(path), self.key, path)
+            check_key(dataset.read(path), self.key, path)
         return len(there) == len(names)
 
     def describe(self, scene: Scene, mapped: bool = False) -> None:
@@ -311,7 +309,7 @@ class Session:
         with self.ranks.stage("files"), self.ranks.writing():
             yield
 
-    def write(self, content: xr.Dataset) -> xr.Dataset:
+    def write(self, content: Results) -> Results:
         """Write the result file; returns what was written."""
         with self.writing():
             dataset.write(content, self.place.output)
@@ -329,7 +327,7 @@ class Session:
         else:  # the run that finished may have been killed before it could
             discard(self.place.parts)
 
-    def finished(self, content: xr.Dataset, began: float) -> Finished:
+    def finished(self, content: Results, began: float) -> Finished:
         """What to print of a run that wrote one file, or found it; `began`: by `time.perf_counter`."""
         spent = np.zeros((self.ranks.size, len(COLUMNS)))
         spent = sum(self.ranks.stage_seconds.values(), spent)
@@ -337,7 +335,7 @@ class Session:
         return Finished(content, self.place.output, self.place.timing, seconds, spent)
 
 
-def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> xr.Dataset:
+def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> Results:
     """Where the time of this job went, by rank and stage."""
     stages = list(ranks.stage_seconds) or ["none"]
     empty = np.zeros((ranks.size, len(COLUMNS)))

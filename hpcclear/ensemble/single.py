@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.response import simulate_together
@@ -15,6 +14,7 @@ from hpcclear.ranks import leading
 from hpcclear.ranks.schedule import Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene, load_scene
 
 TOGETHER = 8
@@ -24,7 +24,7 @@ TOGETHER = 8
 def responses_of(
     scene: Scene,
     variants: Sequence[Mapping[str, Any]],
-    evaluate: Callable[[Scene, xr.Dataset], Array],
+    evaluate: Callable[[Scene, Results], Array],
     shape: tuple[int, ...],
     ranks: Ranks,
     stage: str,
@@ -158,7 +158,7 @@ class Responses:
         for k, response in simulate_together(scenes, [copy for _, _, copy in taken]):
             yield self._record(taken[k][0], scenes[k], response)
 
-    def _record(self, sample: int, scene: Scene, response: xr.Dataset) -> np.ndarray:
+    def _record(self, sample: int, scene: Scene, response: Results) -> np.ndarray:
         """The record (1,) of a response."""
         records = np.zeros(1, self._dtype)
         records["sample"], records["values"] = sample, self._evaluate(scene, response).ravel()

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
@@ -33,6 +32,7 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, Points, Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
@@ -206,7 +206,7 @@ class _Streaming:
                 last = min(first + length, self._sums.total)
                 yield from range(first // BLOCK, -(-last // BLOCK))
 
-    def run(self) -> xr.Dataset:
+    def run(self) -> Results:
         """Simulate, and write the statistics."""
         with saving(self._save):
             if self._raw is not None:
@@ -239,7 +239,7 @@ class _Streaming:
         else:
             self._run_samples(self._sums.remaining())
 
-    def _dataset(self) -> xr.Dataset:
+    def _dataset(self) -> Results:
         return statistics_dataset(
             self._sums, self._session.attributes, self._objective, self._session.joints
         )
@@ -325,7 +325,7 @@ def statistics_dataset(
     attributes: dict[str, str] | None = None,
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
-) -> xr.Dataset:
+) -> Results:
     """A complete accumulator as a dataset of kind ``statistics``."""
     summary, edges = sums.result(), sums.edges
     assert edges is not None  # it is complete

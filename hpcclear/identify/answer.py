@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.identify.advice import (
@@ -28,9 +27,10 @@ from hpcclear.identify.judgement import Judgement, Prepared, features_of, judged
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.settings import Settings
 from hpcclear.identify.signals import Sensor, names_of, revolutions_of
-from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
+from hpcclear.identify.training import Ensemble, ensemble_of, prepared_scene, units_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.results.kinds.identify import with_units
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
@@ -76,7 +76,7 @@ def run_identify(
 
 def _identified(
     scene: Scene, inputs: Inputs, times: Array, session: Session, settings: Settings
-) -> xr.Dataset:
+) -> Results:
     """The dataset of what was found."""
     if settings.pressure and settings.signals:
         scene = loaded(scene, settings.signals[0], settings.pressure)
@@ -91,7 +91,7 @@ def _identified(
     ]
     layouts = [_layouts(row, settings) for row in tables]  # refuses before anything is simulated
     quiet = session.options.style == "quiet"
-    ensemble = simulated(
+    ensemble = ensemble_of(
         plain, inputs, every, settings.size(), seed, session.ranks, session.opened(), quiet
     )
     with session.ranks.stage("posterior"):
@@ -109,7 +109,7 @@ def _identified(
 def _driven(scene: Scene) -> tuple[float, int, list[str]]:
     """Frequency of a revolution of the drive, Hz, the sense of the crank, and the usual signals."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    response = simulate(scene.with_(short), checked=False)
+    response = simulated(scene.with_(short), checked=False)
     turns, seconds = revolutions_of(scene, response), response["time"].to_numpy()
     angle = response["crank_angle"].to_numpy()
     frequency = float((turns[-1] - turns[0]) / (seconds[-1] - seconds[0]))
@@ -145,7 +145,7 @@ def _noise(measured: Measured, share: float | None) -> float | None:
 def identified(
     ensemble: Ensemble, found: Found, times: Array, gains: Advice | None, settings: Settings, seed: int,
     attributes: Mapping[str, object],
-) -> xr.Dataset:  # fmt: skip
+) -> Results:  # fmt: skip
     """Return the dataset of kind ``identify``; `times` (records,), s."""
     inputs = ensemble.inputs
     units = [one.unit for one in inputs.unknowns]

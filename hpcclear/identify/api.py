@@ -1,13 +1,16 @@
 """What a script or notebook calls to identify a machine, in this process."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from hpcclear.ensemble.functions import in_process
 from hpcclear.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def identify(

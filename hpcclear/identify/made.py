@@ -1,25 +1,32 @@
 """A made measurement: a simulated response, sampled and with noise, as a table that `identify` reads."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.response import simulate
-from hpcclear.identify.signals import IMPACTS, revolutions_of, series_of, unit_of
+from hpcclear.dynamics.response import simulated
+from hpcclear.identify.signals import revolutions_of
 from hpcclear.identify.training import prepared_scene
+from hpcclear.results.content import Results
+from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def write_made(
     scene: Scene, path: str | Path, names: Sequence[str], *, noise: float, revolutions: int = 30,
-    samples: int = 512, seed: int = 0, response: xr.Dataset | None = None,
+    samples: int = 512, seed: int = 0, response: xr.Dataset | Results | None = None,
 ) -> None:  # fmt: skip
     """Simulate a scene and write what a sensor would record over the crank angle, after the transient.
 
@@ -46,28 +53,30 @@ def write_made(
     """
     if response is None:
         longer = {"numerics.averaged_revolutions": revolutions + 1}
-        response = simulate(prepared_scene(scene).with_(longer), checked=False)
-    status = Status(int(response["status"]))
+        found = simulated(prepared_scene(scene).with_(longer), checked=False)
+    else:
+        found = Results.of(response)
+    status = Status(int(found["status"]))
     if not status.valid:
         raise InputError("scene", status.name.lower(), status.message, status.remedy)
     cycle = turns_of(scene.linkage)
-    turns = revolutions_of(scene, response)
-    first = np.ceil(turns[0] + float(response.attrs["transient_turns"]) / cycle - 1e-6)
+    turns = revolutions_of(scene, found)
+    first = np.ceil(turns[0] + float(found.attrs["transient_turns"]) / cycle - 1e-6)
     places = first + np.arange(revolutions * samples + 1) / samples
     rng = np.random.default_rng([seed, 0x6D6164])
     columns = [360.0 * cycle * places]
     headings = ["crank_angle [deg]"]
-    clockwise = response["crank_angle"][-1] < response["crank_angle"][0]
+    clockwise = found["crank_angle"][-1] < found["crank_angle"][0]
     columns[0] = -columns[0] if clockwise else columns[0]
     for name in names:
-        values = series_of(response, name)
-        if name.startswith(IMPACTS):  # whole events since the sample before, which have no noise
+        one = signal(found, name, "signal")
+        values, unit = one.values, one.unit
+        if one.counted:  # whole events since the sample before, which have no noise
             count = np.round(np.interp(places, turns, np.cumsum(values)))
             columns.append(np.diff(count, prepend=count[0]))
         else:
             sampled = make_interp_spline(turns, values, k=3)(places)
             columns.append(sampled + noise * sampled.std() * rng.standard_normal(len(places)))
-        unit = unit_of(response, name)
         headings.append(name if unit == "1" else f"{name} [{unit}]")
     _write(Path(path), headings, columns)
 

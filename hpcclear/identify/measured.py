@@ -8,7 +8,8 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.ensemble.maps import number_of
-from hpcclear.identify.signals import IMPACTS, ORDERS, Spectrum, harmonics
+from hpcclear.identify.signals import ORDERS, Spectrum, harmonics
+from hpcclear.results.signals import is_counted
 from hpcclear.scene import Scene
 from hpcclear.scene.headings import Column
 from hpcclear.scene.planar import turns_of
@@ -78,7 +79,7 @@ def read_measured(
     angle, time = (sheet.axes.get(kind) for kind in ("angle", "time"))
     values = sheet.si(_column(sheet, name), unit, "heading")
     seconds = None if time is None else sheet.si(time, "s", "heading")
-    count = name.startswith(IMPACTS)
+    count = is_counted(name)
     if angle is not None:
         place = np.unwrap(sense * sheet.si(angle, "rad", "heading")) / (2.0 * np.pi * turns)
     elif seconds is not None:

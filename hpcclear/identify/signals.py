@@ -1,7 +1,6 @@
 """Signals by name, as harmonics of the crank: of a simulated response and of a table that was measured.
 
-A signal is a series of the response (``crank_moment``, ``slider_acceleration``, ``frame_force_x``), or derived here:
-``acceleration_x BODY.POINT``, ``impacts JOINT``. Each revolution is resampled over the crank angle, so that order k is k cycles
+A signal is one of `hpcclear.results.signals`. Each revolution is resampled over the crank angle, so that order k is k cycles
 per revolution whatever the speed does.
 """
 
@@ -9,13 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from scipy.interpolate import make_interp_spline
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.outcome import Status
 from hpcclear.report.figures import motion
+from hpcclear.results.content import Results
+from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -25,7 +24,6 @@ ORDERS = 64
 INSTANTS = 1024
 """Instants of a revolution: simulated contact forces have content beyond the highest harmonic, which must not alias into it."""
 
-POINTS, IMPACTS = "acceleration_", "impacts "
 PARTS = 3
 """Numbers kept of a harmonic: real and imaginary part of its mean over revolutions, variance between revolutions."""
 
@@ -90,61 +88,22 @@ class Spectrum:
         return cls(rows[..., 0, :] + 1j * rows[..., 1, :], rows[..., 2, :], revolutions)
 
 
-def names_of(response: xr.Dataset) -> list[str]:
+USUAL = (
+    "crank_moment",
+    "slider_acceleration",
+    "followed_acceleration_x",
+    "followed_acceleration_y",
+    "frame_force_x",
+    "frame_force_y",
+)
+"""Signals that people measure first."""
+
+
+def names_of(response: Results) -> list[str]:
     """Return the signals that a mechanism has, those that people measure first."""
-    known = motion.series(response)
-    usual = (
-        "crank_moment",
-        "slider_acceleration",
-        "followed_acceleration_x",
-        "followed_acceleration_y",
-        "frame_force_x",
-        "frame_force_y",
-    )
-    speeds = response["crank_speed"].to_numpy() if "crank_speed" in known else np.zeros(1)
+    speeds = response["crank_speed"].to_numpy() if "crank_speed" in response else np.zeros(1)
     free = ["crank_speed"] if np.ptp(speeds) > 1e-9 * abs(float(speeds[0])) else []
-    return [*(one for one in usual if one in known), *free]
-
-
-def check_name(response: xr.Dataset, name: str) -> None:
-    """Raise InputError where a mechanism has no signal of this name."""
-    known = set(motion.series(response))
-    points = [str(one) for one in response["point"].to_numpy()] if "point" in response else []
-    joints = [str(one) for one in response["joint"].to_numpy()]
-    derived = [f"{IMPACTS}{one}" for one in joints]
-    derived += [f"{POINTS}{axis} {point}" for axis in "xy" for point in points]
-    if name not in known and name not in derived:
-        remedy = nearest(name, [*sorted(known), *derived])
-        raise InputError("--signal", name, "the mechanism has no such signal", remedy)
-
-
-def unit_of(response: xr.Dataset, name: str) -> str:
-    """Return the SI unit of a signal."""
-    if name.startswith(IMPACTS):
-        return "1"
-    known = motion.series(response)
-    return str(known[name].attrs["units"]) if name in known else "m/s^2"
-
-
-def series_of(response: xr.Dataset, name: str) -> Array:
-    """Return a signal of a response (t,), SI."""
-    if name in response:  # of the mechanism as a whole: no need to label those of its parts
-        return response[name].to_numpy()
-    known = motion.series(response)
-    if name in known:
-        return known[name].to_numpy()
-    time = response["time"].to_numpy()
-    if name.startswith(IMPACTS):
-        touching = response["penetration"].sel(joint=name.removeprefix(IMPACTS)).to_numpy() > 0.0
-        return np.concatenate([[0.0], np.diff(touching.astype(float)) > 0.0])
-    axis, _, point = name.removeprefix(POINTS).partition(" ")
-    return _derived(time, response[f"point_{axis}"].sel(point=point).to_numpy())
-
-
-def _derived(time: Array, values: Array) -> Array:
-    """Second derivative (t,) with respect to time."""
-    found: Array = make_interp_spline(time, values, k=5).derivative(2)(time)
-    return found
+    return [*(one for one in USUAL if one in response), *free]
 
 
 def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
@@ -176,13 +135,13 @@ def harmonics(turns: Array, values: Array, count: bool = False) -> Array:
     return np.asarray(found)
 
 
-def revolutions_of(scene: Scene, response: xr.Dataset) -> Array:
+def revolutions_of(scene: Scene, response: Results) -> Array:
     """Return the crank angle of a response in revolutions of its drive (t,), rising."""
     angle, _ = motion.crank_angle(response)
     return angle / (2.0 * np.pi * turns_of(scene.linkage))
 
 
-def spectra(scene: Scene, response: xr.Dataset, names: Sequence[str]) -> Array:
+def spectra(scene: Scene, response: Results, names: Sequence[str]) -> Array:
     """Return the packed harmonics of signals of one response, shape (signals, PARTS, ORDERS + 1); NaN if it failed."""
     shape = (len(names), PARTS, ORDERS + 1)
     if not Status(int(response["status"])).valid:
@@ -193,7 +152,7 @@ def spectra(scene: Scene, response: xr.Dataset, names: Sequence[str]) -> Array:
     kept = turns >= begin - 2.0 / INSTANTS
     found = []
     for name in names:
-        values = series_of(response, name)[kept]
-        each = harmonics(turns[kept], values, name.startswith(IMPACTS))
+        one = signal(response, name, "--signal")
+        each = harmonics(turns[kept], one.values[kept], one.counted)
         found.append(Spectrum.of(each).packed())
     return np.array(found)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.identify.inputs import Inputs, design
 from hpcclear.identify.signals import (
@@ -17,12 +17,11 @@ from hpcclear.identify.signals import (
     ORDERS,
     PARTS,
     Spectrum,
-    check_name,
     spectra,
-    unit_of,
 )
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -81,13 +80,11 @@ def prepared_scene(scene: Scene) -> Scene:
 def units_of(scene: Scene, names: Sequence[str]) -> tuple[str, ...]:
     """Return the units of signals; raises InputError where the mechanism lacks one."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    response = simulate(scene.with_(short), checked=False)
-    for name in names:
-        check_name(response, name)
-    return tuple(unit_of(response, name) for name in names)
+    found = simulated(scene.with_(short), checked=False)
+    return tuple(signal(found, name, "--signal").unit for name in names)
 
 
-def simulated(
+def ensemble_of(
     scene: Scene, inputs: Inputs, names: Sequence[str], members: int, seed: int, ranks: Ranks,
     checkpoint: Checkpoint | None = None, quiet: bool = True,
 ) -> Ensemble:  # fmt: skip

@@ -1,11 +1,11 @@
 """Designs that are statistically indistinguishable from one, and the same design under another name."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
+from hpcclear.results.content import Results, Variable
 
 SAME = 0.01
 """Relative difference up to which a variable of two designs is called the same."""
@@ -16,7 +16,7 @@ NAMED = 3
 """Designs named before the rest is counted."""
 
 
-def words(ours: xr.Dataset, best: xr.Dataset) -> str:
+def words(ours: Results, best: Results) -> str:
     """Return the designs that are equivalent to the best and satisfy the constraints, and the range of their variables."""
     twins = others(ours, best)
     if not satisfies(best):
@@ -37,7 +37,7 @@ FLAT = 0.01
 """Relative difference of merit up to which other designs are listed beside the best."""
 
 
-def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
+def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
     """Return the designs whose merit (n,) is within `FLAT` of the best, what they share, and the lightest; "" if none."""
     if not satisfies(best):
         return ""  # there is no recommended design
@@ -52,15 +52,15 @@ def flat(ours: xr.Dataset, best: xr.Dataset, merit: np.ndarray) -> str:
     if spans := _spans(together):
         text += f"; they differ in {spans}"
     same = [
-        f"{labels.words(one)} = {labels.value(one[0])}"
+        f"{labels.words(one)} = {labels.value(one.isel(design=0))}"
         for one in labels.design_variables(together)
-        if float(one.max()) - float(one.min()) <= SAME * abs(float(one.max()))
+        if np.ptp(one.to_numpy()) <= SAME * abs(one.to_numpy().max())
     ]
     text += f"; in common: {', '.join(same)}" if same else ""
     return text + _lightest(together, best)
 
 
-def masses(verified: xr.Dataset) -> list[xr.DataArray]:
+def masses(verified: Results) -> list[Variable]:
     """Return the design variables that are masses."""
     return [
         one
@@ -69,7 +69,7 @@ def masses(verified: xr.Dataset) -> list[xr.DataArray]:
     ]
 
 
-def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
+def _lightest(together: Results, best: Results) -> str:
     """The lightest of some designs by the sum of their masses, where it is lighter than the best."""
     if not (found := masses(together)):
         return ""
@@ -81,7 +81,7 @@ def _lightest(together: xr.Dataset, best: xr.Dataset) -> str:
     return f"; lightest: {name}, {labels.quantity(saved, 'kg', 2)} less"
 
 
-def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+def others(ours: Results, best: Results) -> list[str]:
     """Return other designs that are statistically indistinguishable from the best; all satisfy the constraints, or none is."""
     if not satisfies(best):
         return []
@@ -92,12 +92,12 @@ def others(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     return [name for name in _twins(ours, best) if name not in same]
 
 
-def satisfies(one: xr.Dataset) -> bool:
+def satisfies(one: Results) -> bool:
     """Return whether a design significantly satisfies all constraints of its case."""
     return verdict_of(one) in (None, Verdict.HOLDS)
 
 
-def _each(ours: xr.Dataset) -> list[xr.Dataset]:
+def _each(ours: Results) -> list[Results]:
     return [ours.isel(design=k) for k in range(ours.sizes["design"])]
 
 
@@ -110,7 +110,7 @@ def _listed(names: list[str]) -> str:
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
 
 
-def again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+def again(ours: Results, best: Results) -> list[str]:
     """Return other names of a design: all variables are the same numbers."""
     variables = labels.design_variables(ours)
     alike = np.full(ours.sizes["design"], bool(variables))  # of none nothing is known
@@ -121,12 +121,12 @@ def again(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     return [name for name in names if name != str(best["design"].item())]
 
 
-def _overlaps(ours: xr.Dataset, best: xr.Dataset, word: str) -> np.ndarray:
+def _overlaps(ours: Results, best: Results, word: str) -> np.ndarray:
     lower, upper = ours[f"{word}_lower"].to_numpy(), ours[f"{word}_upper"].to_numpy()
     return (lower <= float(best[f"{word}_upper"])) & (upper >= float(best[f"{word}_lower"]))
 
 
-def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
+def _twins(ours: Results, best: Results) -> list[str]:
     """As the file states, else those whose confidence intervals overlap."""
     names = [str(name) for name in ours["design"].to_numpy()]
     own = str(best["design"].item())
@@ -139,11 +139,11 @@ def _twins(ours: xr.Dataset, best: xr.Dataset) -> list[str]:
     return [name for name, one in zip(names, alike, strict=True) if one and name != own]
 
 
-def _spans(alike: xr.Dataset) -> str:
+def _spans(alike: Results) -> str:
     """Ranges of the variables in which these designs differ."""
     texts = []
     for variable in labels.design_variables(alike):
-        low, high = float(variable.min()), float(variable.max())
+        low, high = float(np.min(variable)), float(np.max(variable))
         if high - low > SAME * abs(high):
             unit = str(variable.attrs["units"])
             ends = (labels.quantity(end, unit) for end in (low, high))

@@ -6,7 +6,6 @@ The command prints them at its end, and they head the page.
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import Usual
 from hpcclear.base.outcome import Flag
@@ -26,6 +25,7 @@ from hpcclear.report.merit import (
 )
 from hpcclear.report.parts import LinesOf, Recommended, declared
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 MANY = 0.05
 """Share of samples outside the range of Hertz contact above which that is the first of the next steps."""
@@ -34,7 +34,7 @@ FAR = 0.2
 """Relative error of the surrogate above which more samples are advised."""
 
 
-def answer(files: Mapping[str, xr.Dataset], place: str) -> list[Line]:
+def answer(files: Mapping[str, Results], place: str) -> list[Line]:
     """Return the lines, the most important first; none if no design was verified.
 
     Parameters
@@ -81,13 +81,13 @@ def _head(of: Recommended) -> Iterator[Line]:
     yield Line("active bounds", bounds(best))
 
 
-def unit_of(one: xr.Dataset, name: str) -> str:
+def unit_of(one: Results, name: str) -> str:
     """Return the unit of a variable; of what a case makes small it stands beside it."""
     own = f"{name.removesuffix('_true')}_unit"
     return str(one[own].item()) if own in one else str(one[name].attrs["units"])
 
 
-def _goals(best: xr.Dataset) -> Iterator[str]:
+def _goals(best: Results) -> Iterator[str]:
     """Objectives of the case of a design besides mean and standard deviation, with confidence intervals."""
     names = [] if is_plain(best) else goals_of(best)
     for name in names:
@@ -112,7 +112,11 @@ ENDS_IN_WORDS = {"alpha": "lowest mean of f", "beta": "lowest standard deviation
 """What the ends of a front are, of a case without objectives of its own."""
 
 
-def _named(best: xr.Dataset) -> str:
+def _constraints(best: Results) -> str:
+    return str(best["constraints"].item()) if "constraints" in best else ""
+
+
+def _named(best: Results) -> str:
     name = str(best["design"].item())
     if (verdict := verdict_of(best)) in _NONE:
         return f"{_NONE[verdict]}; nearest: {name}"
@@ -122,11 +126,11 @@ def _named(best: xr.Dataset) -> str:
     return f"{name}: {role}" if role else name
 
 
-def _case(best: xr.Dataset) -> str:
+def _case(best: Results) -> str:
     return str(best["case"].item()) if "case" in best else "of the study"
 
 
-def _values(best: xr.Dataset) -> str:
+def _values(best: Results) -> str:
     shown = [
         f"{labels.words(v)} = {labels.value(v)}"
         for v in labels.design_variables(best)
@@ -135,7 +139,7 @@ def _values(best: xr.Dataset) -> str:
     return ", ".join(shown)
 
 
-def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
+def _moment(best: Results, word: str, original: Results | None) -> str:
     """A simulated moment with its confidence interval, and its change from the baseline."""
     one = best[f"{word}_true"]
     unit = str(one.attrs["units"])
@@ -150,7 +154,7 @@ def _moment(best: xr.Dataset, word: str, original: xr.Dataset | None) -> str:
     return f"{text}, {abs(change):.0%} {'below' if change < 0 else 'above'} the baseline ({labels.quantity(before, unit)})"
 
 
-def bounds(best: xr.Dataset) -> str:
+def bounds(best: Results) -> str:
     """Return the active bounds of a design, "none" without any."""
     found = str(best["on_bounds"].item()) if "on_bounds" in best else ""
     return found or "none"
@@ -197,7 +201,7 @@ def _sure(of: Recommended) -> Iterator[Line]:
     yield Line("confidence", text)
 
 
-def _surrogate_errors(best: xr.Dataset) -> list[float]:
+def _surrogate_errors(best: Results) -> list[float]:
     """Relative errors of the surrogate's mean and standard deviation, as far as they are known."""
     found = [float(best[f"{w}_error"]) for w in ("mean", "deviation") if f"{w}_error" in best]
     return [error for error in found if np.isfinite(error)]

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS, Usual
 from hpcclear.report import alike
@@ -17,6 +16,7 @@ from hpcclear.report.merit import (
     recommended,
     usual_of,
 )
+from hpcclear.results.content import Results
 
 BESIDE = ("original", *ENDS[:2])
 """Designs that every case with a baseline has."""
@@ -43,7 +43,7 @@ class Role(NamedTuple):
     """Its roles: "baseline", "lowest mean (alpha), recommended"."""
 
 
-def roles(verified: xr.Dataset) -> dict[str, list[Role]]:
+def roles(verified: Results) -> dict[str, list[Role]]:
     """Return the designs to compare, by case, each distinct design once.
 
     Parameters
@@ -77,7 +77,7 @@ def roles(verified: xr.Dataset) -> dict[str, list[Role]]:
     return found
 
 
-def _cases(verified: xr.Dataset, names: list[str]) -> list[str]:
+def _cases(verified: Results, names: list[str]) -> list[str]:
     """Cases, in the order of the file."""
     if "case" in verified:
         return list(dict.fromkeys(map(str, verified["case"].to_numpy())))
@@ -85,13 +85,13 @@ def _cases(verified: xr.Dataset, names: list[str]) -> list[str]:
     return list(dict.fromkeys(case for case, _, end in ends if end == "original"))
 
 
-def _same(verified: xr.Dataset, own: xr.Dataset, chosen: dict[str, list[str]]) -> str:
+def _same(verified: Results, own: Results, chosen: dict[str, list[str]]) -> str:
     """The chosen design with the same variables, else its own name."""
     twins = alike.again(verified, own)
     return next((name for name in chosen if name in twins), str(own["design"].item()))
 
 
-def _role(end: str, own: xr.Dataset) -> str:
+def _role(end: str, own: Results) -> str:
     """What an end of a front is called, with its name in the files."""
     if end == "original":
         return "baseline"
@@ -102,7 +102,7 @@ def _role(end: str, own: xr.Dataset) -> str:
     return f"lowest {words} ({end})"
 
 
-def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
+def _lightest(verified: Results, case: str, chosen: list[str]) -> str:
     """The design of a case with the lowest sum of masses within its constraints; "" if one of the chosen is as light."""
     own = [
         one
@@ -121,7 +121,7 @@ def _lightest(verified: xr.Dataset, case: str, chosen: list[str]) -> str:
 
 
 def beside_original(
-    verified: xr.Dataset,
+    verified: Results,
 ) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     """Yield each case with a baseline, the headers of its table, and its lines.
 
@@ -147,7 +147,7 @@ def beside_original(
         yield case, tuple(one.words for one in shown), lines
 
 
-def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
+def _against(one: Results, original: Results, name: str) -> str:
     """A simulated value, its half-width, and its change from the baseline's."""
     if name not in one or not np.isfinite(float(one[name])):
         return "not known"
@@ -166,6 +166,6 @@ def _against(one: xr.Dataset, original: xr.Dataset, name: str) -> str:
     return f"{text} {value / before - 1.0:+.0%}" if before else text
 
 
-def _asked(one: xr.Dataset) -> list[str]:
+def _asked(one: Results) -> list[str]:
     """Objectives of the case of a design that have no line anyway: "first", "second"."""
     return [name for name in goals_of(one) if usual_of(one, name) is Usual.OTHER]

@@ -17,7 +17,7 @@ def _lines(of: Recommended) -> Iterator[Line]:
     own = of.of_best("chaos")
     if own is None:
         return
-    moved = (of.files["chaos"]["chaotic"] > SOME).to_numpy()
+    moved = of.files["chaos"]["chaotic"].to_numpy() > SOME
     text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
     if not float(own["chaotic"]) > SOME:
         text += "; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"

@@ -1,12 +1,13 @@
 """A simulated response against measured series: aligned in phase, with error norms for each quantity."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base import markup
 from hpcclear.base.arrays import Array
@@ -14,8 +15,13 @@ from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.units import fits
 from hpcclear.report import bearings
 from hpcclear.report.figures import motion
+from hpcclear.results.content import Results
+from hpcclear.results.signals import Signal, signals_in
 from hpcclear.scene.headings import Column
 from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Alignment = Literal["auto", "angle", "correlation", "none"]
 
@@ -34,6 +40,8 @@ class Quantity:
 
     name: str
     """As headings of exported tables have it, without the unit."""
+    label: str
+    """Its words."""
     unit: str
     shown: str
     """The unit of the measured column."""
@@ -95,7 +103,7 @@ class Comparison:
 
 
 def compare(
-    response: xr.Dataset,
+    response: xr.Dataset | Results,
     path: str | Path,
     align: Alignment = "auto",
     names: Mapping[str, str] | None = None,
@@ -120,7 +128,7 @@ def compare(
     InputError
         The table cannot be read, names what the response has not, or has units of another kind.
     """
-    sheet = read_series(Path(path))
+    response, sheet = Results.of(response), read_series(Path(path))
     axis, along = _axis(sheet)
     given = sheet.si(along, AXES[axis], "heading")
     inside = bearings.averaged(response)
@@ -131,12 +139,9 @@ def compare(
     turns = max(round(float(np.ptp(motion.turns(shown)))), 1)
     place, to_place = _places(shown, axis)
     _check_names(names or {}, sheet.signals)
-    pairs = [(column, *_series(shown, column, names or {})) for column in sheet.signals]
-    measured = [
-        sheet.si(column, str(one.attrs.get("units", "1")).removesuffix("1"), "heading")
-        for column, _, one in pairs
-    ]
-    simulated = [_periodic(place, one.to_numpy()) for _, _, one in pairs]
+    pairs = [(column, _signal(shown, column, names or {})) for column in sheet.signals]
+    measured = [sheet.si(column, one.unit.removesuffix("1"), "heading") for column, one in pairs]
+    simulated = [(_counted if one.counted else _periodic)(place, one.values) for _, one in pairs]
     how = ("angle" if axis == "angle" else "correlation") if align == "auto" else align
     if how == "angle" and axis != "angle":
         remedy = 'Give a column "crank_angle [deg]" first, or align by correlation'
@@ -149,15 +154,16 @@ def compare(
     every = _every(place, at)
     quantities = tuple(
         Quantity(
-            name,
-            str(one.attrs.get("units", "1")),
+            one.name,
+            one.label,
+            one.unit,
             column.unit,
             own,
             curve(at),
             curve(every),
             np.array([np.sqrt(np.mean((curve(at + one) - own) ** 2)) for one in others]),
         )
-        for (column, name, one), own, curve in zip(pairs, measured, simulated, strict=True)
+        for (column, one), own, curve in zip(pairs, measured, simulated, strict=True)
     )
     series_x = _measured_axis(shown, axis, given, at, every)
     return Comparison(
@@ -202,7 +208,7 @@ def _every(place: Array, at: Array) -> Array:
     return every[(every >= at.min() - rounding) & (every <= at.max() + rounding)]
 
 
-def _measured_axis(response: xr.Dataset, axis: str, given: Array, at: Array, every: Array) -> Array:
+def _measured_axis(response: Results, axis: str, given: Array, at: Array, every: Array) -> Array:
     """What the measured axis shows at places of the simulation; angles within a turn where it has them so."""
     sense = motion.crank_angle(response)[1] if axis == "angle" else 1
     x: Array = given[0] + sense * (every - at[0])
@@ -230,7 +236,7 @@ def _axis(sheet: Sheet) -> tuple[str, Column]:
     )  # fmt: skip
 
 
-def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], Array]]:
+def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Array]]:
     """Places (t,) of the instants along the axis, which rise, and what gives those of measured values."""
     if axis == "time":
         time = response["time"].to_numpy()
@@ -240,18 +246,14 @@ def _places(response: xr.Dataset, axis: str) -> tuple[Array, Callable[[Array], A
     return angle - angle[0], lambda given: np.unwrap(sense * (given - first))
 
 
-def _series(
-    response: xr.Dataset, column: Column, names: Mapping[str, str]
-) -> tuple[str, xr.DataArray]:
-    """Name and series (t,) of the quantity that a column measures."""
+def _signal(response: Results, column: Column, names: Mapping[str, str]) -> Signal:
+    """The signal that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
-    found = motion.series(response)
+    found = signals_in(response)
     match = {plain_name(name): name for name in found}.get(plain_name(wanted))
     if match is None:
         alike = [name for name in found if name.startswith(f"{wanted} ")]
-        fitting = [
-            name for name in found if column.unit and fits(column.unit, found[name].attrs["units"])
-        ]
+        fitting = [name for name in found if column.unit and fits(column.unit, found[name].unit)]
         remedy = (
             f"Use one of: {', '.join(alike)}" if alike else nearest(wanted, fitting or list(found))
         )
@@ -259,7 +261,17 @@ def _series(
         raise InputError(
             "heading", column.heading, f"the response has no quantity {wanted!r}", remedy
         )
-    return match, found[match]
+    return found[match]
+
+
+def _counted(place: Array, values: Array) -> Callable[[Array], Array]:
+    """Events (t,) between the place before and each place, continued with the period of them all."""
+    span, passed = float(place[-1]), np.cumsum(values)
+
+    def since(at: Array) -> Array:
+        return passed[-1] * np.floor(at / span) + np.interp(np.mod(at, span), place, passed)
+
+    return lambda at: np.diff(since(at), prepend=since(at[:1]))
 
 
 def _periodic(place: Array, values: Array) -> Callable[[Array], Array]:

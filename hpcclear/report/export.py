@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
@@ -19,6 +18,7 @@ from hpcclear.base.units import factor
 from hpcclear.report import spread
 from hpcclear.report.tables import Units, identifier, to_table
 from hpcclear.results import dataset, files
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -65,7 +65,7 @@ def export(path: str | Path, output: str | Path, units: Sequence[str] = ()) -> "
     return table
 
 
-def read_samples(paths: Sequence[str | Path]) -> dict[str, xr.Dataset]:
+def read_samples(paths: Sequence[str | Path]) -> dict[str, Results]:
     """Return the samples of several result files, by the names of these; those of run times are passed over.
 
     Raises
@@ -73,7 +73,7 @@ def read_samples(paths: Sequence[str | Path]) -> dict[str, xr.Dataset]:
     InputError
         A file cannot be read or holds no samples.
     """
-    found: dict[str, xr.Dataset] = {}
+    found: dict[str, Results] = {}
     for path in map(Path, paths):
         if path.name.endswith(".timing.nc"):
             continue
@@ -88,7 +88,7 @@ def read_samples(paths: Sequence[str | Path]) -> dict[str, xr.Dataset]:
 
 
 def statistics(
-    every: Mapping[str, xr.Dataset],
+    every: Mapping[str, Results],
     output: str | Path,
     lines: spread.Lines,
     units: Sequence[str] = (),

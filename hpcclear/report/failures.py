@@ -4,13 +4,13 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.outcome import Status
 from hpcclear.report.figures import labels
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 CLEAR = 0.3
 """Largest distance of two distributions (Kolmogorov's) below which a variable is not named at all."""
@@ -30,7 +30,7 @@ class Column(NamedTuple):
     values: Array
 
 
-def explained(samples: xr.Dataset) -> list[str]:
+def explained(samples: Results) -> list[str]:
     """Return a sentence for each status of failed samples: how many, why, in which ranges of which variables, what to do.
 
     Parameters
@@ -41,7 +41,7 @@ def explained(samples: xr.Dataset) -> list[str]:
     return list(sentences(samples["status"].to_numpy(), variables(samples)))
 
 
-def variables(samples: xr.Dataset) -> list[Column]:
+def variables(samples: Results) -> list[Column]:
     """Return the design variables of samples (kind ``samples``)."""
     return [
         Column(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())

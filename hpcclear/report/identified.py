@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report.figures import labels
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 NARROWED = 0.8
 """Share of the bounds' range above which an interval says next to nothing."""
@@ -28,7 +28,7 @@ def rounded(value: float, unit: str, digits: int = 2) -> str:
     return f"{text} {scale.unit}" if scale.unit != "–" else text
 
 
-def lines(content: xr.Dataset) -> list[Line]:
+def lines(content: Results) -> list[Line]:
     """Return what was identified: unknowns by record, fit, growth, and what to measure."""
     found = _records(content) if "interval" in content else []
     return [*found, *_growth(content), *_advice(content)]
@@ -39,7 +39,7 @@ def _short(name: object) -> str:
     return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
 
 
-def _records(content: xr.Dataset) -> list[Line]:
+def _records(content: Results) -> list[Line]:
     found = []
     for k, record in enumerate(content["record"].to_numpy()):
         before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
@@ -51,7 +51,7 @@ def _records(content: xr.Dataset) -> list[Line]:
     return found
 
 
-def _calibration(content: xr.Dataset, record: int) -> str:
+def _calibration(content: Results, record: int) -> str:
     share, factor = (
         np.broadcast_to(content[name].to_numpy(), content["interval"].shape[:2])[
             record
@@ -63,7 +63,7 @@ def _calibration(content: xr.Dataset, record: int) -> str:
     return f"{shown} of simulated machines lie in their 95 % interval; intervals widened by the factor {wider}"
 
 
-def _together(content: xr.Dataset, record: int) -> str:
+def _together(content: Results, record: int) -> str:
     """Say whether unknowns are identified separately; where they are not, the combination that is."""
     related = float(content["correlation"][record])
     if abs(related) <= TOGETHER:
@@ -85,7 +85,7 @@ def _together(content: xr.Dataset, record: int) -> str:
     return f"{text}, only {terms.removeprefix('+ ')} = {middle} (95 % interval {low} to {high})"
 
 
-def interval(content: xr.Dataset, record: int, unknown: int) -> str:
+def interval(content: Results, record: int, unknown: int) -> str:
     """Return the median and interval of an unknown, no more digits than the interval allows; a bound where it is cut off."""
     unit = str(content["unit"].to_numpy()[unknown])
     if not int(content["explained"][record]):
@@ -104,10 +104,10 @@ def interval(content: xr.Dataset, record: int, unknown: int) -> str:
     return f"{rounded(middle, unit, digits)} (95 % interval {ends})"
 
 
-def _growth(content: xr.Dataset) -> list[Line]:
+def _growth(content: Results) -> list[Line]:
     if "rate" not in content:
         return []
-    found, used = [], int(content["explained"].sum())
+    found, used = [], int(content["explained"].to_numpy().sum())
     every = content.sizes["record"]
     of = f", from the {used} of {every} records that the model explains" if used < every else ""
     for u, name in enumerate(content["unknown"].to_numpy()):
@@ -128,7 +128,7 @@ def _days(seconds: float) -> str:
     return f"{rounded(seconds / DAY, '1')} days" if np.isfinite(seconds) else "never"
 
 
-def _advice(content: xr.Dataset) -> list[Line]:
+def _advice(content: Results) -> list[Line]:
     if "expected_half_width" not in content:
         return []
     found = []
@@ -150,7 +150,7 @@ def _advice(content: xr.Dataset) -> list[Line]:
     return found
 
 
-def warnings(content: xr.Dataset) -> list[str]:
+def warnings(content: Results) -> list[str]:
     """Return what makes a result doubtful."""
     found = []
     for k, record in enumerate(content["record"].to_numpy() if "record" in content else ()):

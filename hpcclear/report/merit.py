@@ -1,29 +1,29 @@
 """Which design of a study is recommended: what designs of its case are compared by, and the verdicts on their constraints."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS, Usual
 from hpcclear.base.verdict import Verdict, best
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
+from hpcclear.results.content import Results
 
 SPAN = 2.0
 """Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
 
 
-def recommended(verified: xr.Dataset) -> str:
+def recommended(verified: Results) -> str:
     """Return the name of the recommended design; "" if no design was verified."""
     known = bool(np.isfinite(verified["mean_true"]).any())
     return str(best_of(ours_of(verified))["design"].item()) if known else ""
 
 
-def goals_of(one: xr.Dataset) -> list[str]:
+def goals_of(one: Results) -> list[str]:
     """Objectives of the case of a design, where the file has them: "first", "second", and further ones."""
     return [name for name in ORDINALS if f"{name}_goal" in one and str(one[f"{name}_goal"].item())]
 
 
-def leading_goals(verified: xr.Dataset) -> list[str]:
+def leading_goals(verified: Results) -> list[str]:
     """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
     if not any(counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
         return []
@@ -31,12 +31,12 @@ def leading_goals(verified: xr.Dataset) -> list[str]:
     return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
 
 
-def usual_of(one: xr.Dataset, name: str) -> Usual:
+def usual_of(one: Results, name: str) -> Usual:
     """Which of the statistics that are reported of every design an objective of a design's case is."""
     return Usual(int(one[f"{name}_usual"])) if f"{name}_usual" in one else Usual.OTHER
 
 
-def is_plain(one: xr.Dataset) -> bool:
+def is_plain(one: Results) -> bool:
     """Return whether the objectives of its case are mean and standard deviation, without constraints."""
     if "first_goal" not in one:
         return True
@@ -44,7 +44,7 @@ def is_plain(one: xr.Dataset) -> bool:
     return asked == [Usual.MEAN, Usual.DEVIATION] and verdict_of(one) is None
 
 
-def ours_of(verified: xr.Dataset) -> xr.Dataset:
+def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
     rows = [k for k in range(verified.sizes["design"]) if counts(verified.isel(design=k))]
     if "case" in verified:
@@ -54,17 +54,17 @@ def ours_of(verified: xr.Dataset) -> xr.Dataset:
     return verified.isel(design=rows)
 
 
-def _random_inputs(verified: xr.Dataset, k: int) -> int:
+def _random_inputs(verified: Results, k: int) -> int:
     return len(str(verified["random"].to_numpy()[k]).split()) if "random" in verified else 0
 
 
-def counts(one: xr.Dataset) -> bool:
+def counts(one: Results) -> bool:
     """Return whether a design was simulated and is no design of a publication."""
     finite = np.isfinite(float(one["mean_true"])) and np.isfinite(float(one["deviation_true"]))
     return finite and not labels.is_printed(one)
 
 
-def baseline_of(ours: xr.Dataset) -> xr.Dataset | None:
+def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
     for k, name in enumerate(ours["design"].to_numpy()):
         if str(name).rpartition(" ")[2] == "original":
@@ -72,15 +72,15 @@ def baseline_of(ours: xr.Dataset) -> xr.Dataset | None:
     return None
 
 
-def best_of(ours: xr.Dataset) -> xr.Dataset:
+def best_of(ours: Results) -> Results:
     """The recommended design, of `ours_of`."""
     return ours.isel(design=int(judged(ours).argmin()))
 
 
-def judged(ours: xr.Dataset) -> np.ndarray:
+def judged(ours: Results) -> np.ndarray:
     """Merit of the designs of a case, (designs,): infinite for those that satisfy its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
-        return (ours["mean_true"] + SPAN * ours["deviation_true"]).to_numpy()
+        return ours["mean_true"].to_numpy() + SPAN * ours["deviation_true"].to_numpy()
     each = [verdict_of(ours.isel(design=k)) for k in range(ours.sizes["design"])]
     found, level = best([Verdict.HOLDS if one is None else one for one in each])
     merit = ours["first_true"].to_numpy()
@@ -93,7 +93,7 @@ def judged(ours: xr.Dataset) -> np.ndarray:
     return np.where(level, merit, np.inf)
 
 
-def merit(ours: xr.Dataset, best: xr.Dataset) -> str:
+def merit(ours: Results, best: Results) -> str:
     """What `judged` goes by, in words."""
     if is_plain(best):
         return f"lowest mean + {SPAN:g} standard deviations of f"

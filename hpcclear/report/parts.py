@@ -11,16 +11,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-import xarray as xr
-
 from hpcclear.report.html.content import Content
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Files = Mapping[str, xr.Dataset]
+Files = Mapping[str, Results]
 """Result files by their kinds."""
 
 
@@ -56,7 +55,7 @@ class FigureOf(NamedTuple):
         """Its caption for these files."""
         return self.caption if isinstance(self.caption, str) else self.caption(*self._taken(files))
 
-    def _taken(self, files: Files) -> list[xr.Dataset | None]:
+    def _taken(self, files: Files) -> list[Results | None]:
         return [files[self.kind], *([files.get(self.beside)] if self.beside else [])]
 
 
@@ -90,12 +89,12 @@ class Recommended(NamedTuple):
     """A verified study, to be put in words."""
 
     files: Files
-    ours: xr.Dataset
+    ours: Results
     """Designs of the case that the answer is about, of kind ``verification``."""
-    best: xr.Dataset
+    best: Results
     """The recommended one of them."""
 
-    def of_best(self, kind: str) -> xr.Dataset | None:
+    def of_best(self, kind: str) -> Results | None:
         """What a file with a row for each design says of the recommended one; None where it says nothing."""
         found, name = self.files.get(kind), str(self.best["design"].item())
         known = found is not None and name in found["design"].to_numpy()

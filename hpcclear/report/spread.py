@@ -8,7 +8,6 @@ from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, nearest
@@ -18,6 +17,7 @@ from hpcclear.base.student import student
 from hpcclear.base.units import UnitError, to_si
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.statistics.random.survival import CONFIDENCE, fewest, order_interval, share_interval
@@ -133,7 +133,7 @@ def units_of(objective: Objective) -> dict[str, str]:
     return {name: row.units for name, row in rows.items() if row.dtype == "f8"}
 
 
-def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[Line]:
+def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line]:
     """Return mean, standard deviation and quantiles of f, the 95th percentile of each peak force, and shares beyond thresholds.
 
     Parameters
@@ -175,7 +175,7 @@ def statistics(samples: xr.Dataset, thresholds: Sequence[Beyond] = ()) -> list[L
 
 
 def side_by_side(
-    every: Mapping[str, xr.Dataset], thresholds: Sequence[str] = ()
+    every: Mapping[str, Results], thresholds: Sequence[str] = ()
 ) -> dict[str, dict[str, Line]]:
     """Return the lines of `statistics` of several samples: by the name of each, then by label.
 
@@ -201,7 +201,7 @@ def rows_of(found: Lines) -> list[list[str]]:
     ]
 
 
-def remarks(samples: xr.Dataset) -> list[str]:
+def remarks(samples: Results) -> list[str]:
     """Return what the warnings of `simulate` say of these samples, each with the number of samples that it is about."""
     good = samples["status"].to_numpy() == Status.OK
     found = []
@@ -216,7 +216,7 @@ def remarks(samples: xr.Dataset) -> list[str]:
     return [f"{count} of {len(f)} samples: {text}" for count, text in found]
 
 
-def _length_of_peaks(samples: xr.Dataset) -> list[Line]:
+def _length_of_peaks(samples: Results) -> list[Line]:
     """Of how many revolutions each peak is the largest, since it grows with their number."""
     try:
         numerics = scene_of_text(str(samples.attrs.get("scene", "")), "scene").numerics
@@ -228,7 +228,7 @@ def _length_of_peaks(samples: xr.Dataset) -> list[Line]:
     return [Line("peaks", f"largest of {count} revolution{'' if count == 1 else 's'}")]
 
 
-def _values(samples: xr.Dataset, name: str) -> Array:
+def _values(samples: Results, name: str) -> Array:
     """A result of each sample, shape (n,); at joints the largest."""
     values = samples[name].to_numpy()
     return values.max(axis=1) if values.ndim > 1 else values
@@ -268,7 +268,7 @@ def _quantile(values: Array, level: float, unit: str, drawn: bool) -> tuple[str,
     return f"not stated: it needs {fewest(level)} samples", Estimate()
 
 
-def _share(samples: xr.Dataset, one: Beyond, drawn: bool) -> Line:
+def _share(samples: Results, one: Beyond, drawn: bool) -> Line:
     """Share of samples beyond a threshold, with Clopper and Pearson's confidence interval."""
     if one.name not in samples:
         return Line(one.name, "not recorded in these samples")

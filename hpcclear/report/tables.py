@@ -3,6 +3,8 @@
 This is what leaves the program for spreadsheets, MATLAB and pandas; `hpcclear.report.export` writes it.
 """
 
+from __future__ import annotations
+
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -10,16 +12,17 @@ from itertools import islice, product
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import factor, fits, is_unit
 from hpcclear.report.figures import labels
+from hpcclear.results.content import Results, Variable
 from hpcclear.results.names import KINDS
 from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
 
 if TYPE_CHECKING:
+    import xarray as xr
     from pandas import DataFrame
 
 MOST_UNITS = 64
@@ -31,7 +34,7 @@ SI = "SI"
 """Word for the units of the result file, in place of those of the scene."""
 
 
-def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
+def to_table(content: xr.Dataset | Results, units: Sequence[str] = ()) -> DataFrame:
     """Return a result as a table.
 
     Parameters
@@ -58,6 +61,7 @@ def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
     """
     import pandas as pd  # comes with xarray
 
+    content = Results.of(content)
     kind = str(content.attrs.get("hpcclear_kind"))
     if kind not in KINDS:
         reason = "the dataset is no result of hpcclear"
@@ -83,7 +87,7 @@ def to_table(content: xr.Dataset, units: Sequence[str] = ()) -> "DataFrame":
 class _Table:
     """A table in the making."""
 
-    def __init__(self, content: xr.Dataset, rows: tuple[str, ...], units: "Units") -> None:
+    def __init__(self, content: Results, rows: tuple[str, ...], units: Units) -> None:
         self.content, self.rows, self._units = content, rows, units
         self.shape = tuple(content.sizes[dim] for dim in rows)
         self.columns: dict[str, np.ndarray] = {}
@@ -96,20 +100,20 @@ class _Table:
     def add(self, name: str) -> None:
         """Add a variable: as columns, as single values, or to what is left out."""
         variable = self.content[name]
-        if (name in self.content.dims and name not in self.rows) or "rival" in variable.dims:
+        if (name in self.content.sizes and name not in self.rows) or "rival" in variable.dims:
             return  # labels of columns; rows against rows, which a text has as well
         variable, dims = _lower_edges(variable, self.content, self.rows)
         across = [dim for dim in dims if dim not in self.rows]
         alone = not set(dims) & set(self.rows)
-        count = int(np.prod([variable.sizes[dim] for dim in across], initial=1))
+        sizes = [variable.shape[dims.index(dim)] for dim in across]
+        count = int(np.prod(sizes, initial=1))
         if count > MOST_COLUMNS or (alone and not set(across) <= {"joint"}):
             self.left_out.append(name)
             return
         values, unit = self._units.shown(variable)
-        ordered = variable.copy(data=values).transpose(
-            *[d for d in self.rows if d in dims], *across
-        )
-        for place in product(*(range(variable.sizes[dim]) for dim in across)):
+        order = [*(d for d in self.rows if d in dims), *across]
+        ordered = Variable(tuple(order), values.transpose([dims.index(dim) for dim in order]))
+        for place in product(*map(range, sizes)):
             label = " ".join(_label(self.content, d, k) for d, k in zip(across, place, strict=True))
             heading = " ".join(part for part in (name, label, unit and f"[{unit}]") if part)
             one = ordered.isel(dict(zip(across, place, strict=True)))
@@ -123,26 +127,29 @@ class _Table:
                 self.columns[heading] = self._filled(one)
                 self.keys |= {heading} if name in self.rows else set()
 
-    def _filled(self, one: xr.DataArray) -> np.ndarray:
+    def _filled(self, one: Variable) -> np.ndarray:
         """Values of every row, repeated along dimensions that the variable lacks."""
         sizes = [self.content.sizes[d] if d in one.dims else 1 for d in self.rows]
         return np.broadcast_to(one.to_numpy().reshape(sizes), self.shape).ravel()
 
 
 def _lower_edges(
-    variable: xr.DataArray, content: xr.Dataset, rows: tuple[str, ...]
-) -> tuple[xr.DataArray, tuple[str, ...]]:
+    variable: Variable, content: Results, rows: tuple[str, ...]
+) -> tuple[Variable, tuple[str, ...]]:
     """A variable and its dimensions; edges between bins as the lower edge of each bin, -inf of the first."""
     if "edge" in variable.dims and rows == ("bin",):
-        whole = variable.pad(edge=(1, 0), constant_values=-np.inf).rename(edge="bin")
-        if whole.sizes["bin"] == content.sizes["bin"]:
-            variable = whole.drop_vars("bin", errors="ignore")
-    return variable, tuple(map(str, variable.dims))
+        edges = variable.dims.index("edge")
+        before = [(1 if k == edges else 0, 0) for k in range(len(variable.dims))]
+        whole = np.pad(variable.values, before, constant_values=-np.inf)
+        if whole.shape[edges] == content.sizes["bin"]:
+            dims = tuple("bin" if dim == "edge" else dim for dim in variable.dims)
+            variable = Variable(dims, whole, variable.attrs, variable.name)
+    return variable, variable.dims
 
 
-def _label(content: xr.Dataset, dim: str, place: int) -> str:
+def _label(content: Results, dim: str, place: int) -> str:
     """What a place along a dimension is called in a heading."""
-    if dim not in content.coords:
+    if dim not in content:
         return str(place)
     value = content[dim].to_numpy()[place]
     return f"{value:g}" if isinstance(value, np.floating) else str(value)
@@ -151,7 +158,7 @@ def _label(content: xr.Dataset, dim: str, place: int) -> str:
 class Units:
     """Units in which quantities are shown."""
 
-    def __init__(self, content: xr.Dataset, asked: Sequence[str]) -> None:
+    def __init__(self, content: Results, asked: Sequence[str]) -> None:
         self._si = list(asked) == [SI]
         self._asked = [] if self._si else list(asked)
         strings = {} if self._si else _strings(str(content.attrs.get("scene", "")))
@@ -165,7 +172,7 @@ class Units:
                 reason = "it fits no quantity of this result"
                 raise InputError("--unit", unit, reason, f"Units of its quantities: {listed}")
 
-    def shown(self, variable: xr.DataArray) -> tuple[np.ndarray, str]:
+    def shown(self, variable: Variable) -> tuple[np.ndarray, str]:
         """Values and their unit; codes as words, without one."""
         values, unit = variable.to_numpy(), str(variable.attrs.get("units", ""))
         if "flag_meanings" in variable.attrs:
@@ -183,7 +190,7 @@ class Units:
         """The unit that shows quantities of a unit of SI, before which come those of a variable's own entry; "" for SI."""
         return next((u for u in (*self._asked, *own, *self._usual) if fits(u, unit)), "")
 
-    def _own(self, variable: xr.DataArray) -> list[str]:
+    def _own(self, variable: Variable) -> list[str]:
         """Units of the scene's own entry of a design variable."""
         path = str(variable.attrs.get("scene_path", ""))
         places = (path, f"study.variables.{path}.")
@@ -206,7 +213,7 @@ def _strings(text: str) -> dict[str, str]:
     return {path: match[1] for path, match in matches.items() if match is not None}
 
 
-def _words(variable: xr.DataArray) -> np.ndarray:
+def _words(variable: Variable) -> np.ndarray:
     """Codes (any shape) as the words of their meanings; several flags of one value are joined by a plus sign."""
     meanings = str(variable.attrs["flag_meanings"]).split()
     codes = variable.to_numpy()

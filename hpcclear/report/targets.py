@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 
@@ -33,7 +33,7 @@ class Way(NamedTuple):
     """The settings."""
 
 
-def ways(found: xr.Dataset) -> list[Way]:
+def ways(found: Results) -> list[Way]:
     """Return every measured pair of tolerance and revolutions whose bias is known well enough, the cheapest first.
 
     Parameters
@@ -51,7 +51,7 @@ def ways(found: xr.Dataset) -> list[Way]:
     return sorted(way for way in made if np.isfinite(way[:2]).all() and way.error > 0.0)
 
 
-def front(found: xr.Dataset) -> list[Way]:
+def front(found: Results) -> list[Way]:
     """Return the ways than which none that is cheaper has a smaller error."""
     kept: list[Way] = []
     for way in ways(found):
@@ -60,12 +60,12 @@ def front(found: xr.Dataset) -> list[Way]:
     return kept
 
 
-def cheapest(found: xr.Dataset, target: float) -> Way | None:
+def cheapest(found: Results, target: float) -> Way | None:
     """Return the cheapest way to a relative error; None if none that was measured reaches it."""
     return next((way for way in front(found) if way.error <= target), None)
 
 
-def sentences(found: xr.Dataset) -> list[str]:
+def sentences(found: Results) -> list[str]:
     """Return a sentence for each of `TARGETS`, and one for the scene's own settings."""
     words = []
     for target in TARGETS:
@@ -84,7 +84,7 @@ def sentences(found: xr.Dataset) -> list[str]:
     return words
 
 
-def caption(found: xr.Dataset) -> str:
+def caption(found: Results) -> str:
     """Return what the line and the marks of the figure of total errors are, of the panels that are there."""
     if "averaging_error" not in found:
         return (
@@ -104,7 +104,7 @@ def seconds(value: float) -> str:
     return f"{value:.2g} s" if value >= 0.1 else f"{1e3 * value:.2g} ms"
 
 
-def settings(found: xr.Dataset) -> Way | None:
+def settings(found: Results) -> Way | None:
     """Return what the scene's own settings cost and reach.
 
     None if the file does not have them as numbers, the panel of averaging is not there, or their tolerance is not between
@@ -127,7 +127,7 @@ def settings(found: xr.Dataset) -> Way | None:
     return _own(found, scene)
 
 
-def _own(found: xr.Dataset, scene: Scene) -> Way | None:
+def _own(found: Results, scene: Scene) -> Way | None:
     """A single run at the tolerance and over the revolutions of a scene.
 
     Its error is that of the next looser tolerance, shorter transient and shorter average that were measured: no more is known,
@@ -153,13 +153,13 @@ def _own(found: xr.Dataset, scene: Scene) -> Way | None:
     return Way(float(price) * (waited + averaged), error, words)
 
 
-def _averaging(found: xr.Dataset) -> Array:
+def _averaging(found: Results) -> Array:
     """Errors of averages by transient and revolutions: at least those of every longer run, as less would be luck."""
-    error = found["averaging_error"].transpose("transient", "averaged").to_numpy()[::-1, ::-1]
+    error = found["averaging_error"].to_numpy()[::-1, ::-1]
     return np.asarray(np.maximum.accumulate(np.maximum.accumulate(error, 0), 1)[::-1, ::-1])
 
 
-def _largest_bias(found: xr.Dataset) -> Array:
+def _largest_bias(found: Results) -> Array:
     """Largest bias of each tolerance by two standard errors; a value below that of a tighter one would be luck."""
     bias = (
         np.abs(found["tolerance_bias"].to_numpy()) + 2.0 * found["tolerance_bias_error"].to_numpy()
@@ -171,7 +171,7 @@ def _largest_bias(found: xr.Dataset) -> Array:
     return largest
 
 
-def _ways_of(found: xr.Dataset, k: int, bias: float) -> Iterator[Way]:
+def _ways_of(found: Results, k: int, bias: float) -> Iterator[Way]:
     """Ways at one tolerance: means over replicas, and single runs."""
     rtol, price = _short(float(found["tolerance"][k])), float(found["tolerance_seconds"][k])
     wait, variance = REPLICAS * float(found["spin_up"]), float(found["turn_variance"][k])

@@ -21,7 +21,7 @@ from hpcclear.base.errors import InputError, refused
 from hpcclear.base.outcome import JOINTS, OUTCOME, recast
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.results import dataset, files, netcdf
-from hpcclear.results.content import Content, Results, Variable
+from hpcclear.results.content import Results, Variable
 from hpcclear.results.keys import check_key, key_attribute
 from hpcclear.results.names import designs_in
 
@@ -79,7 +79,7 @@ class Checkpoint:
     """Finished samples and stages of one run, in a directory of their own.
 
     Opening it makes the directory, removes rubbish that a kill left, and reads what is there. One
-    process uses it at a time: hold a `hpcclear.results.lock.Lock`.
+    process uses it at a time: hold a `hpcclear.base.lock.Lock`.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ class Checkpoint:
         """
         with self._watch.running():
             variables = {key: _stage_variable(key, values) for key, values in data.items()}
-            content = Content(variables, {**self.attributes, "stage": name})
+            content = Results(variables, {**self.attributes, "stage": name})
             netcdf.save(content, self._stage_path(name))
 
     def load_stage(self, name: str) -> dict[str, np.ndarray] | None:
@@ -298,7 +298,7 @@ class Checkpoint:
     def finish(self) -> None:
         """Remove all that was written here; call it when the final files are in place."""
         with self._watch.running():
-            netcdf.save(Content({}, self.attributes), self.directory / _DONE)
+            netcdf.save(Results({}, self.attributes), self.directory / _DONE)
             discard(self.directory)
             self._parts.clear()
             self._buffer.clear()
@@ -307,8 +307,6 @@ class Checkpoint:
         """Read the parts that are there; the number of the next one."""
         if (self.directory / _DONE).exists():
             discard(self.directory)
-        # what xarray loads late is loaded before samples wait
-        Content({"sample": Variable(("sample",), np.zeros(1))}).to_xarray()
         self.directory.mkdir(exist_ok=True)
         if self.directory.is_symlink():  # results are written where the user said, nowhere else
             reason = "it is a symbolic link"

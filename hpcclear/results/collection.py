@@ -12,7 +12,7 @@ import h5py
 
 from hpcclear.base.errors import InputError
 from hpcclear.results import netcdf
-from hpcclear.results.content import Content, Variable
+from hpcclear.results.content import Results, Variable
 
 NAME = "samples.nc"
 """What it is called, in the directory of the others."""
@@ -66,7 +66,7 @@ def write(folder: Path, names: Sequence[str]) -> None:
             pieces.setdefault(key, []).append((total, name, (samples, *ends[key])))
         total += samples
     elsewhere = {key: netcdf.Elsewhere((total, *ends[key]), rows) for key, rows in pieces.items()}
-    netcdf.save(Content(known, attributes), folder / NAME, elsewhere)
+    netcdf.save(Results(known, attributes), folder / NAME, elsewhere)
 
 
 def _variables(path: Path) -> tuple[set[str], int]:

@@ -1,18 +1,24 @@
 """What a result file holds, as plain arrays with names, dimensions and attributes.
 
-A dataset of xarray holds the same and can do far more with it. A command that writes one file, or looks whether a file is its
-own, does without: xarray and pandas take a quarter of a second to load.
+Inside the package there is nothing else. A dataset of xarray holds the same and can do far more with it: users get one from
+functions of Python (`Results.to_xarray`) or by opening a file, and give one to figures (`Results.of`). Commands do without,
+because xarray and pandas take a quarter of a second to load.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 
 import numpy as np
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Place: TypeAlias = "int | np.integer | slice | list[int] | np.ndarray"
+"""Where to look along a dimension: at one place, which takes the dimension away, or at several."""
+
+Other = TypeVar("Other")
 
 
 class Variable:
@@ -23,18 +29,64 @@ class Variable:
     dims : tuple of str
     values : ndarray
     attrs : dict
+        ``units`` and ``long_name``, as a file has them.
+    name : str
+        Of a variable of `Results`, "" of another one.
+    labels : mapping of str to ndarray
+        Coordinates of the results that it is of, by dimension.
     """
 
     def __init__(
-        self, dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, object] | None = None
+        self,
+        dims: tuple[str, ...],
+        values: np.ndarray,
+        attrs: Mapping[str, object] | None = None,
+        name: str = "",
+        labels: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         if len(dims) != values.ndim:
             raise ValueError(f"an array of shape {values.shape} has not the dimensions {dims}")
         self.dims, self.values, self.attrs = dims, values, dict[str, Any](attrs or {})
+        self.name, self.labels = name, labels or {}
 
     def to_numpy(self) -> np.ndarray:
         """Return the values, of the shape of the dimensions."""
         return self.values
+
+    def item(self) -> Any:
+        """Return the only value as a number or text of Python; raises ValueError where there are several."""
+        return self.values.item()
+
+    def isel(self, places: Mapping[str, Place] | None = None, **more: Place) -> Variable:
+        """Return what stands at places along dimensions."""
+        dims, values, labels = list(self.dims), self.values, dict(self.labels)
+        for dim, place in {**(places or {}), **more}.items():
+            values = values[(*[slice(None)] * dims.index(dim), place)]
+            if dim in labels:
+                labels[dim] = labels[dim][place]
+            if isinstance(place, int | np.integer):
+                dims.remove(dim)
+        return Variable(tuple(dims), np.asarray(values), self.attrs, self.name, labels)
+
+    def sel(self, **labels: Any) -> Variable:
+        """Return what stands at labels of coordinates, one or several of each; raises KeyError where there are none."""
+        return self.isel({dim: place_of(self.labels[dim], one) for dim, one in labels.items()})
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Sizes of the dimensions."""
+        return self.values.shape
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return self.values.size
+
+    def __getitem__(self, place: Place | tuple[Place, ...]) -> Any:
+        return self.values[place]
+
+    def __len__(self) -> int:
+        return len(self.values)
 
     def __array__(
         self, dtype: np.typing.DTypeLike | None = None, copy: bool | None = None
@@ -48,10 +100,19 @@ class Variable:
         return int(self.values)
 
 
-class Content:
+def place_of(known: np.ndarray, wanted: Any) -> Place:
+    """Return where labels stand in a coordinate (n,), one or several; raises KeyError where one does not."""
+    found = [np.flatnonzero(known == one)[:1] for one in np.atleast_1d(wanted)]
+    if not all(map(len, found)):
+        raise KeyError(wanted)
+    return np.concatenate([*found, np.zeros(0, int)]) if np.ndim(wanted) else int(found[0][0])
+
+
+class Results:
     """Variables by their names, and global attributes. A variable that is called as its dimension is a coordinate.
 
-    Raises ValueError where two variables do not agree on the size of a dimension.
+    Its methods are called as those of a dataset of xarray and do the same. Raises ValueError where two variables do not agree
+    on the size of a dimension.
 
     Attributes
     ----------
@@ -59,49 +120,86 @@ class Content:
     attrs : dict
     sizes : dict of str to int
         Of the dimensions, in the order in which the variables have them.
+    labels : dict of str to ndarray
+        Coordinates; of a dimension that a selection took away the label that was chosen.
     """
 
     def __init__(
         self,
         variables: Mapping[str, Variable],
         attrs: Mapping[str, object] | None = None,
-        sizes: Mapping[str, int] | None = None,
+        chosen: Sequence[str] = (),
     ) -> None:
-        self.variables, self.attrs = dict(variables), dict[str, Any](attrs or {})
-        self.sizes = dict(sizes or {})
+        self.attrs, self.sizes = dict[str, Any](attrs or {}), dict[str, int]()
         for name, one in variables.items():
             for dim, size in zip(one.dims, one.values.shape, strict=True):
                 if self.sizes.setdefault(dim, size) != size:
                     raise ValueError(f"{name!r} has {size} of {dim}, others {self.sizes[dim]}")
-        for name in self.sizes.keys() & self.variables.keys():
-            if self.variables[name].dims != (name,):
+        for name in self.sizes.keys() & variables.keys():
+            if variables[name].dims != (name,):
                 raise ValueError(f"{name!r} names a dimension and a data variable")
+        self.labels = {
+            name: one.values
+            for name, one in variables.items()
+            if name in self.sizes or name in chosen
+        }
+        self.variables = {
+            name: Variable(one.dims, one.values, one.attrs, name, self.labels)
+            for name, one in variables.items()
+        }
 
     @classmethod
-    def of(cls, dataset: Results) -> Content:
-        """Return what a file keeps of a dataset: its coordinates are those of dimensions."""
-        if isinstance(dataset, Content):
+    def of(cls, dataset: Results | xr.Dataset) -> Results:
+        """Return what a dataset of xarray, or these results, hold."""
+        if isinstance(dataset, Results):
             return dataset
-        kept = {
+        found = {
             str(name): Variable(tuple(map(str, one.dims)), one.to_numpy(), one.attrs)
             for name, one in dataset.variables.items()
-            if name in dataset.sizes or name not in dataset.coords
         }
-        return cls(kept, dataset.attrs, {str(dim): n for dim, n in dataset.sizes.items()})
+        return cls(found, dataset.attrs, [str(n) for n in dataset.coords if not dataset[n].dims])
 
     def to_xarray(self) -> xr.Dataset:
         """Return the same as a dataset of xarray, which shares the arrays."""
         import xarray as xr
 
         made = {name: xr.Variable(v.dims, v.values, v.attrs) for name, v in self.variables.items()}
-        return xr.Dataset(made, attrs=self.attrs)
+        return xr.Dataset(made, attrs=self.attrs).set_coords(list(self.labels))
+
+    @property
+    def data_vars(self) -> dict[str, Variable]:
+        """Variables that are no coordinates."""
+        return {name: one for name, one in self.variables.items() if name not in self.labels}
+
+    def isel(self, places: Mapping[str, Place] | None = None, **more: Place) -> Results:
+        """Return what stands at places along dimensions."""
+        wanted = {**(places or {}), **more}
+        found = {
+            name: one.isel({dim: place for dim, place in wanted.items() if dim in one.dims})
+            for name, one in self.variables.items()
+        }
+        return Results(found, self.attrs, tuple(self.labels))
+
+    def sel(self, **labels: Any) -> Results:
+        """Return what stands at labels of coordinates, one or several of each; raises KeyError where there are none."""
+        return self.isel({dim: place_of(self.labels[dim], one) for dim, one in labels.items()})
+
+    def assign_attrs(self, **attrs: object) -> Results:
+        """Return these results with further global attributes."""
+        return Results(self.variables, {**self.attrs, **attrs}, tuple(self.labels))
+
+    @overload
+    def get(self, name: str) -> Variable | None: ...
+
+    @overload
+    def get(self, name: str, default: Other) -> Variable | Other: ...
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return a variable, or the default where this name is missing."""
+        return self.variables.get(name, default)
 
     def __contains__(self, name: object) -> bool:
         return name in self.variables
 
     def __getitem__(self, name: str) -> Variable:
         return self.variables[name]
-
-
-Results: TypeAlias = "xr.Dataset | Content"
-"""What is read by names alone, be it of xarray or not."""

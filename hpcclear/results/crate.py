@@ -11,10 +11,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import xarray as xr
-
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset, files
+from hpcclear.results.content import Results
 
 NAME = "ro-crate-metadata.json"
 CRATE = "https://w3id.org/ro/crate/1.1"
@@ -38,7 +37,7 @@ def write_crate(directory: Path, notify: Callable[[str], object] = lambda text: 
         There is no result file, all are damaged, or a file of that name says something else: its user may have added to it.
     """
     read = dict(dataset.each_in(directory))
-    found = {path: one for path, one in read.items() if isinstance(one, xr.Dataset)}
+    found = {path: one for path, one in read.items() if isinstance(one, Results)}
     for path, one in read.items():
         if isinstance(one, InputError):
             notify(f"{path} is left out: {one.reason}")
@@ -52,7 +51,7 @@ def write_crate(directory: Path, notify: Callable[[str], object] = lambda text: 
     return place
 
 
-def _graph(directory: Path, found: Mapping[Path, xr.Dataset]) -> list[dict[str, Any]]:
+def _graph(directory: Path, found: Mapping[Path, Results]) -> list[dict[str, Any]]:
     described = [_file(directory, path, content) for path, content in found.items()]
     parts = [{"@id": one["@id"]} for one in described]
     # Scenes of responses are made from the study's; alone they are what was asked for.
@@ -99,13 +98,13 @@ def _graph(directory: Path, found: Mapping[Path, xr.Dataset]) -> list[dict[str, 
     return [descriptor, root, profile, program, *inputs, run, *described]
 
 
-def _stated(contents: Iterable[xr.Dataset], name: str) -> str:
+def _stated(contents: Iterable[Results], name: str) -> str:
     """What files say of themselves under a name; all of it where they differ."""
     values = dict.fromkeys(str(one.attrs[name]) for one in contents if name in one.attrs)
     return "; ".join(values) or "not stated"
 
 
-def _file(directory: Path, path: Path, content: xr.Dataset) -> dict[str, Any]:
+def _file(directory: Path, path: Path, content: Results) -> dict[str, Any]:
     data = path.read_bytes()
     return {
         "@id": path.relative_to(directory).as_posix(), "@type": "File", "name": path.name,

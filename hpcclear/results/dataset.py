@@ -1,4 +1,4 @@
-"""Result files: built from plain arrays and records, written whole, checked; read as datasets of xarray.
+"""Result files: built from plain arrays and records, written whole, and checked when they are read.
 
 The names, dimensions and units come from `hpcclear.results.names`; how bytes reach the disk is in
 `hpcclear.results.netcdf` and `hpcclear.results.files`.
@@ -6,12 +6,10 @@ The names, dimensions and units come from `hpcclear.results.names`; how bytes re
 
 from __future__ import annotations
 
-import functools
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ParamSpec
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +28,7 @@ from hpcclear.base.outcome import (
     unknown,
 )
 from hpcclear.results import netcdf
-from hpcclear.results.content import Content, Results, Variable
+from hpcclear.results.content import Results, Variable
 from hpcclear.results.faults import fault_of
 from hpcclear.results.names import (
     DESIGN_VARIABLES,
@@ -40,13 +38,7 @@ from hpcclear.results.names import (
 )
 from hpcclear.results.rows import Column, Kind
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 CONVENTIONS = "CF-1.11"
-
-P = ParamSpec("P")
-
 
 # -----------------------------------------------------------------------------------------------
 # Building
@@ -56,7 +48,7 @@ NOT_CHECKED = "not checked: no replicas were simulated"
 """Value of the attribute ``objective_half_width`` of files whose objective has none."""
 
 
-def filled(
+def dataset(
     kind: str,
     coords: Mapping[str, ArrayLike],
     data: Mapping[str, ArrayLike],
@@ -66,7 +58,7 @@ def filled(
     words: Mapping[str, str] | None = None,
     *,
     whole: bool = True,
-) -> Content:
+) -> Results:
     """The content of one kind of result file, with every attribute the table knows.
 
     Parameters
@@ -92,7 +84,7 @@ def filled(
 
     Returns
     -------
-    Content
+    Results
 
     Raises
     ------
@@ -122,20 +114,7 @@ def filled(
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
     if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
-    return Content(variables, {**fixed, **(attributes or {})})
-
-
-def _of_xarray(build: Callable[P, Content]) -> Callable[P, xr.Dataset]:
-    """Have a function return what it builds as a dataset of xarray."""
-
-    @functools.wraps(build)
-    def made(*parts: P.args, **more: P.kwargs) -> xr.Dataset:
-        return build(*parts, **more).to_xarray()
-
-    return made
-
-
-dataset = _of_xarray(filled)
+    return Results(variables, {**fixed, **(attributes or {})})
 
 
 def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> Variable:
@@ -209,7 +188,7 @@ def samples_dataset(
     words: Mapping[str, str] | None = None,
     joints: Sequence[str] = JOINTS,
     labels: Sequence[str] = (),
-) -> xr.Dataset:
+) -> Results:
     """Outcome records and the designs they belong to, by growing sample number.
 
     Parameters
@@ -235,7 +214,7 @@ def samples_dataset(
 
     Returns
     -------
-    xarray.Dataset
+    Results
         Kind ``samples``.
 
     Raises
@@ -314,7 +293,7 @@ def response_content(
     objective: Objective = MEAN_GAP,
     joints: Sequence[str] = JOINTS,
     linkage: Mapping[str, Sequence[str] | np.ndarray] | None = None,
-) -> Content:
+) -> Results:
     """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
 
     `linkage`: labels or numbers along further dimensions, of what has these.
@@ -325,7 +304,7 @@ def response_content(
         for name, words in (linkage or {}).items()
     }
     attrs = {**(attributes or {}), **_checked(data)}
-    return filled("response", coords, data, attrs, objective=objective)
+    return dataset("response", coords, data, attrs, objective=objective)
 
 
 def timing_dataset(
@@ -333,7 +312,7 @@ def timing_dataset(
     data: Mapping[str, ArrayLike],
     command: str,
     attributes: Mapping[str, object] | None = None,
-) -> xr.Dataset:
+) -> Results:
     """Where the time went: arrays of shape (ranks, stages) in seconds; kind ``timing``."""
     coords = {"rank": np.arange(np.shape(data["busy"])[0]), "stage": np.array(stages, dtype=str)}
     return dataset("timing", coords, {**data, "command": command}, attributes)
@@ -360,7 +339,7 @@ def write(content: Results, path: str | os.PathLike[str]) -> None:
 
 def read(
     path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
-) -> xr.Dataset:
+) -> Results:
     """Read a result file into memory and check it against the table.
 
     Parameters
@@ -372,7 +351,7 @@ def read(
 
     Returns
     -------
-    xarray.Dataset
+    Results
 
     Raises
     ------
@@ -380,13 +359,6 @@ def read(
         The file is missing, cut off, changed, foreign, of another kind or scene, or says what
         cannot be.
     """
-    return content_in(path, kind, scene_hash).to_xarray()
-
-
-def content_in(
-    path: str | os.PathLike[str], kind: str | None = None, scene_hash: str | None = None
-) -> Content:
-    """Read a result file as `read` does, without xarray; raises InputError as it does."""
     place = _path(path)
     content = netcdf.load(place)
     fault = fault_of(content, kind)
@@ -417,7 +389,7 @@ def files_in(directory: Path) -> list[Path]:
     return found
 
 
-def each_in(directory: Path) -> Iterator[tuple[Path, xr.Dataset | InputError]]:
+def each_in(directory: Path) -> Iterator[tuple[Path, Results | InputError]]:
     """Read `files_in` a directory, one after the other: what each holds, or why it cannot be read; errors as there."""
     for path in files_in(directory):
         try:

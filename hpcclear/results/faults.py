@@ -3,12 +3,12 @@
 import numpy as np
 
 from hpcclear.base.outcome import JUDGED, NUMBERS, Status
-from hpcclear.results.content import Content
+from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS, LIMIT, ROLE, designs_in
 from hpcclear.results.rows import Column
 
 
-def fault_of(content: Content, kind: str | None) -> str | None:
+def fault_of(content: Results, kind: str | None) -> str | None:
     """What is wrong with what was read, or None."""
     found = content.attrs.get("hpcclear_kind")
     if not isinstance(found, str) or found not in KINDS:
@@ -39,7 +39,7 @@ def fault_of(content: Content, kind: str | None) -> str | None:
     return _outcome_fault(content) if "status" in content else None
 
 
-def _outcome_fault(content: Content) -> str | None:
+def _outcome_fault(content: Results) -> str | None:
     """Outcomes that cannot be, such as a number in a failed sample."""
     status = content["status"].values
     if not np.isin(status, [int(code) for code in Status]).all():

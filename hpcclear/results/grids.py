@@ -1,9 +1,16 @@
 """Maps: files of kind ``samples`` whose samples are the cells of a grid."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
+from hpcclear.results.content import Results, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SHAPE = "map_shape"
 """Attribute of a map: cells along its entries, in the order of the design variables."""
@@ -17,22 +24,23 @@ def grid(content: xr.Dataset) -> xr.Dataset:
     InputError
         If the dataset is no map.
     """
+    return cells_of(Results.of(content)).to_xarray()
+
+
+def cells_of(content: Results) -> Results:
+    """Return what `grid` does, of results; raises InputError as it does."""
     if SHAPE not in content.attrs:
         raise InputError(
             "map", content.attrs.get("hpcclear_kind"), "is no map", "Make one with hpcclear map"
         )
     shape = tuple(int(n) for n in str(content.attrs[SHAPE]).split())
-    names = [
-        str(v.name) for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"
-    ]
-    coords: dict[str, object] = {}
+    names = [k for k, v in content.data_vars.items() if v.attrs.get("role") == "design_variable"]
+    found = {}
+    for name, one in content.data_vars.items():
+        if name not in names:
+            folded = one.values.reshape(*shape, *one.shape[1:])
+            found[name] = Variable((*names, *one.dims[1:]), folded, one.attrs)
     for k, name in enumerate(names):
-        values = np.moveaxis(content[name].to_numpy().reshape(shape), k, 0).reshape(shape[k], -1)
-        coords[name] = (name, values[:, 0], content[name].attrs)
-    coords["joint"] = content["joint"]
-    data = {}
-    for key, variable in content.drop_vars(names).data_vars.items():
-        rest = variable.dims[1:]
-        folded = variable.to_numpy().reshape(*shape, *variable.shape[1:])
-        data[key] = ((*names, *rest), folded, variable.attrs)
-    return xr.Dataset(data, coords, content.attrs)
+        values = np.moveaxis(content[name].values.reshape(shape), k, 0).reshape(shape[k], -1)
+        found[name] = Variable((name,), values[:, 0], content[name].attrs)
+    return Results({**found, "joint": content["joint"]}, content.attrs)

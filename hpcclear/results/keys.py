@@ -21,7 +21,7 @@ def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
 
     Parameters
     ----------
-    content : Content or xarray.Dataset
+    content : Results or xarray.Dataset
         What was read from `place`.
     key : mapping of str to str
         What makes this run what it is: scene, version, seed, ...; flattened entries of a scene
@@ -50,7 +50,7 @@ def check_key(content: Results, key: Mapping[str, str], place: Path) -> None:
 
 
 def key_of(content: Results) -> dict[str, object]:
-    """The key of the run that made a dataset; empty where it carries none, as a single response."""
+    """The key of the run that made results; empty where it carries none, as a single response."""
     try:
         found = json.loads(str(content.attrs.get(KEY, "{}")))
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""NetCDF-4 files of datasets: an image in memory, sealed, written whole.
+"""NetCDF-4 files of results: an image in memory, sealed, written whole.
 
 A file is built in memory, so the same content gives the same bytes and a full disk meets a plain
 ``write`` instead of the HDF5 library. A seal (SHA-256 of all bytes before it) is appended after
@@ -22,7 +22,7 @@ import numpy as np
 
 from hpcclear.base import host
 from hpcclear.base.errors import InputError
-from hpcclear.results.content import Content, Results, Variable
+from hpcclear.results.content import Results, Variable
 from hpcclear.results.files import Buffer, write_bytes
 
 SEAL = b"\nhpcclear seal sha256:"
@@ -96,7 +96,7 @@ def save(content: Results, path: Path, elsewhere: Mapping[str, Elsewhere] = NOTH
 
     `elsewhere`: variables whose values are in other files; what is missing of them there reads as NaN or -1.
     """
-    image = _image(Content.of(content), elsewhere)
+    image = _image(content, elsewhere)
     with image.getbuffer() as written:
         ending = seal(written)
     image.seek(0, io.SEEK_END)
@@ -105,7 +105,7 @@ def save(content: Results, path: Path, elsewhere: Mapping[str, Elsewhere] = NOTH
         write_bytes(path, written, SEAL)
 
 
-def load(path: Path) -> Content:
+def load(path: Path) -> Results:
     """Read a file of `save` into memory; `InputError` for anything else (see `read_bytes`)."""
     content = read_bytes(path)
     try:
@@ -118,7 +118,7 @@ def load(path: Path) -> Content:
 
 
 def encode(content: Results) -> bytes:
-    """Content as the bytes of a NetCDF-4 file; equal content gives equal bytes.
+    """Results as the bytes of a NetCDF-4 file; equal content gives equal bytes.
 
     Variables are numbers or text; coordinates are one-dimensional and named as their dimension.
     Floating-point data variables carry ``_FillValue = NaN``, coordinates and integers carry none.
@@ -128,10 +128,10 @@ def encode(content: Results) -> bytes:
     ValueError
         A type or a coordinate that the file cannot hold.
     """
-    return _image(Content.of(content)).getvalue()
+    return _image(content).getvalue()
 
 
-def _image(content: Content, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
+def _image(content: Results, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
     """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
     data = {name: one for name, one in content.variables.items() if name not in content.sizes}
@@ -162,7 +162,7 @@ def _encode_dimension(
     file: h5py.File,
     name: str,
     number: int,
-    content: Content,
+    content: Results,
     elsewhere: Mapping[str, Elsewhere],
 ) -> None:
     if name in content:
@@ -232,7 +232,7 @@ def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str
             target.attrs[str(name)] = np.atleast_1d(np.asarray(value))
 
 
-def decode(content: bytes) -> Content:
+def decode(content: bytes) -> Results:
     """What the bytes of `encode` hold; nothing outside these bytes is touched or evaluated.
 
     Raises
@@ -256,7 +256,7 @@ def decode(content: bytes) -> Content:
                 coordinates[name] = Variable((name,), values, attributes)
             else:
                 data[name] = Variable(_decode_dims(source), values, attributes)
-        return Content({**data, **coordinates}, _decode_attributes(file))
+        return Results({**data, **coordinates}, _decode_attributes(file))
 
 
 def _bare_dimension(source: h5py.Dataset) -> bool:

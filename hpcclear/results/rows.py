@@ -50,6 +50,11 @@ class Column(NamedTuple):
     dtype: str  # "f8", "i8", "i1" or "text"
     required: bool = False
     codes: Codes | None = None  # of a flag
+    label: str = ""  # short words, where the name is none; see `in_words`
+
+    def in_words(self, name: str) -> str:
+        """What a variable of this name is called on an axis, without its unit: "contact force"."""
+        return self.label or name.replace("_", " ")
 
     def unit(self, objective: str, rate: str = "that of the rate") -> str:
         """The unit in a study whose objective has the unit `objective`, and what is made of its rate the unit `rate`."""
@@ -124,9 +129,11 @@ def kind_of(
     )  # fmt: skip
 
 
-def number(dims: Dims, units: str, long_name: str, *, required: bool = False) -> Column:
+def number(
+    dims: Dims, units: str, long_name: str, label: str = "", *, required: bool = False
+) -> Column:
     """A number of double precision."""
-    return Column(dims, units, long_name, "f8", required)
+    return Column(dims, units, long_name, "f8", required, label=label)
 
 
 def count(dims: Dims, long_name: str, *, required: bool = False) -> Column:

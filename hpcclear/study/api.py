@@ -1,11 +1,15 @@
 """What a script or notebook calls for effect screening, in this process."""
 
-from pathlib import Path
+from __future__ import annotations
 
-import xarray as xr
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hpcclear.ensemble.functions import in_process
 from hpcclear.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def effects(

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
-from hpcclear.dynamics.response import simulate
+from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.report.figures.motion import phase
+from hpcclear.results.content import Results
 from hpcclear.results.dataset import variable_name
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
@@ -96,7 +96,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
     for name, choice in compared(run, designs):
         scene = scene_of(run, choice, run.study.verification.response_revolutions)
         with run.ranks.stage("responses"):
-            response = simulate(scene)
+            response = simulated(scene)
         status = Status(int(response["status"]))
         if status is not Status.OK:
             run.notify(
@@ -110,7 +110,7 @@ def write(run: StudyRun, designs: Sequence[Choice]) -> None:
         run.write(content, file, {**made_by, "design": name})
 
 
-def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
+def _steady(scene: Scene, response: Results) -> Results:
     """The response after its transient, all of which is averaged."""
     turns = turns_of(scene.linkage)
     begin = 2.0 * np.pi * turns * scene.numerics.transient_revolutions
@@ -118,10 +118,10 @@ def _steady(scene: Scene, response: xr.Dataset) -> xr.Dataset:
     return kept.assign_attrs(transient_turns=0)
 
 
-def _statistics(scene: Scene, response: xr.Dataset, windows: int) -> Array:
+def _statistics(scene: Scene, response: Results, windows: int) -> Array:
     """Statistics of each segment of a steady response, (windows, statistics, quantities); NaN if it failed."""
     shape = (windows, len(STATISTICS), _quantities(scene))
-    if response["status"] != Status.OK:
+    if int(response["status"]) != Status.OK:
         return np.full(shape, np.nan)
     steady = _steady(scene, response)
     widths = {"contact_force": len(scene.joint_labels), "crank_moment": 1, "slider_acceleration": 1}

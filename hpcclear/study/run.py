@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.checkpoint import Checkpoint
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.streams import generator
 from hpcclear.scene.study import Study
@@ -103,7 +103,7 @@ class StudyRun:
         return len(self.checkpoint.completed(0, count)) == count
 
     def write(
-        self, content: xr.Dataset, name: str = "", attributes: Mapping[str, str] | None = None
+        self, content: Results, name: str = "", attributes: Mapping[str, str] | None = None
     ) -> None:
         """Write a result file, called after its kind unless it has a name, with what made it; `attributes` where that differs
         from the study's."""

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
@@ -104,9 +104,7 @@ def write(run: StudyRun, result: Result) -> None:
         "clearance": result["clearance"],
         "parameter": np.array(run.study.names),
     }
-    content: xr.Dataset = dataset.dataset(
-        "sensitivity", coords, data, objective=run.scene.objective
-    )
+    content: Results = dataset.dataset("sensitivity", coords, data, objective=run.scene.objective)
     held = run.study.variable(parameter(run))
     content["clearance"].attrs.update(long_name=held.words, units=held.unit or "1")
     content.attrs["failed_simulations"] = int(result["failed"])

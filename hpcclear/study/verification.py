@@ -334,7 +334,7 @@ def write(
     if "first_goal" in content:
         each = (content.isel(design=row) for row in range(len(names)))
         texts = np.array(["; ".join(worded(one)) for one in each])
-        content["constraints"] = content["constraints"].copy(data=texts)
+        content["constraints"].values = texts
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked

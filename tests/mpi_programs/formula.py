@@ -194,21 +194,20 @@ def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     data = {**series, "crank_angle": angle, "contact_force": pair}
     data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
     scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
-    content = dataset.response_content(angle / 523.0, data | scalars, objective=scene.objective)
-    return content.to_xarray()
+    return dataset.response_content(angle / 523.0, data | scalars, objective=scene.objective)
 
 
 def respond_together(scenes: Sequence[Scene], copies: Sequence[int]):
     """Those of a batch, each by what simulates one."""
     for k, (scene, copy) in enumerate(zip(scenes, copies, strict=True)):
-        yield k, responses.simulate(scene, copy=copy, checked=False)
+        yield k, responses.simulated(scene, copy=copy, checked=False)
 
 
 def replace_dynamics(set_attribute: Callable[[object, str, object], None] = setattr) -> None:
     """Samples and responses by formula, and nothing is compiled."""
     set_attribute(simulate, "make_evaluator", make_formula)
     set_attribute(compiling, "compile_share", compile_nothing)
-    set_attribute(responses, "simulate", respond)
+    set_attribute(responses, "simulated", respond)
     set_attribute(single, "simulate_together", respond_together)
 
 

@@ -109,5 +109,5 @@ def describe(found: "Finished") -> int:
     for text in identified.warnings(content):
         out.print(remark("warning", fitting(text)))
     out.print(f"written  {found.output}")
-    explained = "explained" not in content or bool((content["explained"] == 1).all())
+    explained = "explained" not in content or bool(content["explained"].to_numpy().all())
     return Exit.DONE if explained else Exit.TARGET_MISSED

@@ -9,9 +9,9 @@ import click
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.cli.options import PATH, TRUST, Amount, command, place_of, say, show
 from hpcclear.ranks.stopping import Exit
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
     from hpcclear.report.html.content import Content
@@ -84,7 +84,7 @@ def run(
     return Exit.DONE
 
 
-def _moving(content: "Content", place: Path) -> "xr.Dataset":
+def _moving(content: "Content", place: Path) -> "Results":
     """The response that a film shows."""
     if content.response is None:
         reason = "it holds no response, so there is no motion to show"

@@ -53,9 +53,7 @@ def run(written: Written, output: Path, keep: int | None) -> int:
     place = Place.of_response(place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
         if output.exists():
-            dataset.content_in(
-                output, "response"
-            )  # an earlier response is replaced, and nothing else
+            dataset.read(output, "response")  # an earlier response is replaced, and nothing else
         began = time.perf_counter()
         response = simulated(scene)
         dataset.write(response, output)

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report import targets
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ def _legend_above(figure: "Figure", axes: "Axes") -> None:
     figure.legend(handles, names, loc="outside upper center", ncols=2)
 
 
-def _foot(figure: "Figure", found: xr.Dataset, *sentences: str) -> None:
+def _foot(figure: "Figure", found: Results, *sentences: str) -> None:
     """Where the numbers come from, below a figure."""
     versions = str(found.attrs.get("versions", ""))
     lines = [*sentences, str(found.attrs.get("processor", "")), versions]
@@ -77,7 +77,7 @@ def _small(axes: Any) -> None:
 
 
 @style.drawn
-def integration_figure(found: xr.Dataset) -> "Figure":
+def integration_figure(found: Results) -> "Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
     quantities = [str(q) for q in found["quantity"].to_numpy()]
     figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
@@ -99,7 +99,7 @@ def integration_figure(found: xr.Dataset) -> "Figure":
     return figure
 
 
-def _ladder(axes: "Axes", here: xr.Dataset, work: str) -> None:
+def _ladder(axes: "Axes", here: Results, work: str) -> None:
     """One line a method; what the reference cannot resolve is hollow."""
     factor = 1e3 if work == "seconds" else 1.0
     floor = MARGIN * float(here["reference_error"])
@@ -123,7 +123,7 @@ def _ladder(axes: "Axes", here: xr.Dataset, work: str) -> None:
 
 
 @style.drawn
-def averaging_figure(found: xr.Dataset) -> "Figure":
+def averaging_figure(found: Results) -> "Figure":
     """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
     panel, error = axes[0, 0], found["averaging_error"]
@@ -162,18 +162,18 @@ def averaging_figure(found: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def surrogate_figure(found: xr.Dataset) -> "Figure":
+def surrogate_figure(found: Results) -> "Figure":
     """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
     figure, axes = style.grid(3, 1, 145.0, sharex=True)
     size, each = found["training"].to_numpy(), float(found["sample_seconds"])
     rows = (
-        ("unexplained share\n$1 - R^2$ (–)", 1.0 - found["r2"]),
-        ("RMAE (–)", found["rmae"]),
-        ("leave-one-out error\nover std. dev. (–)", found["leave_one_out"]),
+        ("unexplained share\n$1 - R^2$ (–)", 1.0 - found["r2"].to_numpy()),
+        ("RMAE (–)", found["rmae"].to_numpy()),
+        ("leave-one-out error\nover std. dev. (–)", found["leave_one_out"].to_numpy()),
     )
     for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
         for k, surrogate in enumerate(found["surrogate"].to_numpy()):
-            y = values.sel(surrogate=surrogate).to_numpy()
+            y = values[k]
             panel.loglog(
                 size,
                 y,
@@ -197,7 +197,7 @@ def surrogate_figure(found: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def random_inputs_figure(found: xr.Dataset) -> "Figure":
+def random_inputs_figure(found: Results) -> "Figure":
     """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
     bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
@@ -242,7 +242,7 @@ def random_inputs_figure(found: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def parallel_figure(found: xr.Dataset) -> "Figure":
+def parallel_figure(found: Results) -> "Figure":
     """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
     number = found["ranks"].to_numpy()
@@ -266,13 +266,14 @@ def parallel_figure(found: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def spending_figure(found: xr.Dataset) -> "Figure":
+def spending_figure(found: Results) -> "Figure":
     """Error of a steady mean against core time, a line a tolerance; below, what each tolerance is off by."""
     figure, axes = style.grid(2, 1, 150.0, height_ratios=(2.2, 1.0))
     top, bottom = axes[:, 0]
     tolerance, seconds = found["tolerance"].to_numpy(), found["spent_seconds"].to_numpy()
-    model = np.where(found["spent_model"] > 0.0, found["spent_model"], np.nan)
-    best = float(found["cheapest_tolerance"].sel(aim=AIM, method="nearest"))
+    model = found["spent_model"].to_numpy()
+    model = np.where(model > 0.0, model, np.nan)
+    best = float(found["cheapest_tolerance"][np.abs(found["aim"].to_numpy() - AIM).argmin()])
     for k, rtol in enumerate(tolerance):
         look = k % len(style.CYCLE)
         if rtol == best:
@@ -315,7 +316,7 @@ def spending_figure(found: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def total_figure(found: xr.Dataset) -> "Figure":
+def total_figure(found: Results) -> "Figure":
     """Total error of f of one design against run time: the cheapest settings, three targets, and the scene's own settings."""
     figure, axes = style.grid(1, 1, 90.0)
     panel, best = axes[0, 0], targets.front(found)
@@ -357,7 +358,7 @@ _TARGET_MARKS, _MARK = "*Dp", 6.0
 """Marks of recommended settings, and their size in points."""
 
 
-def _recommended(panel: "Axes", found: xr.Dataset) -> tuple[list[targets.Way], list[list[float]]]:
+def _recommended(panel: "Axes", found: Results) -> tuple[list[targets.Way], list[list[float]]]:
     """Recommended settings and the targets of each; settings whose marks would cover each other are one, the more accurate."""
     kept: list[targets.Way] = []
     aims: list[list[float]] = []
@@ -376,7 +377,7 @@ def _recommended(panel: "Axes", found: xr.Dataset) -> tuple[list[targets.Way], l
     return kept, aims
 
 
-FIGURES: "dict[str, Callable[[xr.Dataset], Figure]]" = {
+FIGURES: "dict[str, Callable[[Results], Figure]]" = {
     "total": total_figure,
     "spending": spending_figure,
     "integration": integration_figure,
@@ -397,7 +398,7 @@ _CAPTIONS = {
 }
 
 
-def _total_caption(found: xr.Dataset) -> str:
+def _total_caption(found: Results) -> str:
     return f"Total error of f of one design against core time. {targets.caption(found)}"
 
 

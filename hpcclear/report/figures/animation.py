@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, moving, style
 from hpcclear.results import files
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ _DPI = 150
 
 
 def animate(
-    response: xr.Dataset, path: str | Path, seconds: float = 6.0, revolutions: int = 2
+    response: Results, path: str | Path, seconds: float = 6.0, revolutions: int = 2
 ) -> Path:
     """Write a film of the last revolutions, slowed down or sped up to a length in seconds.
 
@@ -65,7 +65,7 @@ def animate(
     return place
 
 
-def _pictures(shown: xr.Dataset, count: int) -> Iterator[Array]:
+def _pictures(shown: Results, count: int) -> Iterator[Array]:
     """Frames (height, width, 3), bytes, evenly spaced in time."""
     time = shown["time"].to_numpy()
     at = np.linspace(time[0], time[-1], count, endpoint=False)
@@ -81,7 +81,7 @@ def _pictures(shown: xr.Dataset, count: int) -> Iterator[Array]:
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _scene(shown: xr.Dataset) -> "tuple[Figure, Any]":
+def _scene(shown: Results) -> "tuple[Figure, Any]":
     """The figure without what moves, and a function that gives these artists at an instant."""
     with style.matplotlib().rc_context({**style.RC, "backend": "agg"}):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -109,7 +109,7 @@ def _scene(shown: xr.Dataset) -> "tuple[Figure, Any]":
 class _Mechanism:
     """Bodies as lines and areas through their points."""
 
-    def __init__(self, axes: "Axes", shown: xr.Dataset) -> None:
+    def __init__(self, axes: "Axes", shown: Results) -> None:
         self._bodies, self._points, _ = moving.bodies(shown)
         unit = labels.scale("m", self._points)
         self._points = self._points * unit.factor
@@ -136,7 +136,7 @@ class _Mechanism:
         return self._lines
 
 
-def _forces(axes: "Axes", shown: xr.Dataset) -> Any:
+def _forces(axes: "Axes", shown: Results) -> Any:
     """Contact forces over the revolutions, and the line that marks the instant."""
     unit, turn = labels.of(shown["contact_force"]), motion.turns(shown)
     for row, (joint, label) in enumerate(motion.joints(shown).items()):

@@ -4,18 +4,15 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
-import xarray as xr
-
 from hpcclear.report.figures import designs, response
 from hpcclear.report.parts import FigureOf, Files, declared
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def drawings(
-    files: Files, responses: Mapping[str, xr.Dataset]
-) -> "dict[str, Callable[[], Figure]]":
+def drawings(files: Files, responses: Mapping[str, Results]) -> "dict[str, Callable[[], Figure]]":
     """Return what draws each figure that results allow, by its name.
 
     Parameters
@@ -35,7 +32,7 @@ def drawings(
     return made
 
 
-def of_response(found: xr.Dataset) -> list[FigureOf]:
+def of_response(found: Results) -> list[FigureOf]:
     """Return the figures that a response allows, beside `response_figure`."""
     every = (one for one in declared(FigureOf) if one.kind == "response")
-    return [one for one in every if not one.along or one.along in found.dims]
+    return [one for one in every if not one.along or one.along in found.sizes]

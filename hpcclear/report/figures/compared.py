@@ -33,9 +33,7 @@ def overlay_figure(comparison: "Comparison") -> "Figure":
         panel.plot(x, one.measured[order] * unit.factor, ".", label="measured", **dots)
         line = np.where(begins, np.nan, one.series * unit.factor)
         panel.plot(along, line, color=style.PALETTE["blue"], label="simulated")
-        panel.set_ylabel(
-            unit.label(labels.literal(one.name.replace("_", " ").replace(" ", "\n", 1)))
-        )
+        panel.set_ylabel(unit.label(labels.literal(one.label.replace(" of ", "\nof ", 1))))
     axes[0, 0].legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.25), borderaxespad=0.0)
     name = "measured time" if comparison.axis == "time" else "measured crank angle"
     axes[-1, 0].set_xlabel(across.label(name))

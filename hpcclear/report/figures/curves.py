@@ -3,13 +3,13 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces, level, periodic
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.planar import turns_of
@@ -67,7 +67,7 @@ def tabulated(scene: Scene) -> list[Tabulated]:
 
 
 @style.drawn
-def tables_figure(found: xr.Dataset) -> "Figure":
+def tables_figure(found: Results) -> "Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
     tables = tabulated(scene_of_text(str(found.attrs["scene"]), "scene"))
     if not tables:

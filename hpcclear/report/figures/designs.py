@@ -7,18 +7,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 @style.drawn
-def front_figure(front: xr.Dataset, verification: xr.Dataset | None = None) -> "Figure":
+def front_figure(front: Results, verification: Results | None = None) -> "Figure":
     """Pareto fronts of all cases, and the designs that were simulated (the paper's Fig. 9).
 
     Axes are what each case makes small: mean and standard deviation, if it requests nothing else; of more than two things
@@ -81,7 +81,7 @@ _SIDES = ((4, 3), (4, -9), (12, 3), (12, -9), (20, 3))
 _LETTERS = (("mean", r"mean $\mu_f$"), ("deviation", r"standard deviation $\sigma_f$"))
 
 
-def _goals(one: xr.Dataset) -> list[_Goal]:
+def _goals(one: Results) -> list[_Goal]:
     """What a case makes small, from its part of the fronts."""
     asked = searched(one)
     if len(asked) < 2:
@@ -89,7 +89,7 @@ def _goals(one: xr.Dataset) -> list[_Goal]:
     return [_asked(one, name, *row) for name, row in asked.items()]
 
 
-def searched(one: xr.Dataset) -> dict[str, tuple[str, str]]:
+def searched(one: Results) -> dict[str, tuple[str, str]]:
     """Words and unit of what a case makes small, from its part of the fronts (kind ``front``), by the variable; none where that
     is mean and standard deviation."""
     names = [f"searched_{name}" for name in ORDINALS if f"searched_{name}_goal" in one]
@@ -97,12 +97,12 @@ def searched(one: xr.Dataset) -> dict[str, tuple[str, str]]:
     return {name: row for name, row in every.items() if row[0]}
 
 
-def _moment(one: xr.Dataset, name: str, words: str) -> _Goal:
+def _moment(one: Results, name: str, words: str) -> _Goal:
     unit = labels.of(one[name])
     return _Goal(unit.label(words), name, name, unit)
 
 
-def _asked(one: xr.Dataset, name: str, words: str, unit: str) -> _Goal:
+def _asked(one: Results, name: str, words: str, unit: str) -> _Goal:
     """One of them: a formula of the user has no unit."""
     scale = labels.scale(unit or "1", one[name])
     if len(words) > 2 * NARROW:
@@ -112,7 +112,7 @@ def _asked(one: xr.Dataset, name: str, words: str, unit: str) -> _Goal:
     return _Goal(label, name, name.removeprefix("searched_"), scale)
 
 
-def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
+def _runs(panel: Any, one: Results, x: _Goal, y: _Goal) -> None:
     """The solutions of every run of a case."""
     for k, run in enumerate(one["run"].to_numpy()):
         row = one.sel(run=run)
@@ -123,7 +123,7 @@ def _runs(panel: Any, one: xr.Dataset, x: _Goal, y: _Goal) -> None:
 
 def _verified(
     panel: Any,
-    verification: xr.Dataset,
+    verification: Results,
     case: str,
     x: _Goal,
     y: _Goal,
@@ -170,7 +170,7 @@ def _verified(
             panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
 
 
-def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, count: int) -> None:
+def _ends(panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, count: int) -> None:
     """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
     from matplotlib.patheffects import withStroke
 
@@ -194,7 +194,7 @@ def _ends(panel: Any, verification: xr.Dataset, case: str, x: _Goal, y: _Goal, c
                 drawn.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
 
 
-def _mark(one: xr.Dataset) -> tuple[str, str]:
+def _mark(one: Results) -> tuple[str, str]:
     """What a design is called in the legend, and its mark."""
     if labels.is_printed(one):
         return "paper (simulated)", "D"
@@ -203,7 +203,7 @@ def _mark(one: xr.Dataset) -> tuple[str, str]:
     return "optimised (simulated)", "o"
 
 
-def _bars(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
+def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
     """Distances to the confidence intervals as `errorbar` wants them, (2, 1); None if there are none."""
     if f"{name}_lower" not in one or f"{name}_upper" not in one:
         return None
@@ -212,7 +212,7 @@ def _bars(one: xr.Dataset, name: str, unit: labels.Scale) -> np.ndarray | None:
 
 
 @style.drawn
-def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2) -> "Figure":
+def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) -> "Figure":
     """Responses of optimised designs beside the baseline design's, α left and β right (the paper's Fig. 10), further ends
     behind them.
 
@@ -241,7 +241,7 @@ def comparison_figure(responses: Mapping[str, xr.Dataset], revolutions: int = 2)
         series = {k: r[name].sel(joint=joint) if joint else r[name] for k, r in shown.items()}
         unit = labels.scale(
             str(next(iter(series.values())).attrs["units"]),
-            [float(abs(s).max()) for s in series.values()],
+            [float(np.nanmax(abs(s.to_numpy()))) for s in series.values()],
         )
         for panel, members in zip(line, columns.values(), strict=True):
             for design in (d for d in order if d in members):

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.student import student
 from hpcclear.base.verdict import Verdict
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 from hpcclear.results.names import ALL_ON, SECONDS_BY_ROUND
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ CONFIDENCE = 0.95
 """Confidence level of what is saved."""
 
 
-def named(content: xr.Dataset, variant: int) -> list[str]:
+def named(content: Results, variant: int) -> list[str]:
     """Names of the effects that are off in a variant."""
     off = content["off"].to_numpy()[variant].astype(bool)
     return [str(name) for name in content["effect"].to_numpy()[off]]
@@ -68,13 +68,13 @@ class Saving(NamedTuple):
         return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
-def seconds_of(timing: xr.Dataset | None) -> Times:
+def seconds_of(timing: Results | None) -> Times:
     """Processor times of a sample of each variant; empty where they were not measured."""
     found: Times = json.loads("{}" if timing is None else timing.attrs.get(SECONDS_BY_ROUND, "{}"))
     return found
 
 
-def saving(content: xr.Dataset, variant: int, seconds: Times) -> Saving:
+def saving(content: Results, variant: int, seconds: Times) -> Saving:
     """What a variant saves: measured in pairs with the whole scene, else by evaluations."""
     here, whole = (
         np.array(seconds.get(label(names), ())) for names in (named(content, variant), [])
@@ -100,7 +100,7 @@ def shown(value: float, limit: float) -> str:
     return f"{number} ± {limit:.{digits}f} %"
 
 
-def statement(content: xr.Dataset, variant: int, seconds: Times) -> str:
+def statement(content: Results, variant: int, seconds: Times) -> str:
     """What leaving an effect out changes and saves, in a sentence."""
     one = content.isel(variant=variant)
     change = shown(float(one["change"][0]), float(one["limit"][0])).removeprefix("+")
@@ -111,7 +111,7 @@ def statement(content: xr.Dataset, variant: int, seconds: Times) -> str:
     return f"{text}, run time saved: {saved}{_verdict(one, float(content.attrs['tolerance']))}."
 
 
-def _verdict(one: xr.Dataset, tolerance: float) -> str:
+def _verdict(one: Results, tolerance: float) -> str:
     """What a single variant's changes come to, as the end of its sentence."""
     counted, found = one["judged"].to_numpy() == 1, one["finding"].to_numpy()
     if int(one["decision"]) == Verdict.HOLDS:
@@ -131,7 +131,7 @@ def _verdict(one: xr.Dataset, tolerance: float) -> str:
     return f"; undecided with {count} samples, about {float(f'{more:.1g}'):.0f} would suffice"
 
 
-def statements(content: xr.Dataset, seconds: Times) -> list[str]:
+def statements(content: Results, seconds: Times) -> list[str]:
     """A sentence for each effect by itself, for pairs that are more than their sum, and for what may be left out."""
     singles = [k for k in range(1, content.sizes["variant"]) if len(named(content, k)) == 1]
     chosen = int(np.argmax(content["recommended"].to_numpy()))
@@ -146,7 +146,7 @@ def statements(content: xr.Dataset, seconds: Times) -> list[str]:
     return [*(statement(content, k, seconds) for k in singles), *distinguished(content), last]
 
 
-def distinguished(content: xr.Dataset) -> list[str]:
+def distinguished(content: Results) -> list[str]:
     """Pairs whose change of f is significantly not the sum of the two, a sentence each."""
     off = content["off"].to_numpy()
     single = {int(np.argmax(row)): k for k, row in enumerate(off) if row.sum() == 1}
@@ -168,7 +168,7 @@ def distinguished(content: xr.Dataset) -> list[str]:
 
 
 @style.drawn
-def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Figure":
+def effects_figure(effects: Results, timing: Results | None = None) -> "Figure":
     """Change of f by each effect, with confidence interval, on a logarithmic scale, and its run time.
 
     Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
@@ -212,7 +212,7 @@ def effects_figure(effects: xr.Dataset, timing: xr.Dataset | None = None) -> "Fi
     return figure
 
 
-def caption(effects: xr.Dataset, timing: xr.Dataset | None) -> str:
+def caption(effects: Results, timing: Results | None) -> str:
     """What `effects_figure` shows."""
     seconds = seconds_of(timing)
     rounds = max(

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report.figures import style
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,13 +17,14 @@ LOW = 0.9
 """R2 on test points below which a surrogate is called indicative, as `study.sensitivity.r2` has it by default."""
 
 
-def of_surfaces(sensitivity: xr.Dataset) -> dict[str, float]:
+def of_surfaces(sensitivity: Results) -> dict[str, float]:
     """Return R2 of each response surface over the whole interval, at the clearance where it is least (kind ``sensitivity``)."""
     widest = sensitivity["r2"].isel(interval=int(np.argmax(sensitivity["interval"].to_numpy())))
-    return {str(one["surface"].item()): float(one.min()) for one in widest}
+    surfaces = sensitivity["surface"].to_numpy()
+    return {str(k): float(one.min()) for k, one in zip(surfaces, widest.to_numpy(), strict=True)}
 
 
-def of_models(kriging: xr.Dataset) -> dict[str, float]:
+def of_models(kriging: Results) -> dict[str, float]:
     """Return R2 of each Kriging model, of its worst part (kind ``kriging``)."""
     family = [str(name) for name in kriging["family"].to_numpy()]
     r2 = kriging["r2"].to_numpy()
@@ -39,7 +40,7 @@ def verdict(r2: float) -> str:
     return f"R² = {r2:.2f}, indicative only" if r2 < LOW else ""
 
 
-def warnings(kind: str, content: xr.Dataset | None) -> list[str]:
+def warnings(kind: str, content: Results | None) -> list[str]:
     """Return a sentence for each surrogate of a file (kind ``sensitivity`` or ``kriging``) that does not fit."""
     if content is None or "r2" not in content:
         return []
@@ -52,10 +53,10 @@ def warnings(kind: str, content: xr.Dataset | None) -> list[str]:
     ]
 
 
-def captioned(kind: str, caption: str) -> Callable[[xr.Dataset], str]:
+def captioned(kind: str, caption: str) -> Callable[[Results], str]:
     """Return what makes the caption of a figure of surrogates: behind its words, those that do not fit."""
 
-    def of(content: xr.Dataset) -> str:
+    def of(content: Results) -> str:
         found = warnings(kind, content)
         return f"{caption} Warning: {'; '.join(found)}." if found else caption
 

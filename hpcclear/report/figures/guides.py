@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ class Touch(NamedTuple):
     """Label along the dimension ``joint``."""
 
 
-def touches(response: xr.Dataset) -> list[Touch]:
+def touches(response: Results) -> list[Touch]:
     """Contacts of a response in the order in which they begin.
 
     Those between two stored instants are missed: store every step, `output.instants_per_revolution` = 0. A law of impacts
@@ -42,7 +42,7 @@ def touches(response: xr.Dataset) -> list[Touch]:
 
 
 @style.drawn
-def guide_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
+def guide_figure(response: Results, revolutions: int = 2) -> "Figure":
     """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last revolutions.
 
     Parameters
@@ -57,7 +57,7 @@ def guide_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
     InputError
         If no guide has clearance.
     """
-    if "guide" not in response.dims:
+    if "guide" not in response.sizes:
         raise InputError(
             "guide", "", "no guide of this mechanism has clearance",
             "Give a slide a clearance, length, height and corner_radius",
@@ -80,7 +80,7 @@ def guide_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
     return figure
 
 
-def _corners(panel: "Axes", shown: xr.Dataset, turn: Array) -> None:
+def _corners(panel: "Axes", shown: Results, turn: Array) -> None:
     """A row for each corner, filled while it touches, with a tick where a contact begins."""
     rows = [str(label) for label in shown["joint"].to_numpy() if "." in str(label)]
     for row, label in enumerate(rows):

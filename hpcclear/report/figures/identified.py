@@ -3,11 +3,11 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +16,7 @@ BINS = 60
 DAY = 86400.0
 
 
-def _check(content: xr.Dataset) -> None:
+def _check(content: Results) -> None:
     """Raise InputError where nothing was measured."""
     if "interval" not in content:
         reason = "no signal was measured"
@@ -24,7 +24,7 @@ def _check(content: xr.Dataset) -> None:
 
 
 @style.drawn
-def posterior_figure(content: xr.Dataset) -> "Figure":
+def posterior_figure(content: Results) -> "Figure":
     """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``.
 
     Raises
@@ -49,7 +49,7 @@ def posterior_figure(content: xr.Dataset) -> "Figure":
             ends = content["interval"][k, u].to_numpy() * scale.factor
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
-        panel.set_xlabel(scale.label(str(content["unknown"].to_numpy()[u])))
+        panel.set_xlabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
         panel.set_ylabel(f"density (1/{scale.unit})")
         panel.legend(loc="upper right")
     style.settle(axes)
@@ -57,7 +57,7 @@ def posterior_figure(content: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def features_figure(content: xr.Dataset) -> "Figure":
+def features_figure(content: Results) -> "Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
 
     Raises
@@ -67,7 +67,8 @@ def features_figure(content: xr.Dataset) -> "Figure":
     """
     _check(content)
     last = content.isel(record=-1)
-    score = ((last["measured"] - last["predicted"]) / last["predicted_deviation"]).to_numpy()
+    measured, predicted = last["measured"].to_numpy(), last["predicted"].to_numpy()
+    score = (measured - predicted) / last["predicted_deviation"].to_numpy()
     figure, axes = style.grid(1, 1, 60.0)
     panel = axes[0, 0]
     panel.axhspan(
@@ -90,7 +91,7 @@ def features_figure(content: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def growth_figure(content: xr.Dataset) -> "Figure":
+def growth_figure(content: Results) -> "Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
 
     Raises
@@ -119,7 +120,7 @@ def growth_figure(content: xr.Dataset) -> "Figure":
             limit = scale.factor * float(content.attrs["limit"])
             panel.axhline(limit, color=style.PALETTE["orange"], ls="--", label="limit")
         panel.set_xlabel("time since the first record (days)")
-        panel.set_ylabel(scale.label(str(content["unknown"].to_numpy()[u])))
+        panel.set_ylabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
         panel.legend(loc="best")
     style.settle(axes)
     return figure

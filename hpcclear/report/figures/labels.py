@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+import textwrap
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
-from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    import xarray as xr
+from hpcclear.results.content import Results, Variable
+from hpcclear.results.names import DESIGN_VARIABLES
+from hpcclear.scene.paths import described
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -95,7 +95,7 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
     return f"{shown}{unit}"
 
 
-def value(one: xr.DataArray) -> str:
+def value(one: Variable) -> str:
     """A design variable of a design as it is printed: with its unit, or the name of the row of a table."""
     number, options = float(one), str(one.attrs.get("options", ""))
     if options and np.isfinite(number):
@@ -142,14 +142,56 @@ def between(low: float, high: float, units: str) -> str:
     return " to ".join(ends)
 
 
-def of(variable: xr.DataArray) -> Scale:
+def of(variable: Variable) -> Scale:
     """The scale of a variable of a dataset."""
     return scale(str(variable.attrs.get("units", "1")), variable.to_numpy())
 
 
-def words(variable: xr.DataArray) -> str:
-    """What a variable is called on an axis; a design variable by its symbol or scene path."""
+def words(variable: Variable) -> str:
+    """What a variable is called in a sentence; a design variable by its short name or scene path."""
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
+
+
+MEANINGS = {
+    "m1": "crank mass $m_1$",
+    "u1": "crank centre $u_1$",
+    "I1": "crank inertia $I_1$",
+    "m2": "rod mass $m_2$",
+    "u2": "rod centre $u_2$",
+    "I2": "rod inertia $I_2$",
+    "m3": "slider mass $m_3$",
+    "C": "clearance $C$",
+}
+"""Of the short names of a scene, for a variable that is what its short name says."""
+
+WIDE = 32
+"""Letters of a line of an axis label: half a column."""
+
+
+def axis(variable: Variable) -> str:
+    """What a variable is called on an axis, in words: "radial clearance of the joint A"."""
+    words, path = (
+        str(variable.attrs.get("long_name", "")),
+        str(variable.attrs.get("scene_path", "")),
+    )
+    if path:
+        return entry(path, words)
+    return wrapped(words or variable.name.replace("_", " "))
+
+
+def entry(path: str, words: str = "") -> str:
+    """What an entry of a scene is called on an axis, by its path or short name and its words, where a file has some."""
+    short = DESIGN_VARIABLES.get(path, ("", ""))[1]
+    if short and words in ("", short):
+        return MEANINGS.get(path, wrapped(short))
+    if words in ("", f"design variable {path}"):
+        words = described([path]) if "." in path else path.replace("_", " ")
+    return wrapped(words)
+
+
+def wrapped(words: str) -> str:
+    """Words in lines of `WIDE` letters, printed as they are."""
+    return literal("\n".join(textwrap.wrap(words, WIDE)))
 
 
 def objective(content: Results) -> str:
@@ -157,12 +199,12 @@ def objective(content: Results) -> str:
     return str(content.attrs.get("objective", MEAN_GAP.words))
 
 
-def design_variables(content: xr.Dataset) -> list[xr.DataArray]:
+def design_variables(content: Results) -> list[Variable]:
     """The design variables of a dataset in its order."""
     return [v for v in content.data_vars.values() if v.attrs.get("role") == "design_variable"]
 
 
-def clearance(content: xr.Dataset) -> xr.DataArray | None:
+def clearance(content: Results) -> Variable | None:
     """The design variable that is a clearance, if there is one."""
     for variable in design_variables(content):
         if str(variable.attrs.get("long_name", "")).startswith("radial clearance"):
@@ -175,6 +217,6 @@ def literal(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def is_printed(one: xr.Dataset) -> bool:
+def is_printed(one: Results) -> bool:
     """Whether one design of a dataset of kind ``verification`` is one that a publication prints."""
     return "mean_paper" in one and bool(np.isfinite(one["mean_paper"]))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -14,7 +13,8 @@ from hpcclear.base.outcome import Regime, Status
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.figures.varied import RPM, varied
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.grids import grid
+from hpcclear.results.content import Results, Variable
+from hpcclear.results.grids import cells_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,7 @@ _EXPONENT = "largest Lyapunov exponent\nper revolution"
 
 
 @style.drawn
-def map_figure(content: xr.Dataset) -> "Figure":
+def map_figure(content: Results) -> "Figure":
     """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval.
 
     Of a dataset that `hpcclear map` wrote.
@@ -37,20 +37,20 @@ def map_figure(content: xr.Dataset) -> "Figure":
     InputError
         The dataset is no map.
     """
-    cells = grid(content)
+    cells = cells_of(content)
     names = [str(name) for name in cells["objective"].dims]
     return _plane(cells, names) if len(names) == 2 else _line(cells, names[0])
 
 
-def entry(variable: xr.DataArray) -> tuple[Array, str]:
+def entry(variable: Variable) -> tuple[Array, str]:
     """Values (n,) of an entry of the scene in a readable unit, and the label of its axis; angular speeds in rpm."""
     unit = RPM if variable.attrs.get("units") == "rad/s" else labels.of(variable)
-    words = labels.literal(labels.words(variable))
+    words = labels.axis(variable)
     label = unit.label(words) if unit.unit != "–" else words
     return variable.to_numpy() * unit.factor, label
 
 
-def _plane(cells: xr.Dataset, names: list[str]) -> "Figure":
+def _plane(cells: Results, names: list[str]) -> "Figure":
     figure, axes = style.grid(3, 1, 175.0, sharex=True)
     (x, across), (y, up) = (entry(cells[name]) for name in names)
     exponent = cells["lyapunov_exponent"].to_numpy().T
@@ -95,7 +95,7 @@ def _plane(cells: xr.Dataset, names: list[str]) -> "Figure":
     return figure
 
 
-def _line(cells: xr.Dataset, name: str) -> "Figure":
+def _line(cells: Results, name: str) -> "Figure":
     figure, axes = style.grid(4, 1, 150.0, sharex=True)
     x, across = entry(cells[name])
     unit = labels.of(cells["objective"])
@@ -121,7 +121,7 @@ def _line(cells: xr.Dataset, name: str) -> "Figure":
 
 @style.drawn
 def bifurcation_figure(
-    responses: "xr.Dataset | Sequence[xr.Dataset]", revolutions: int | None = None
+    responses: "Results | Sequence[Results]", revolutions: int | None = None
 ) -> "Figure":
     """Values once a revolution against the entry of the scene that is varied.
 
@@ -141,7 +141,7 @@ def bifurcation_figure(
     InputError
         No response at all, one with fewer revolutions, or scenes that differ in several entries.
     """
-    if isinstance(responses, xr.Dataset):
+    if isinstance(responses, Results):
         return _observed(responses)
     motion.check_some(responses, "Give one response for each value")
     figure, axes = style.grid(2, 1, 110.0, sharex=True)
@@ -163,7 +163,7 @@ def bifurcation_figure(
     return figure
 
 
-def _observed(content: xr.Dataset) -> "Figure":
+def _observed(content: Results) -> "Figure":
     """Of a file of kind ``bifurcation``."""
     variables = labels.design_variables(content)
     if not variables or content.attrs.get("hpcclear_kind") != "bifurcation":
@@ -174,7 +174,9 @@ def _observed(content: xr.Dataset) -> "Figure":
     x, across = entry(variables[0])
     seen = content["observed"]
     words, units = str(seen.attrs["long_name"]), str(seen.attrs["units"])
-    _dots(axes[0, 0], np.repeat(x, seen.sizes["crossing"]), seen.to_numpy().ravel(), units, words)
+    _dots(
+        axes[0, 0], np.repeat(x, content.sizes["crossing"]), seen.to_numpy().ravel(), units, words
+    )
     axes[0, 0].set_xlabel(across)
     style.settle(axes)
     return figure

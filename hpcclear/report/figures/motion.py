@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures.style import JOINT_NAMES
-from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    import xarray as xr
+from hpcclear.results.content import Results, Variable
 
 TURN = 2.0 * np.pi
 
@@ -38,12 +34,12 @@ def turns(response: Results) -> Array:
     return phase(response) / TURN
 
 
-def turns_label(response: xr.Dataset) -> str:
+def turns_label(response: Results) -> str:
     """The label of an axis of `turns`."""
     return f"{'turns of the drive' if 'drive_phase' in response else 'crank angle'} (revolutions)"
 
 
-def crank_angle(response: xr.Dataset) -> tuple[Array, int]:
+def crank_angle(response: Results) -> tuple[Array, int]:
     """Crank angle times its sense (time,), rad, which rises, and the sense, -1 clockwise; of a drive that swings its phase."""
     angle, gone = response["crank_angle"].to_numpy(), phase(response)
     sense = -1 if angle[-1] < angle[0] else 1
@@ -53,26 +49,26 @@ def crank_angle(response: xr.Dataset) -> tuple[Array, int]:
     return sense * angle, sense
 
 
-def whole_turns(response: xr.Dataset) -> int:
+def whole_turns(response: Results) -> int:
     """How many whole revolutions, from one passage of phase 0 to the last, a response holds."""
     first, last = _passages(response)
     return last - first
 
 
-def _passages(response: xr.Dataset) -> tuple[int, int]:
+def _passages(response: Results) -> tuple[int, int]:
     """Number of the first and of the last revolution's border; an instant that is missing there is forgiven."""
     angle = turns(response)
     slack = min(1.5 * float(np.max(np.diff(angle[:2]), initial=1e-6)), 0.02)
     return int(np.ceil(angle[0] - slack)), int(np.floor(angle[-1] + slack))
 
 
-def latest(response: xr.Dataset, revolutions: int) -> xr.Dataset:
+def latest(response: Results, revolutions: int) -> Results:
     """The last whole revolutions; all there is of a response that ended in the first."""
     whole = whole_turns(response)
     return steady(response, min(revolutions, whole)) if whole > 0 else response
 
 
-def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
+def steady(response: Results, revolutions: int | None = None) -> Results:
     """The last whole revolutions of a response.
 
     Parameters
@@ -103,18 +99,18 @@ def steady(response: xr.Dataset, revolutions: int | None = None) -> xr.Dataset:
     return response.isel(time=np.flatnonzero(inside))
 
 
-def joints(response: xr.Dataset) -> dict[str, str]:
+def joints(response: Results) -> dict[str, str]:
     """What the joints of a response are called in figures, by label: O12 and O23 of a slider-crank."""
     labels = [str(label) for label in response["joint"].to_numpy()]
     return {label: JOINT_NAMES.get(label, label) for label in labels}
 
 
-def pins(response: xr.Dataset) -> list[str]:
+def pins(response: Results) -> list[str]:
     """Labels of the joints of a response that are no corners of sliders in guides."""
     return [str(label) for label in response["joint"].to_numpy() if "." not in str(label)]
 
 
-def of_pins(response: xr.Dataset) -> xr.Dataset:
+def of_pins(response: Results) -> Results:
     """A response without the corners of sliders in guides; raises InputError where no other joint is left."""
     if not pins(response):
         raise InputError(
@@ -123,7 +119,7 @@ def of_pins(response: xr.Dataset) -> xr.Dataset:
     return response.sel(joint=pins(response))
 
 
-def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
+def quantities(response: Results) -> list[tuple[str, str, str]]:
     """What responses are compared by: variable, joint or "", words."""
     named = enumerate(joints(response).items(), 1)
     found = [("contact_force", label, f"contact force {k} ({name})") for k, (label, name) in named]
@@ -133,49 +129,29 @@ def quantities(response: xr.Dataset) -> list[tuple[str, str, str]]:
     return found
 
 
-def series(response: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Every series (t,) by its name; of joints, bodies and points by that and their label, which a single one may lack."""
-    found: dict[str, xr.DataArray] = {}
-    for key, variable in response.data_vars.items():
-        name, others = str(key), [dim for dim in variable.dims if dim != "time"]
-        if "time" not in variable.dims or len(others) > 1:
-            continue
-        if not others:
-            found[name] = variable
-            continue
-        labels = [str(label) for label in response[others[0]].to_numpy()]
-        for k, label in enumerate(labels):
-            found[f"{name} {label}"] = variable.isel({others[0]: k})
-        if len(labels) == 1:
-            found[name] = variable.isel({others[0]: 0})
-    return found
-
-
-def followed(response: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+def followed(response: Results) -> tuple[Variable, Variable]:
     """Where the output stands and how fast it moves: the slider, or a linkage's last body, by its angle if it turns, else along
     the axis on which it moves further."""
     if "slider_position" in response:
         return response["slider_position"], response["slider_velocity"]
     last = response.isel(body=-1)
     word, speed = "angle", last["body_spin"]
-    if not (speed != 0.0).any():
+    if not speed.to_numpy().any():
         word = max("xy", key=lambda axis: float(np.ptp(last[f"body_{axis}"].to_numpy())))
         speed = last[f"body_v{word}"]
-    name = str(last["body"].item())
-    return (
-        last[f"body_{word}"].assign_attrs(long_name=f"{word} of {name}"),
-        speed.assign_attrs(long_name=f"speed of {name}"),
-    )
+    name, place = str(last["body"].item()), last[f"body_{word}"]
+    place.attrs["long_name"], speed.attrs["long_name"] = f"{word} of {name}", f"speed of {name}"
+    return place, speed
 
 
-def clearances(response: xr.Dataset) -> Array:
+def clearances(response: Results) -> Array:
     """Radial clearance of each pin, m, shape (joints,); NaN where there is none, or where it was never reached."""
     found = reaches(response)
     found[~np.isin(response["joint"].to_numpy(), pins(response))] = np.nan
     return found
 
 
-def reaches(response: xr.Dataset) -> Array:
+def reaches(response: Results) -> Array:
     """Eccentricity |e| at which each joint touches, m, shape (joints,); NaN where it never did.
 
     Penetration is |e| less that, so it follows from contact: the radial clearance of a pin.
@@ -190,7 +166,7 @@ def reaches(response: xr.Dataset) -> Array:
     return found
 
 
-def contact(response: xr.Dataset, joint: str) -> str:
+def contact(response: Results, joint: str) -> str:
     """Return how long a joint is in contact, in words: a share of the time, never rounded to 0 or 1."""
     touching = response["penetration"].sel(joint=joint).to_numpy() > 0.0
     if touching.all() or not touching.any():
@@ -202,12 +178,12 @@ def contact(response: xr.Dataset, joint: str) -> str:
     return f"in contact {shown} % of the time"
 
 
-def eccentricity(response: xr.Dataset) -> Array:
+def eccentricity(response: Results) -> Array:
     """Distance of journal centre and bearing centre, m, shape (time, 2)."""
     return np.hypot(response["eccentricity_x"].to_numpy(), response["eccentricity_y"].to_numpy())
 
 
-def objective_by_turn(response: xr.Dataset) -> Array:
+def objective_by_turn(response: Results) -> Array:
     """Objective f of every whole revolution, m, shape (revolutions,): time means over the instants of the file."""
     time, angle = response["time"].to_numpy(), turns(response)
     first, last = _passages(response)
@@ -224,21 +200,21 @@ def objective_by_turn(response: xr.Dataset) -> Array:
     return np.sqrt(squares)
 
 
-def section(response: xr.Dataset, name: str | xr.DataArray, phase: float = 0.0) -> Array:
-    """A variable, by name or itself, once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
+def section(response: Results, name: str | Variable | Array, phase: float = 0.0) -> Array:
+    """A variable, by name or itself (t, ...), once a revolution, at the crank angle `phase` (rad): shape (revolutions, ...)."""
     angle, sense = crank_angle(response)
     phase = sense * phase
     first = np.ceil((angle[0] - phase) / TURN - 1e-6)
     last = np.floor((angle[-1] - phase) / TURN + 1e-6)
     at = phase + TURN * np.arange(first, last + 1)
-    values = (response[name] if isinstance(name, str) else name).to_numpy()
+    values = np.asarray(response[name] if isinstance(name, str) else name)
     columns = values.reshape(len(angle), -1).T
     return np.column_stack([np.interp(at, angle, column) for column in columns]).reshape(
         len(at), *values.shape[1:]
     )
 
 
-def spectrum(response: xr.Dataset, values: Array) -> tuple[Array, Array]:
+def spectrum(response: Results, values: Array) -> tuple[Array, Array]:
     """Amplitudes over the crank order (multiples of the crank's mean frequency), Hann window.
 
     Parameters

@@ -1,28 +1,28 @@
 """The mechanism in motion: its bodies by their points, and films of them as GIF and MP4."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS
 from hpcclear.report.figures import motion
+from hpcclear.results.content import Results
 
 Drawn = tuple[list[list[int]], Array, Array]
 """Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
 
 
-def bodies(shown: xr.Dataset) -> Drawn:
+def bodies(shown: Results) -> Drawn:
     """Return the bodies of a response (kind ``response``) at each instant."""
     return _slider_crank(shown, eccentricities(shown)) if "rod_x" in shown else _linkage(shown)
 
 
-def eccentricities(shown: xr.Dataset) -> Array:
+def eccentricities(shown: Results) -> Array:
     """Return journal centres from bearing centres, m, shape (t, joints, 2)."""
     both = [shown[f"eccentricity_{axis}"].to_numpy() for axis in "xy"]
     return np.stack(both, axis=-1)
 
 
-def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
+def _slider_crank(shown: Results, e: Array) -> Drawn:
     """Points of crank, rod and slider.
 
     The length of the crank follows from the motion itself: the way to the crank pin is that to the rod's mass
@@ -54,7 +54,7 @@ def _slider_crank(shown: xr.Dataset, e: Array) -> Drawn:
     return [[0, 1], [2, 3], [4]], points, np.column_stack([phi, theta, tilt])
 
 
-def _linkage(shown: xr.Dataset) -> Drawn:
+def _linkage(shown: Results) -> Drawn:
     names = [str(point).partition(".")[0] for point in shown["point"].to_numpy()]
     bodies = [
         [k for k, name in enumerate(names) if name == body]

@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.noise import band_name
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results, Variable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ FALL = 80.0
 
 
 @style.drawn
-def noise_figure(response: xr.Dataset) -> "Figure":
+def noise_figure(response: Results) -> "Figure":
     """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
     squares of their orders.
 
@@ -35,13 +35,17 @@ def noise_figure(response: xr.Dataset) -> "Figure":
         )  # fmt: skip
     figure, axes = style.grid(2, 1, 110.0)
     forces = _forces(response)
-    highest = max(float(level.max()) for level, *_ in forces.values())
+    highest = max(float(np.nanmax(level)) for level, *_ in forces.values())
     for row, (name, (level, lower, upper, orders)) in enumerate(forces.items()):
         colour = style.CYCLE[row % 7]
         _levels(axes[0, 0], (level, lower, upper), name, colour)
-        unit = labels.scale("N", [float(one.max()) for *_, one in forces.values()])
+        unit = labels.scale("N", [float(np.max(one)) for *_, one in forces.values()])
         axes[1, 0].loglog(
-            orders["order"], orders.to_numpy() * unit.factor, color=colour, lw=0.7, label=name
+            orders.labels["order"],
+            orders.to_numpy() * unit.factor,
+            color=colour,
+            lw=0.7,
+            label=name,
         )
     axes[0, 0].set_xscale("log")
     axes[0, 0].set_ylim(bottom=highest - FALL)
@@ -59,20 +63,20 @@ def noise_figure(response: xr.Dataset) -> "Figure":
 
 
 def _levels(
-    panel: "Axes", ends: tuple[xr.DataArray, xr.DataArray, xr.DataArray], name: str, colour: str
+    panel: "Axes", ends: tuple[Variable, Variable, Variable], name: str, colour: str
 ) -> None:
     """A line with its interval; an end at nothing is at the bottom."""
     level, lower, upper = ends
     there = np.isfinite(level.to_numpy())
-    band = level["band"].to_numpy()[there]
+    band = level.labels["band"][there]
     panel.plot(band, level.to_numpy()[there], "o-", ms=2.5, lw=0.8, color=colour, label=name)
     least = np.nan_to_num(lower.to_numpy()[there], nan=np.nan, neginf=-1e3)
     panel.fill_between(band, least, upper.to_numpy()[there], color=colour, alpha=0.25, lw=0.0)
 
 
 def _forces(
-    response: xr.Dataset,
-) -> dict[str, tuple[xr.DataArray, xr.DataArray, xr.DataArray, xr.DataArray]]:
+    response: Results,
+) -> dict[str, tuple[Variable, Variable, Variable, Variable]]:
     """Level, ends of its interval, and orders, of the force on the frame and of each contact force that is not 0."""
     ends = ("level", "level_lower", "level_upper", "orders")
     found = {}
@@ -80,7 +84,7 @@ def _forces(
         found["force on the frame"] = tuple(response[f"frame_force_{end}"] for end in ends)
     for joint in map(str, response["joint"].to_numpy()):
         own = tuple(response[f"contact_force_{end}"].sel(joint=joint) for end in ends)
-        if float(own[-1].max()) > 0.0:
+        if float(np.max(own[-1])) > 0.0:
             found[joint.replace("_", " ")] = own
     return found  # type: ignore[return-value]
 

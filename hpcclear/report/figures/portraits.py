@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ _FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
 
 
 @style.drawn
-def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
+def orbit_figure(response: Results, revolutions: int | None = None) -> "Figure":
     """Orbit of the journal centres in the clearance circle, contact distinguished from free flight.
 
     Parameters
@@ -54,7 +54,7 @@ def orbit_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
 
 
 @style.drawn
-def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
+def force_polar_figure(response: Results, revolutions: int | None = None) -> "Figure":
     """Contact force over its direction in the fixed frame; parameters as for `orbit_figure`."""
     shown = motion.steady(response, revolutions)
     joints = motion.joints(shown)
@@ -92,7 +92,7 @@ def force_polar_figure(response: xr.Dataset, revolutions: int | None = None) -> 
 
 
 @style.drawn
-def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figure":
+def phase_figure(response: Results, revolutions: int | None = None) -> "Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
     Of a linkage, speed of its last body over its angle or place. Parameters as for `orbit_figure`.
@@ -115,8 +115,8 @@ def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
         line = LineCollection(list(parts), array=turn[1:], cmap=style.COLOURS, linewidths=0.6)
         panel.add_collection(line)
         panel.autoscale_view()
-        panel.set_xlabel(x.label(labels.words(both[0])))
-        panel.set_ylabel(y.label(labels.words(both[1])))
+        panel.set_xlabel(x.label(labels.axis(both[0])))
+        panel.set_ylabel(y.label(labels.axis(both[1])))
     bar = figure.colorbar(line, ax=axes[:, 0].tolist(), location="bottom", aspect=50, pad=0.02)
     bar.set_label(motion.turns_label(shown))
     style.settle([*axes[:, 0], bar.ax])
@@ -125,7 +125,7 @@ def phase_figure(response: xr.Dataset, revolutions: int | None = None) -> "Figur
 
 @style.drawn
 def poincare_figure(
-    response: xr.Dataset, phase: float = 0.0, revolutions: int | None = None
+    response: Results, phase: float = 0.0, revolutions: int | None = None
 ) -> "Figure":
     """Poincaré section: output (slider, or a linkage's last body) and journal centres once a revolution, at one crank angle.
 
@@ -161,8 +161,8 @@ def poincare_figure(
         "zorder": 3,
     }
     drawn = top.scatter(position, velocity, **options)
-    top.set_xlabel(x.label(labels.words(output[0])))
-    top.set_ylabel(y.label(labels.words(output[1])))
+    top.set_xlabel(x.label(labels.axis(output[0])))
+    top.set_ylabel(y.label(labels.axis(output[1])))
     top.set_title(f"{len(order)} crossings of crank angle {np.degrees(phase):g}°")
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = motion.clearances(shown) * unit.factor
@@ -253,7 +253,7 @@ CROSSINGS = 200
 """Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
 
 
-def section_figure(found: xr.Dataset) -> "Figure":
+def section_figure(found: Results) -> "Figure":
     """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
     count = motion.whole_turns(found) - int(found.attrs.get("transient_turns", 0))
     if count < CROSSINGS:

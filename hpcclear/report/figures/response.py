@@ -3,17 +3,17 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def _joints(axes: "Axes", response: xr.Dataset, name: str, unit: labels.Scale) -> None:
+def _joints(axes: "Axes", response: Results, name: str, unit: labels.Scale) -> None:
     """One curve for each joint against the revolution of the crank."""
     for row, (joint, label) in enumerate(motion.joints(response).items()):
         values = response[name].sel(joint=joint).to_numpy() * unit.factor
@@ -26,7 +26,7 @@ def _curve(row: int) -> dict[str, Any]:
 
 
 @style.drawn
-def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
+def response_figure(response: Results, revolutions: int = 2) -> "Figure":
     """Slider motion, where there is a slider, contact forces and torque of the drive over the last revolutions.
 
     Parameters
@@ -67,7 +67,7 @@ def response_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 
 
 @style.drawn
-def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
+def penetration_figure(response: Results, revolutions: int = 2) -> "Figure":
     """Penetration of the joints over the last revolutions; parameters as for `response_figure`."""
     shown = motion.latest(response, revolutions)
     joints = motion.joints(shown)
@@ -90,7 +90,7 @@ def penetration_figure(response: xr.Dataset, revolutions: int = 2) -> "Figure":
 
 @style.drawn
 def spectrum_figure(
-    response: xr.Dataset, revolutions: int | None = None, orders: float = 100.0
+    response: Results, revolutions: int | None = None, orders: float = 100.0
 ) -> "Figure":
     """Amplitude spectra of slider acceleration (linkage: torque of the drive) and contact forces over orders of the crank
     frequency.
@@ -122,7 +122,7 @@ def spectrum_figure(
 
 
 @style.drawn
-def energy_figure(response: xr.Dataset) -> "Figure":
+def energy_figure(response: Results) -> "Figure":
     """Energy balance: work of drive and loads and dissipated energy since the start, stored energy, and the residual.
 
     Of a dataset of kind ``response``.
@@ -135,8 +135,8 @@ def energy_figure(response: xr.Dataset) -> "Figure":
     )
     kinds = ("exchanged", "stored")
     for panel, names, kind in zip(axes[:2, 0], balances, kinds, strict=True):
-        present = [n for n in names if n in response and bool((response[n] != 0.0).any())]
-        unit = labels.scale("J", [float(abs(response[n]).max()) for n in present])
+        present = [n for n in names if n in response and response[n].to_numpy().any()]
+        unit = labels.scale("J", [float(abs(response[n].to_numpy()).max()) for n in present])
         for row, name in enumerate(present):
             values = response[name].to_numpy() * unit.factor
             label = name.replace("_", " ").removesuffix(" energy")

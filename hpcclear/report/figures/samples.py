@@ -3,34 +3,20 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.names import DESIGN_VARIABLES
+from hpcclear.results.content import Results, Variable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-_MEANINGS = {
-    "m1": "crank mass $m_1$",
-    "u1": "crank centre $u_1$",
-    "I1": "crank inertia $I_1$",
-    "m2": "rod mass $m_2$",
-    "u2": "rod centre $u_2$",
-    "I2": "rod inertia $I_2$",
-    "m3": "slider mass $m_3$",
-    "C": "clearance $C$",
-}
-"""Of the short names of a scene, for a variable that is what its short name says."""
-
-
 @style.drawn
-def samples_figure(samples: xr.Dataset) -> "Figure":
+def samples_figure(samples: Results) -> "Figure":
     """Objective against every design variable, coloured by clearance; its spread, histogram and failures.
 
     Of a dataset of kind ``samples``.
@@ -68,25 +54,17 @@ def samples_figure(samples: xr.Dataset) -> "Figure":
         panel = figure.add_subplot(row[i % 2], sharey=first)
         drawn = _cloud(panel, variable, samples["objective"], _values(main))
         panel.tick_params(labelleft=i % 2 == 0)
-        panel.set_xlabel(labels.of(variable).label(symbol(variable)))
+        panel.set_xlabel(labels.of(variable).label(labels.axis(variable)))
         panel.set_ylabel(unit.label("$f$") if i % 2 == 0 else "")
         style.settle([panel], 3)
     if others:
         bar = figure.colorbar(drawn, cax=figure.add_subplot(cells[-1]), orientation="horizontal")
-        bar.set_label("colour of the points: " + labels.of(main).label(symbol(main)))
+        bar.set_label("colour of the points: " + labels.of(main).label(labels.axis(main)))
         style.settle([bar.ax])
     return figure
 
 
-def symbol(variable: xr.DataArray) -> str:
-    """What a design variable is called on an axis, short enough for half a column."""
-    name = str(variable.attrs["scene_path"])
-    short = name if len(name) < 24 else "…" + name[-23:]
-    is_short = DESIGN_VARIABLES.get(name, ("", ""))[1] == variable.attrs.get("long_name")
-    return _MEANINGS[name] if is_short and name in _MEANINGS else labels.literal(short)
-
-
-def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.DataArray) -> "Axes":
+def _first_rows(figure: "Figure", cells: Any, samples: Results, main: Variable) -> "Axes":
     """Objective against clearance and its histogram, the spread below, and what the marks mean; the first axes."""
     first = figure.add_subplot(cells[0, 0])
     _cloud(first, main, samples["objective"], _values(main))
@@ -113,11 +91,12 @@ def _first_rows(figure: "Figure", cells: Any, samples: xr.Dataset, main: xr.Data
     return first
 
 
-def _spread(below: "Axes", samples: xr.Dataset, main: xr.DataArray) -> None:
+def _spread(below: "Axes", samples: Results, main: Variable) -> None:
     """How f scatters between revolutions, where that is known."""
     spread = samples["objective_spread"]
-    below.set_xlabel(labels.of(main).label(symbol(main)))
-    if not bool(spread.notnull().any()) and bool(samples["objective"].notnull().any()):
+    below.set_xlabel(labels.of(main).label(labels.axis(main)))
+    values = spread.to_numpy()
+    if np.isnan(values).all() and not np.isnan(samples["objective"]).all():
         below.set_yticks([])
         words = "cycle-to-cycle variation\nnot available for this objective"
         place: dict[str, Any] = {"ha": "center", "va": "center", "transform": below.transAxes}
@@ -125,16 +104,16 @@ def _spread(below: "Axes", samples: xr.Dataset, main: xr.DataArray) -> None:
         return
     _cloud(below, main, spread, _values(main))
     below.set_ylabel(labels.of(spread).label("std. dev. in time"))
-    positive = spread.where(spread > 0)
-    if float(positive.max()) > 30.0 * float(positive.min()):
+    positive = values[values > 0.0]
+    if positive.size and positive.max() > 30.0 * positive.min():
         below.set_yscale("log")
 
 
-def _values(variable: xr.DataArray) -> Array:
+def _values(variable: Variable) -> Array:
     return variable.to_numpy() * labels.of(variable).factor
 
 
-def _cloud(axes: "Axes", variable: xr.DataArray, result: xr.DataArray, colour: Array) -> Any:
+def _cloud(axes: "Axes", variable: Variable, result: Variable, colour: Array) -> Any:
     """Points, their median in bins, and crosses at the foot where the simulation failed."""
     x, y = _values(variable), _values(result)
     good = np.isfinite(y)
@@ -171,14 +150,14 @@ def binned(x: Array, y: Array, bins: int = 12) -> tuple[Array, Array]:
     return middle[full], np.array([np.median(y[place == k]) for k in full])
 
 
-def _title(samples: xr.Dataset) -> str:
+def _title(samples: Results) -> str:
     count = samples.sizes["sample"]
-    failed = int((samples["status"] != 0).sum())
-    latched = int((samples["latched"] != 0).any("joint").sum()) if "latched" in samples else 0
+    failed = int(np.count_nonzero(samples["status"]))
+    latched = int(samples["latched"].to_numpy().any(axis=1).sum()) if "latched" in samples else 0
     return f"{count} simulations: {failed} failed, {latched} with a joint always in contact"
 
 
-def _marks(samples: xr.Dataset) -> list[Any]:
+def _marks(samples: Results) -> list[Any]:
     """Legend entries of what `_cloud` draws."""
     from matplotlib.lines import Line2D
 
@@ -186,7 +165,7 @@ def _marks(samples: xr.Dataset) -> list[Any]:
         Line2D([], [], color=style.PALETTE["green"], marker="o", ms=2.5, ls="none", label="sample"),
         Line2D([], [], color=style.PALETTE["vermilion"], lw=1.2, label="median"),
     ]
-    if bool((samples["status"] != 0).any()):
+    if samples["status"].to_numpy().any():
         marks.append(Line2D([], [], color="black", marker="x", ms=4, ls="none", label="failed"))
     return marks
 

@@ -8,7 +8,8 @@ import contextlib
 import functools
 import inspect
 import io
-from collections.abc import Callable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
 from hpcclear.results import files
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,8 +114,8 @@ _given: "ContextVar[list[Axes] | None]" = ContextVar("axes of a caller", default
 def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
     """Draw a figure in this style, whatever the user's settings, and leave those alone.
 
-    The function takes ``ax`` besides: axes of the caller, as many as the figure has panels, from above to below and from left
-    to right. It draws into them, and returns their figure.
+    Datasets of xarray, which a user gives, become results here. The function takes ``ax`` besides: axes of the caller, as many
+    as the figure has panels, from above to below and from left to right. It draws into them, and returns their figure.
     """
 
     @functools.wraps(function)
@@ -121,7 +123,8 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
         token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
         try:
             with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
-                return function(*args, **kwargs)
+                named = {name: _results(one) for name, one in kwargs.items()}
+                return function(*map(_results, args), **named)
         finally:
             _given.reset(token)
 
@@ -130,6 +133,18 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
     parameters = [*signature.parameters.values(), given]
     styled.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return styled
+
+
+def _results(given: Any) -> Any:
+    """What a figure is given, with results in place of datasets of xarray, also of those in a mapping or list."""
+    xarray = sys.modules.get("xarray")
+    if xarray is None:
+        return given
+    if isinstance(given, xarray.Dataset):
+        return Results.of(given)
+    if isinstance(given, Mapping):
+        return {name: _results(one) for name, one in given.items()}
+    return [_results(one) for one in given] if isinstance(given, list) else given
 
 
 def page(height: float) -> "Figure":

@@ -4,11 +4,11 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import fits, labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @style.drawn
-def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
+def sensitivity_figure(sensitivity: Results) -> "Figure":
     """Sensitivities against clearance, a panel for each response surface (the paper's Fig. 5, curves).
 
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
@@ -44,7 +44,7 @@ def sensitivity_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 def _sensitivity_panel(
-    axes: "Axes", surface: xr.Dataset, across: labels.Scale, unit: labels.Scale
+    axes: "Axes", surface: Results, across: labels.Scale, unit: labels.Scale
 ) -> None:
     widest = surface.isel(interval=int(np.argmax(surface["interval"].to_numpy())))
     clearance = surface["clearance"].to_numpy() * across.factor
@@ -75,7 +75,7 @@ def _sensitivity_panel(
 
 
 @style.drawn
-def fit_figure(sensitivity: xr.Dataset) -> "Figure":
+def fit_figure(sensitivity: Results) -> "Figure":
     """Fit of the response surfaces against clearance, a curve for each interval (the paper's Fig. 7).
 
     Of a dataset of kind ``sensitivity``.
@@ -94,7 +94,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
                 panel.plot(clearance, values, color=colours[k], label=f"{interval:.0%}", **options)
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")
-        lowest = float(sensitivity["r2"].sel(surface=surface).min())
+        lowest = float(np.nanmin(sensitivity["r2"].sel(surface=surface)))
         bottom = max(-0.25, min(lowest, 0.75)) - 0.02
         line[0].set_ylim(bottom, 1.03)
         if lowest < 0.0:
@@ -113,7 +113,7 @@ def fit_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
+def sobol_figure(sensitivity: Results) -> "Figure":
     """Global sensitivity: first-order and total Sobol indices with two standard errors.
 
     Parameters
@@ -157,7 +157,7 @@ def sobol_figure(sensitivity: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
+def surfaces_figure(kriging: Results, levels: int = 24) -> "Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
 
     Parameters
@@ -176,7 +176,7 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
 
     main = labels.clearance(kriging)
     name = "" if main is None else str(main.attrs["scene_path"])
-    found = models_in(kriging)
+    found = models_in(kriging.variables)
     shown = {k: m for k, m in found.items() if len(m.names) == 3 and name in m.names}
     if not shown:
         reason = "no model has two design variables and the clearance as inputs"
@@ -199,11 +199,11 @@ def surfaces_figure(kriging: xr.Dataset, levels: int = 24) -> "Figure":
             drawn = panel.contourf(*grid, levels=edges, cmap=style.COLOURS)
             lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
             panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
-            panel.set_xlabel(scales[0].label(symbol(str(first.attrs["scene_path"]))))
+            panel.set_xlabel(scales[0].label(labels.axis(first)))
             panel.tick_params(labelleft=k == 0)
             panel.set_title(f"$C$ = {clearances[k] * across.factor:.3g} {across.unit}")
             fits.mark(panel, known[family])
-        line[0].set_ylabel(scales[1].label(symbol(str(second.attrs["scene_path"]))))
+        line[0].set_ylabel(scales[1].label(labels.axis(second)))
         line[0].set_title(f"{line[0].get_title(loc='left')}, $R^2$ = {known[family]:.2g}")
     bar = figure.colorbar(drawn, ax=axes.ravel().tolist(), location="bottom", aspect=45, pad=0.01)
     bar.set_label(unit.label("objective $f$"))
@@ -226,7 +226,7 @@ def _fields(model: "Piecewise", main: int) -> tuple[Any, Any, Any, Any]:
 
 
 @style.drawn
-def parity_figure(kriging: xr.Dataset) -> "Figure":
+def parity_figure(kriging: Results) -> "Figure":
     """Surrogate against dynamics, every model (the paper's Figs. 6 and 8).
 
     Each point is predicted by the model without that point, so that no point is judged by itself; R2 on the test
@@ -239,7 +239,7 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     """
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 
-    found = models_in(kriging)
+    found = models_in(kriging.variables)
     rows = (len(found) + 1) // 2
     figure, axes = style.grid(rows, 2, 14.0 + 46.0 * rows, sharex=True, sharey=True)
     unit = labels.of(kriging["training_output"])
@@ -266,7 +266,7 @@ def parity_figure(kriging: xr.Dataset) -> "Figure":
     return figure
 
 
-def _held(sensitivity: xr.Dataset) -> str:
+def _held(sensitivity: Results) -> str:
     """What is held fixed for each surface: the clearance, unless a study says otherwise."""
     words = labels.words(sensitivity["clearance"])
     if words == "radial clearance":
@@ -281,14 +281,14 @@ def _surface(name: str) -> str:
 
 
 def symbol(name: str) -> str:
-    """A design variable in a formula's letters, or its path shortened."""
+    """A design variable in a formula's letters, or in words."""
     if name.endswith("_ratio"):
         return f"{symbol(name.removesuffix('_ratio'))} ratio"
     if len(name) == 2 and name[1].isdigit():
         return f"${name[0]}_{name[1]}$"
     if name == "C":
         return "$C$"
-    return labels.literal(name if len(name) < 18 else "…" + name[-17:])
+    return labels.entry(name)
 
 
 def _finish_grid(axes: np.ndarray, used: int, label: str) -> None:

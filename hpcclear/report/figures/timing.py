@@ -3,17 +3,17 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 @style.drawn
-def timing_figure(timing: xr.Dataset) -> "Figure":
+def timing_figure(timing: Results) -> "Figure":
     """How every rank spent its time, and how much of it each stage took.
 
     Of a dataset of kind ``timing``.
@@ -23,11 +23,11 @@ def timing_figure(timing: xr.Dataset) -> "Figure":
     figure, axes = style.grid(2, 1, 40.0 + 5.0 * sum(sizes), height_ratios=sizes)
     parts = [("busy", "computing", "blue"), ("compile", "compiling", "orange")]
     parts += [("write", "writing", "green"), ("idle", "waiting", "grey")]
-    for panel, along, over in zip(axes[:, 0], ("rank", "stage"), ("stage", "rank"), strict=True):
+    for panel, along, over in zip(axes[:, 0], ("rank", "stage"), (1, 0), strict=True):
         names = [labels.literal(str(name)) for name in timing[along].to_numpy()]
         left = np.zeros(len(names))
         for name, label, colour in parts:
-            spent = timing[name].sum(over).to_numpy()
+            spent = timing[name].to_numpy().sum(over)
             panel.barh(
                 np.arange(len(names)),
                 spent,

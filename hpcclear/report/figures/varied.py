@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion
+from hpcclear.results.content import Results
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.paths import described, flatten, quantities
 from hpcclear.scene.plugged import UntrustedSource
@@ -25,7 +25,7 @@ class Varied(NamedTuple):
     """SI, shape (responses,)."""
 
 
-def varied(responses: Sequence[xr.Dataset]) -> Varied:
+def varied(responses: Sequence[Results]) -> Varied:
     """Return the physical entry in which the scenes differ; the clearance as the motion shows it, where files do not say.
 
     Raises
@@ -48,7 +48,7 @@ def varied(responses: Sequence[xr.Dataset]) -> Varied:
     return Varied(words, RPM if unit == "rad/s" else labels.scale(unit or "1", values), values)
 
 
-def _differing(responses: Sequence[xr.Dataset]) -> dict[str, list[float]]:
+def _differing(responses: Sequence[Results]) -> dict[str, list[float]]:
     """Values in each response of the physical entries that are not the same in all; none where a file carries no scene."""
     try:
         tables = [_entries(one) for one in responses]
@@ -61,7 +61,7 @@ def _differing(responses: Sequence[xr.Dataset]) -> dict[str, list[float]]:
     return {path: column for path, column in columns.items() if len(set(column)) > 1}
 
 
-def _entries(response: xr.Dataset) -> dict[str, Any]:
+def _entries(response: Results) -> dict[str, Any]:
     """Numbers of the scene of a response, by their paths."""
     scene = scene_of_text(str(response.attrs.get("scene", "")), "responses")
     known = quantities()

@@ -3,18 +3,18 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 @style.drawn
-def fan_figure(wear: xr.Dataset) -> "Figure":
+def fan_figure(wear: Results) -> "Figure":
     """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them.
 
     Of a dataset of kind ``wear``.
@@ -65,7 +65,7 @@ def fan_figure(wear: xr.Dataset) -> "Figure":
 
 
 @style.drawn
-def survival_figure(wear: xr.Dataset) -> "Figure":
+def survival_figure(wear: Results) -> "Figure":
     """Share of lives that are not over against revolutions, with 95 % confidence intervals.
 
     Of a dataset of kind ``wear``.
@@ -94,7 +94,7 @@ def survival_figure(wear: xr.Dataset) -> "Figure":
     return figure
 
 
-def _revolutions(wear: xr.Dataset) -> str:
+def _revolutions(wear: Results) -> str:
     """The label of an axis of revolutions, with the hours they take where every life turns alike."""
     each = wear["revolution_time"].to_numpy() if "revolution_time" in wear else np.zeros(0)
     if not each.size or np.ptp(each) > 0.0:
@@ -108,7 +108,7 @@ AGES = 4
 
 
 @style.drawn
-def profile_figure(wear: xr.Dataset) -> "Figure":
+def profile_figure(wear: Results) -> "Figure":
     """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives.
 
     Of a dataset of kind ``wear``.
@@ -126,7 +126,8 @@ def profile_figure(wear: xr.Dataset) -> "Figure":
         (str(name), surface, depths)
         for name in wear["joint"].to_numpy()
         for surface in ("bearing", "journal")
-        if (depths := wear[f"{surface}_profile"].sel(joint=name, quantile=0.5)).max() > 0.0
+        if (depths := wear[f"{surface}_profile"].sel(joint=name, quantile=0.5)).to_numpy().max()
+        > 0.0
     ]
     ages = np.unique(np.linspace(0, wear.sizes["cycle"] - 1, AGES + 1).round().astype(int))[1:]
     rows = max(-(-len(panels) // 2), 1)
@@ -136,13 +137,11 @@ def profile_figure(wear: xr.Dataset) -> "Figure":
         panel.remove()
     for panel, (name, surface, depths) in zip(axes.ravel(), panels, strict=False):
         scale = labels.scale("m", depths.to_numpy())
-        for shade, one in zip(
-            np.linspace(0.3, 1.0, len(ages)), depths.isel(cycle=ages), strict=True
-        ):
-            value = scale.factor * one.to_numpy()
+        for shade, age in zip(np.linspace(0.3, 1.0, len(ages)), ages, strict=True):
+            value = scale.factor * depths.isel(cycle=age).to_numpy()
             panel.plot(
                 angle, np.append(value, value[0]), color=style.PALETTE["blue"], alpha=shade,
-                label=f"{float(one['cycle']):.3g}",
+                label=f"{float(wear['cycle'][age]):.3g}",
             )  # fmt: skip
         panel.set_title(f"{name}\n{scale.label(surface)}")
         panel.set_rmin(0.0)

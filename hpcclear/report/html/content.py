@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import xarray as xr
-
 from hpcclear.base.errors import InputError
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.results.grids import SHAPE
 
 
@@ -16,25 +15,25 @@ class Content:
     """Results to report."""
 
     directory: Path
-    files: dict[str, xr.Dataset]
+    files: dict[str, Results]
     """By kind; responses are apart."""
     names: dict[str, str]
     """The file each came from, by kind."""
-    responses: dict[str, xr.Dataset] = field(default_factory=dict)
+    responses: dict[str, Results] = field(default_factory=dict)
     """By the name of the design."""
     troubles: tuple[str, ...] = ()
     """What could not be read or does not belong together, a sentence each."""
     whole: bool = True
     """Whether this is all of a directory, not files that were chosen."""
-    samples: dict[str, dict[str, xr.Dataset]] = field(default_factory=dict)
+    samples: dict[str, dict[str, Results]] = field(default_factory=dict)
     """Where several samples are all that there is, each with its run times, by the name of its file; `files` has the first."""
 
-    def get(self, kind: str) -> xr.Dataset | None:
+    def get(self, kind: str) -> Results | None:
         """The dataset of a kind, or None."""
         return self.files.get(kind)
 
     @property
-    def response(self) -> xr.Dataset | None:
+    def response(self) -> Results | None:
         """The response of the baseline design, else the first; None if there is none."""
         return self.responses.get("original", next(iter(self.responses.values()), None))
 
@@ -65,10 +64,10 @@ def read(*places: str | Path) -> Content:
     chosen = [Path(place) for place in places]
     whole = len(chosen) == 1 and not chosen[0].is_file()
     place = chosen[0] if whole else chosen[0].parent
-    files: dict[str, xr.Dataset] = {}
+    files: dict[str, Results] = {}
     names: dict[str, str] = {}
-    responses: dict[str, xr.Dataset] = {}
-    several: dict[str, dict[str, xr.Dataset]] = {}
+    responses: dict[str, Results] = {}
+    several: dict[str, dict[str, Results]] = {}
     troubles: list[str] = []
     others: list[str] = []
     found = dataset.each_in(place) if whole else ((one, dataset.read(one)) for one in chosen)
@@ -104,7 +103,7 @@ def read(*places: str | Path) -> Content:
     return Content(place, files, names, responses, every, whole, samples)
 
 
-def _strangers(files: dict[str, xr.Dataset]) -> list[str]:
+def _strangers(files: dict[str, Results]) -> list[str]:
     """Files that were made from different scenes."""
     hashes = {str(one.attrs["scene_hash"]) for one in files.values() if "scene_hash" in one.attrs}
     if len(hashes) > 1:

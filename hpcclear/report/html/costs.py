@@ -1,7 +1,6 @@
 """The section of the page on accuracy against run time (kind ``accuracy``)."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.report import targets
 from hpcclear.report.figures import accuracy as figures
@@ -9,6 +8,7 @@ from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, folded
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
@@ -43,7 +43,7 @@ def accuracy(content: Content) -> list[object] | None:
     ]
 
 
-def _cheapest(found: xr.Dataset) -> list[list[object]]:
+def _cheapest(found: Results) -> list[list[object]]:
     here = found.sel(quantity="objective")
     error, seconds = here["error"].to_numpy(), here["seconds"].to_numpy()
     rows: list[list[object]] = []
@@ -66,7 +66,7 @@ def _cheapest(found: xr.Dataset) -> list[list[object]]:
     return rows
 
 
-def _steady(found: xr.Dataset) -> list[list[object]]:
+def _steady(found: Results) -> list[list[object]]:
     rows: list[list[object]] = []
     for aim in found["aim"].to_numpy():
         one = found.sel(aim=aim)
@@ -77,12 +77,12 @@ def _steady(found: xr.Dataset) -> list[list[object]]:
     return rows
 
 
-def _averaging(found: xr.Dataset) -> list[list[object]]:
+def _averaging(found: Results) -> list[list[object]]:
     error = found["averaging_error"]
     rows: list[list[object]] = []
     for place in (0, -1):
         one = error.isel(transient=-1, averaged=place)
-        count = int(one["averaged"])
+        count = int(found["averaged"][place])
         cost = count * float(found["turn_seconds"])
         rows.append([f"average over {count} revolutions", *_cells(float(one), cost)])
     rows.append(
@@ -95,7 +95,7 @@ def _averaging(found: xr.Dataset) -> list[list[object]]:
     return rows
 
 
-def _surrogates(found: xr.Dataset) -> list[list[object]]:
+def _surrogates(found: Results) -> list[list[object]]:
     each = float(found["sample_seconds"])
     rows: list[list[object]] = []
     for name in found["surrogate"].to_numpy():
@@ -105,7 +105,7 @@ def _surrogates(found: xr.Dataset) -> list[list[object]]:
     return rows
 
 
-def _moments(found: xr.Dataset) -> list[list[object]]:
+def _moments(found: Results) -> list[list[object]]:
     rows: list[list[object]] = []
     for moment in found["moment"].to_numpy():
         for estimate in found["estimate"].to_numpy():

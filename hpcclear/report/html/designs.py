@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import ORDINALS
 from hpcclear.report import alike, beside
@@ -13,6 +12,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, number, quantity
 from hpcclear.report.merit import is_plain
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 
 SIMULATED = (
     ("mean_true", "mean of f"),
@@ -69,7 +69,7 @@ def designs(content: Content) -> dict[str, object] | None:
     }
 
 
-def _variables(verified: xr.Dataset) -> str:
+def _variables(verified: Results) -> str:
     """What the design variables are: "m2: mass of the rod; ..."."""
     known = [
         (str(labels.words(v)), str(v.attrs.get("long_name", "")))
@@ -79,12 +79,12 @@ def _variables(verified: xr.Dataset) -> str:
     return "; ".join(f"{name}: {words}" for name, words in known if words and words != name)
 
 
-def names_in(verified: xr.Dataset) -> list[str]:
+def names_in(verified: Results) -> list[str]:
     """Return the names of all designs."""
     return [str(name) for name in verified["design"].to_numpy()]
 
 
-def _distinct(verified: xr.Dataset, names: Sequence[str]) -> list[str]:
+def _distinct(verified: Results, names: Sequence[str]) -> list[str]:
     """Names without those of designs that an earlier one of the same case has already."""
     kept: list[str] = []
     for name in names:
@@ -94,7 +94,7 @@ def _distinct(verified: xr.Dataset, names: Sequence[str]) -> list[str]:
     return kept
 
 
-def _findings(verified: xr.Dataset) -> list[str]:
+def _findings(verified: Results) -> list[str]:
     """A sentence for the lowest mean and the lowest standard deviation of each case."""
     by_name = {name: verified.sel(design=name) for name in names_in(verified)}
     words = []
@@ -115,7 +115,7 @@ def _findings(verified: xr.Dataset) -> list[str]:
     return words
 
 
-def _within_intervals(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: str) -> str:
+def _within_intervals(by_name: Mapping[str, Results], one: Results, what: str) -> str:
     """A restriction, where another design of the case has a lower value that is statistically indistinguishable."""
     case = str(one["case"].item()) if "case" in one else ""
     rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
@@ -124,7 +124,7 @@ def _within_intervals(by_name: Mapping[str, xr.Dataset], one: xr.Dataset, what: 
 
 
 def table_of(
-    verified: xr.Dataset,
+    verified: Results,
     shown: Mapping[str, str],
     columns: Sequence[tuple[str, str]],
     caption: str,
@@ -151,11 +151,11 @@ def table_of(
     return Table(header, rows, caption)
 
 
-def _objectives(verified: xr.Dataset) -> list[str]:
+def _objectives(verified: Results) -> list[str]:
     return [name for name in ORDINALS if f"{name}_goal" in verified]
 
 
-def _goals(one: xr.Dataset, names: Sequence[str]) -> list[object]:
+def _goals(one: Results, names: Sequence[str]) -> list[object]:
     """Cells of objectives and constraints of a case, where these are not mean and standard deviation alone."""
     if not names:
         return []
@@ -167,7 +167,7 @@ def _goals(one: xr.Dataset, names: Sequence[str]) -> list[object]:
     return [*cells, "; ".join(worded(one)) or "none"]
 
 
-def _cell(one: xr.Dataset, name: str, scale: labels.Scale) -> str:
+def _cell(one: Results, name: str, scale: labels.Scale) -> str:
     """A value, if it was simulated with the half-width of its confidence interval."""
     value, word = float(one[name]) * scale.factor, name.removesuffix("_true")
     if f"{word}_lower" not in one or f"{word}_upper" not in one:

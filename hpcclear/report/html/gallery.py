@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
@@ -14,6 +13,7 @@ from hpcclear.report.figures import catalogue, designs, labels, motion, response
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
 from hpcclear.report.parts import FigureOf, SectionOf, declared
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,12 +52,12 @@ def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
             yield about, functools.partial(picture, one.draw, found[name], about)
 
 
-def _comparison(found: Mapping[str, xr.Dataset]) -> dict[str, str]:
+def _comparison(found: Mapping[str, Results]) -> dict[str, str]:
     caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
     return _shown(designs.comparison_figure(found), caption)
 
 
-def _response_alone(found: xr.Dataset) -> dict[str, str]:
+def _response_alone(found: Results) -> dict[str, str]:
     caption = f"Response over two revolutions{_clearances(found)}."
     return _shown(response.response_figure(found), caption)
 
@@ -68,7 +68,7 @@ def _shown(figure: "Figure", caption: str) -> dict[str, str]:
     return {"png": picture, "caption": caption}
 
 
-def _clearances(*responses: xr.Dataset) -> str:
+def _clearances(*responses: Results) -> str:
     """At which clearances these were simulated, where that is the same for all."""
     parts = []
     for joint, name in enumerate(motion.joints(responses[0]).values()):
@@ -80,7 +80,7 @@ def _clearances(*responses: xr.Dataset) -> str:
 
 
 def picture(
-    draw: "Callable[[xr.Dataset], Figure]", found: xr.Dataset, caption: str
+    draw: "Callable[[Results], Figure]", found: Results, caption: str
 ) -> dict[str, str] | None:
     """Draw a figure of one file with its caption; None if the file has not what it needs (no Sobol indices, say)."""
     return _tried(functools.partial(draw, found), caption)

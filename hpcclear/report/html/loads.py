@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import xarray as xr
-
 from hpcclear.base.outcome import Status
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels
@@ -11,6 +9,7 @@ from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, quantity
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 
 _NO_ANGLE = "A dash instead of an angle: the peak lies between two stored instants, and the stored force there is lower."
 
@@ -101,7 +100,7 @@ def _row(name: str, one: bearings.Bearing) -> list[object]:
     ]  # fmt: skip
 
 
-def _whole(name: str, found: xr.Dataset) -> list[object]:
+def _whole(name: str, found: Results) -> list[object]:
     drive = bearings.torque(found)
     half_width = found["objective_limit" if "regime" in found else "objective_uncertainty"]
     f, unit = float(found["objective"]), str(found["objective"].attrs["units"])

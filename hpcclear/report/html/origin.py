@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels
@@ -12,6 +11,7 @@ from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, folded, number, preformatted
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 from hpcclear.scene.loading import parse
 from hpcclear.scene.paths import quantities
 
@@ -61,7 +61,7 @@ def timing(content: Content) -> list[object] | None:
         return None
     rows: list[list[object]] = []
     for k, rank in enumerate(found["rank"].to_numpy()):
-        spent = [float(found[name].isel(rank=k).sum()) for name in _PARTS]
+        spent = [float(np.sum(found[name][k])) for name in _PARTS]
         share = spent[0] / sum(spent) if sum(spent) > 0.0 else 0.0
         row: list[object] = [
             f"rank {rank}",
@@ -69,7 +69,7 @@ def timing(content: Content) -> list[object] | None:
             Number(f"{share:.0%}"),
         ]
         if "samples" in found:
-            row.append(Number(int(found["samples"].isel(rank=k).sum())))
+            row.append(Number(int(np.sum(found["samples"][k]))))
         rows.append(row)
     header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
     header += ["samples"] if "samples" in found else []
@@ -83,21 +83,22 @@ def timing(content: Content) -> list[object] | None:
     return [*parts, picture] if picture else parts
 
 
-def _fared(content: Content, found: xr.Dataset) -> list[object]:
+def _fared(content: Content, found: Results) -> list[object]:
     """What the run took, in a sentence or two."""
-    spent = {name: float(found[name].sum()) for name in _PARTS}
+    spent = {name: float(np.sum(found[name])) for name in _PARTS}
     total, count = sum(spent.values()) or 1.0, found.sizes["rank"]
-    wall = float(np.sum([found[name].sum("stage") for name in _PARTS], axis=0).max())
+    wall = float(np.sum([found[name].to_numpy().sum(1) for name in _PARTS], axis=0).max())
     words = (
         f"{count} {'rank' if count == 1 else 'ranks'} worked on it for {number(wall, 3)} s, "
         f"{spent['busy'] / total:.0%} of {'its' if count == 1 else 'their'} time on computing."
     )
     rates = []
-    if "samples" in found and float(found["busy"].sum()) > 0.0:
-        rate = float(found["samples"].sum() / found["busy"].where(found["samples"] > 0).sum())
+    if "samples" in found and float(np.sum(found["busy"])) > 0.0:
+        simulated = found["samples"].to_numpy()
+        rate = float(simulated.sum() / found["busy"][simulated > 0].sum())
         rates.append(f"{number(rate, 3)} samples per second and core")
     if (samples := content.get("samples")) is not None:
-        rates.append(f"{number(float(samples['rhs_evaluations'].sum()), 3)} force evaluations")
+        rates.append(f"{number(float(np.sum(samples['rhs_evaluations'])), 3)} force evaluations")
     return [words, f"{'; '.join(rates).capitalize()}."] if rates else [words]
 
 

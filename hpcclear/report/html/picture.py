@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.objectives import Usual
 from hpcclear.report.figures import labels, motion, moving
@@ -13,6 +12,7 @@ from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
 from hpcclear.report.merit import goals_of, leading_goals, recommended, usual_of
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 
 _LEGEND = {
     "design": "simulated",
@@ -63,7 +63,7 @@ def front(content: Content) -> dict[str, Any]:
     }
 
 
-def _leading(fronts: xr.Dataset | None, verified: xr.Dataset | None) -> Sequence[str]:
+def _leading(fronts: Results | None, verified: Results | None) -> Sequence[str]:
     """The first two objectives of the case that the answer is about, else of the first case; mean and standard deviation by
     default."""
     asked = leading_goals(verified) if verified is not None else []
@@ -105,7 +105,7 @@ Goal = tuple[str, float] | tuple[str, float, float, float]
 """Unit and value of an objective, and the ends of its confidence interval where that is known."""
 
 
-def _usual(one: xr.Dataset, ending: str) -> dict[str, Goal]:
+def _usual(one: Results, ending: str) -> dict[str, Goal]:
     """Mean and standard deviation of f, which every design has, by their words."""
     return {
         words: (
@@ -117,7 +117,7 @@ def _usual(one: xr.Dataset, ending: str) -> dict[str, Goal]:
     }
 
 
-def _ends(one: xr.Dataset, name: str, ending: str = "_true") -> tuple[()] | tuple[float, float]:
+def _ends(one: Results, name: str, ending: str = "_true") -> tuple[()] | tuple[float, float]:
     """Ends of the confidence interval of a simulated value; nothing where they are not known."""
     if ending != "_true" or f"{name}_lower" not in one:
         return ()
@@ -125,12 +125,12 @@ def _ends(one: xr.Dataset, name: str, ending: str = "_true") -> tuple[()] | tupl
     return ends if np.isfinite(np.array(ends)).all() else ()
 
 
-def _searched(one: xr.Dataset) -> dict[str, Goal]:
+def _searched(one: Results) -> dict[str, Goal]:
     """What the case of a solution makes small, by the surrogate: unit and value by its words."""
     return {words: (unit or "1", float(one[name])) for name, (words, unit) in searched(one).items()}
 
 
-def _verified(one: xr.Dataset) -> dict[str, Goal]:
+def _verified(one: Results) -> dict[str, Goal]:
     """The same of a design, by simulation."""
     return {
         str(one[f"{name}_goal"].item()): (
@@ -142,7 +142,7 @@ def _verified(one: xr.Dataset) -> dict[str, Goal]:
     }
 
 
-def _solutions(fronts: xr.Dataset, verified: xr.Dataset | None) -> list[dict[str, Any]]:
+def _solutions(fronts: Results, verified: Results | None) -> list[dict[str, Any]]:
     """The swarm's solutions by the surrogate, each with its direct simulation where there is one."""
     found = []
     variables = labels.design_variables(fronts)
@@ -166,9 +166,7 @@ def _solutions(fronts: xr.Dataset, verified: xr.Dataset | None) -> list[dict[str
     return found
 
 
-def _same(
-    one: xr.Dataset, verified: xr.Dataset | None, case: str, names: list[str]
-) -> xr.Dataset | None:
+def _same(one: Results, verified: Results | None, case: str, names: list[str]) -> Results | None:
     """The verified design of the same case and values."""
     if verified is None or not set(names) <= set(map(str, verified.data_vars)):
         return None
@@ -181,7 +179,7 @@ def _same(
     return None if found.size == 0 else verified.isel(design=int(found[0]))
 
 
-def _design(one: xr.Dataset) -> dict[str, Any]:
+def _design(one: Results) -> dict[str, Any]:
     """A design that was simulated directly."""
     name = str(one["design"].item())
     is_original = name.rpartition(" ")[2] == "original"
@@ -200,20 +198,20 @@ def _design(one: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _values(one: xr.Dataset) -> list[list[str]]:
+def _values(one: Results) -> list[list[str]]:
     """Design variables with units; those the case does not have are left out."""
     rows = [(labels.words(v), labels.value(v)) for v in labels.design_variables(one)]
     return [[name, str(value)] for name, value in rows if value != "–"]
 
 
-def _moments(one: xr.Dataset, mean: str, deviation: str) -> list[list[str]]:
+def _moments(one: Results, mean: str, deviation: str) -> list[list[str]]:
     return [
         [_WORDS[word], str(quantity(float(one[name]), str(one[name].attrs["units"])))]
         for word, name in (("mean", mean), ("deviation", deviation))
     ]
 
 
-def _direct(one: xr.Dataset) -> list[list[str]]:
+def _direct(one: Results) -> list[list[str]]:
     """Simulated moments with confidence intervals, surrogate errors, counts, and the values that the paper prints."""
     rows = []
     for word in ("mean", "deviation"):
@@ -241,7 +239,7 @@ def _direct(one: xr.Dataset) -> list[list[str]]:
     return rows
 
 
-def series(response: xr.Dataset, most: int = 720) -> list[dict[str, Any]]:
+def series(response: Results, most: int = 720) -> list[dict[str, Any]]:
     """Curves of the last two revolutions: turns of the drive from 0, values in readable units."""
     shown = motion.latest(response, 2)
     every = max(1, shown.sizes["time"] // most)
@@ -262,7 +260,7 @@ def series(response: xr.Dataset, most: int = 720) -> list[dict[str, Any]]:
     return found
 
 
-def frames(response: xr.Dataset) -> dict[str, Any]:
+def frames(response: Results) -> dict[str, Any]:
     """The mechanism in motion over the last two revolutions: bodies by their points, joints by theirs."""
     shown = motion.latest(response, 2)
     every = max(1, int(shown.sizes["time"] / max(motion.whole_turns(shown), 1) / FRAMES))

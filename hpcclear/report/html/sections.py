@@ -1,7 +1,6 @@
 """Sections of the page on samples, findings and data quality, made from what there is; None where nothing is."""
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
@@ -10,6 +9,7 @@ from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, quantity
 from hpcclear.report.parts import SectionOf
+from hpcclear.results.content import Results
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.statistics.random.survival import order_interval, quantiles
 
@@ -33,7 +33,7 @@ def _lives_words(content: Content) -> list[str]:
         return []
     last = lives.isel(cycle=-1)
     cycles, failed = float(last["cycle"]), int((~np.isin(lives["ending"], LIVED)).sum())
-    early = int((lives["ended"] < cycles).sum()) - failed
+    early = int((lives["ended"].to_numpy() < cycles).sum()) - failed
     words = [
         f"{lives.sizes['life']} service lives of {'up to ' if early > 0 else ''}{cycles:.4g} revolutions were simulated; "
         f"{_failures(failed)}."
@@ -66,12 +66,13 @@ def _samples_words(content: Content) -> list[str]:
     samples = content.get("samples")
     if samples is None:
         return []
-    count, failed = samples.sizes["sample"], int((samples["status"] != 0).sum())
+    count, failed = samples.sizes["sample"], int(np.count_nonzero(samples["status"]))
     names = ", ".join(labels.words(v) for v in labels.design_variables(samples))
     words = [f"{count} simulations, varying {names}; {_failures(failed)}."]
     f = samples["objective"]
-    if bool(f.notnull().any()):
-        low, high = (str(quantity(float(end), str(f.attrs["units"]))) for end in (f.min(), f.max()))
+    if not np.isnan(f).all():
+        ends = float(np.nanmin(f)), float(np.nanmax(f))
+        low, high = (str(quantity(end, str(f.attrs["units"]))) for end in ends)
         words.append(
             f"The objective f, {labels.objective(samples)}, lies between {low} and {high}."
         )
@@ -91,7 +92,7 @@ def _facts(content: Content) -> list[tuple[str, object]]:
     """Numbers of samples and designs as tiles."""
     facts: list[tuple[str, object]] = []
     if (samples := content.get("samples")) is not None:
-        failed = int((samples["status"] != 0).sum())
+        failed = int(np.count_nonzero(samples["status"]))
         facts += [("samples", samples.sizes["sample"]), ("failed", failed)]
     if (verified := content.get("verification")) is not None:
         facts.append(("designs simulated with confidence intervals", verified.sizes["design"]))
@@ -135,7 +136,7 @@ def compared(content: Content) -> list[object]:
     return [words, Table(["quantity", *content.samples], rows, caption)]
 
 
-def _thresholds(samples: xr.Dataset) -> list[spread.Beyond]:
+def _thresholds(samples: Results) -> list[spread.Beyond]:
     """Values of f that the cases of the study keep below, or whose exceedance they make small."""
     try:
         study = scene_of_text(str(samples.attrs.get("scene", "")), "scene").study

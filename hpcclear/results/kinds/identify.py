@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from hpcclear.results.content import Results
 from hpcclear.results.rows import count, flag, kind_of, number, text
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 KIND = kind_of(
     160, "Unknowns of a machine from measured signals", ("unknown",),
@@ -52,12 +53,11 @@ KIND = kind_of(
 OF_UNKNOWNS = ("prior_lower", "prior_upper", "interval", "expected_half_width", "rate")
 
 
-def with_units(content: xr.Dataset, units: Sequence[str]) -> xr.Dataset:
-    """Return a dataset with the common unit of its unknowns; with none where they differ, as ``unit`` has them."""
-    found = content.copy()
+def with_units(content: Results, units: Sequence[str]) -> Results:
+    """Return results with the common unit of its unknowns; with none where they differ, as ``unit`` has them."""
     common = units[0] if len(set(units)) == 1 else "1"
     for name in OF_UNKNOWNS:
-        if name in found:
+        if name in content:
             unit = common if name != "rate" else "1/s" if common == "1" else f"{common}/s"
-            found[name] = found[name].assign_attrs(units=unit)
-    return found
+            content[name].attrs["units"] = unit
+    return content

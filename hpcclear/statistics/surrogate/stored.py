@@ -1,9 +1,9 @@
 """Surrogates as they stand in a dataset of kind ``kriging``, a row for each subinterval's model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-import xarray as xr
+from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate import kriging, regression
@@ -55,8 +55,8 @@ def rows_of(leaves: Sequence[Leaf], parameters: Sequence[str]) -> dict[str, np.n
     return data
 
 
-def models_in(content: xr.Dataset) -> dict[str, Piecewise]:
-    """The models by their inputs ("m2 m3 u2 I2_ratio C").
+def models_in(columns: Mapping[str, ArrayLike]) -> dict[str, Piecewise]:
+    """The models of the variables of a file, by their inputs ("m2 m3 u2 I2_ratio C").
 
     Kriging models are ready to predict; others have their training points, and what stands in the file of their predictions.
 
@@ -65,39 +65,47 @@ def models_in(content: xr.Dataset) -> dict[str, Piecewise]:
     InputError
         The rows are no models, or do not fit together.
     """
+    arrays = {name: np.asarray(one) for name, one in columns.items()}
     found: dict[str, list[int]] = {}
-    for row, family in enumerate(content["family"].to_numpy()):
+    for row, family in enumerate(arrays["family"]):
         found.setdefault(str(family), []).append(row)
-    return {family: _family(content, family, rows) for family, rows in found.items()}
+    return {family: _family(arrays, family, rows) for family, rows in found.items()}
 
 
-def _family(content: xr.Dataset, family: str, rows: Sequence[int]) -> Piecewise:
-    names = family.split(" ")
-    part = content.isel(model=list(rows))
-    return Piecewise(
-        tuple(_leaf(content.isel(model=row), family, names) for row in rows),
-        part["r2"].to_numpy(),
-        part["rmae"].to_numpy(),
-        part["accepted"].to_numpy().astype(bool),
+def _family(arrays: Mapping[str, np.ndarray], family: str, rows: list[int]) -> Piecewise:
+    known = arrays["parameter"].tolist()
+    if not set(family.split(" ")) <= set(known):
+        raise _unfit(family)
+    leaves = tuple(
+        _leaf({name: one[row] for name, one in arrays.items() if len(one) > row}, family, known)
+        for row in rows
     )
+    r2, rmae, accepted = (arrays[name][rows] for name in ("r2", "rmae", "accepted"))
+    return Piecewise(leaves, r2, rmae, accepted.astype(bool))
 
 
-def _leaf(one: xr.Dataset, family: str, names: Sequence[str]) -> Leaf:
-    foreign = "surrogate" in one
+def _unfit(family: str) -> InputError:
+    return InputError("file", family, "the models do not fit together", "Use it as written")
+
+
+def _leaf(one: Mapping[str, np.ndarray], family: str, known: list[str]) -> Leaf:
+    """The model of a row; `known`: names along the dimension of the parameters."""
+    foreign, names = "surrogate" in one, family.split(" ")
     columns = regression.COLUMNS if foreign else {**kriging.COLUMNS, "kernel": ("", "kernel")}
-    size, held = int(one["points"]), {"kernel"} | set(map(str, one.variables))
-    if not set(names) <= set(one["parameter"].to_numpy().tolist()) or set(columns) - held:
-        raise InputError("file", family, "the models do not fit together", "Use it as written")
+    size, places = int(one["points"]), [known.index(name) for name in names]
+    if set(columns) - {"kernel", *one}:
+        raise _unfit(family)
     arrays = {
         "names": np.array(names),
         "lower": np.array([float(one[f"{name}_lower"]) for name in names]),
         "upper": np.array([float(one[f"{name}_upper"]) for name in names]),
-        "inputs": np.column_stack([one[name].to_numpy()[:size] for name in names]),
-        "values": one["training_output"].to_numpy()[:size],
+        "inputs": np.column_stack([one[name][:size] for name in names]),
+        "values": one["training_output"][:size],
         "kernel": np.array(SQUARED_EXPONENTIAL),  # unless the file has another
     }
     for name, (dim, attribute) in columns.items():
         if name in one:
-            column = one[name].sel(parameter=names) if dim == "parameter" else one[name]
-            arrays[attribute] = column.to_numpy()[:size] if dim == "point" else column.to_numpy()
+            value = np.asarray(one[name])
+            within: dict[str, slice | list[int]] = {"point": slice(size), "parameter": places}
+            arrays[attribute] = value[within[dim]] if dim else value
     return regression.restored(arrays) if foreign else Kriging.from_arrays(arrays)

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS, Status
@@ -19,6 +18,7 @@ from hpcclear.ensemble.samples import sample_points
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.ranks.progress import Progress
 from hpcclear.results import dataset
+from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.stages import REPLICATES
@@ -188,7 +188,7 @@ def _moments(values: Array) -> tuple[float, ...]:
     return mean.value, mean.error, deviation.value, deviation.error, failed
 
 
-def _mean_over_steps(scene: Scene, response: xr.Dataset) -> Array:
+def _mean_over_steps(scene: Scene, response: Results) -> Array:
     """f of one sample, the mean of eq. 13 taken over the accepted steps; NaN if it failed."""
     if int(response["status"]) != Status.OK:
         return np.array(np.nan)
