@@ -17,9 +17,9 @@ from jsonschema import Draft202012Validator
 from patience import crowded
 from pydantic import ValidationError
 
+from hpcclear.base import units as scene_units
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene, differences, load_scene, scene_schema
-from hpcclear.scene import units as scene_units
 from hpcclear.scene.fields import Table
 from hpcclear.scene.paths import flatten, replace
 
