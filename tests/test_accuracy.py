@@ -288,7 +288,7 @@ def test_clearances_that_differ_are_varied_apart():
 
 @pytest.fixture(scope="module")
 def measured():
-    return measure(TWIN, alone(), TINY)
+    return measure(TWIN, alone(), TINY).to_xarray()
 
 
 def test_everything_is_in_one_file_that_reads_back(measured, tmp_path):
