@@ -355,7 +355,7 @@ FORGERIES = (
     ("front", "mean", 1e308),
     ("verification", "mean_true_lower", np.nan),
     ("verification", "mean_true", -1e308),
-    ("claims", "verdict", "x"),
+    ("claims", "verdict", 99),
     ("timing", "busy", -1e308),
     ("responses/original", "eccentricity_y", -np.inf),
     ("responses/original", "time", 1e300),
