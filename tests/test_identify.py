@@ -267,7 +267,7 @@ def test_two_clearances_that_only_their_sum_decides_are_not_identified_separatel
     together = next(line.text for line in lines(content) if line.label == "together")
     found_sum = re.search(r"only (0\.\d+) crank_rod \+ (0\.\d+) rod_slider = (\d+) µm", together)
     assert [float(one) for one in found_sum.groups()] == pytest.approx([0.5, 0.5, 80.0], rel=0.15)
-    widths = np.ptp(content["interval"][0].values, axis=1)
+    widths = np.ptp(content["interval"].to_numpy()[0], axis=1)
     assert (widths > 3e-5).all()  # each is open, though their mean is known
     each = content["posterior"][0, :, :2]
     assert float(each.mean("input").std()) < 0.3 * float(each.std("particle").min())

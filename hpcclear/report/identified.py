@@ -73,7 +73,7 @@ def _together(content: Results, record: int) -> str:
     text = f"not identified separately (correlation {related:.2f})"
     if len(units) > 1:
         return text
-    places = content["posterior"][record, :, : len(names)].to_numpy()
+    places = content["posterior"].to_numpy()[record, :, : len(names)]
     weights = np.linalg.eigh(np.cov(places.T))[1][:, 0]  # the direction of the least variance
     weights = weights / np.abs(weights).sum() * np.sign(weights[np.argmax(np.abs(weights))])
     low, middle, high = np.quantile(places @ weights, (0.025, 0.5, 0.975))
@@ -137,7 +137,7 @@ def _advice(content: Results) -> list[Line]:
         parts = []
         for u, unknown in enumerate(content["unknown"].to_numpy()):
             unit = str(content["unit"].to_numpy()[u])
-            widths = content["expected_half_width"][k, :, u].to_numpy()
+            widths = content["expected_half_width"].to_numpy()[k, :, u]
             shown = ", ".join(
                 f"{rounded(float(width), unit)} ({count})"
                 for width, count in zip(widths, counts, strict=True)

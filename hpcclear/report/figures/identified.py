@@ -41,12 +41,12 @@ def posterior_figure(content: Results) -> "Figure":
         edges = np.linspace(low, high, BINS + 1)
         for k, record in enumerate(content["record"].to_numpy()):
             colour = style.CYCLE[k % len(style.CYCLE)]
-            values = content["posterior"][k, :, u].to_numpy()
+            values = content["posterior"].to_numpy()[k, :, u]
             density = np.histogram(values, edges)[0] / (len(values) * np.diff(edges) * scale.factor)
             panel.stairs(
                 density, edges * scale.factor, color=colour, label=labels.literal(str(record))
             )
-            ends = content["interval"][k, u].to_numpy() * scale.factor
+            ends = content["interval"].to_numpy()[k, u] * scale.factor
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
         panel.set_xlabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
@@ -107,7 +107,7 @@ def growth_figure(content: Results) -> "Figure":
     for u, panel in enumerate(axes[:, 0]):
         unit = str(content["unit"].to_numpy()[u])
         good = content["explained"].to_numpy() != 0
-        low, middle, high = (content["interval"][:, u, k].to_numpy() for k in range(3))
+        low, middle, high = (content["interval"].to_numpy()[:, u, k] for k in range(3))
         scale = labels.scale(unit, high)
         panel.errorbar(
             days, scale.factor * middle, scale.factor * np.array([middle - low, high - middle]), fmt="o",
