@@ -9,12 +9,12 @@ import click
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.cli.options import PATH, TRUST, Amount, command, place_of, say, show
 from hpcclear.ranks.stopping import Exit
-from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hpcclear.report.html.content import Content
+    from hpcclear.results.content import Results
 
 
 @command("look", "Draw figures and films of results.")
