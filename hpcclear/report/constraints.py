@@ -22,8 +22,14 @@ OPEN = "the integration tolerance leaves it open"
 
 
 def verdict_of(one: Results) -> Verdict | None:
-    """Return the verdict on all constraints of a design (of kind ``verification``); None if its case has none."""
-    codes = one["constraint_verdict"].to_numpy() if "constraint_verdict" in one else np.array([])
+    """Return the verdict on all constraints of a design (of kind ``verification``); None if its case has none.
+
+    Constraints in words alone, without codes, are not known to be satisfied.
+    """
+    if "constraint_verdict" not in one:
+        told = "constraints" in one and str(one["constraints"].to_numpy())
+        return Verdict.UNDECIDED if told else None
+    codes = one["constraint_verdict"].to_numpy()
     found = codes[codes != ABSENT].tolist()
     return together(found) if found else None
 
