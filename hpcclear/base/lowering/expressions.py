@@ -130,10 +130,6 @@ class Expressions:
         if op in _ARITHMETIC:
             if kind == WHOLE:
                 return getattr(b, _ARITHMETIC[op])(one, other)
-            products = [getattr(number, "opname", "") == "fmul" for number in (one, other)]
-            if op in (ast.Add, ast.Sub) and all(products):
-                # which of them is rounded by itself must not hang on what stands around
-                other.flags[:] = ["nsz"]
             return getattr(b, f"f{_ARITHMETIC[op]}")(one, other)
         if op is ast.Pow:
             return self.intrinsic("llvm.pow", [self.cast(one, DOUBLE), self.cast(other, DOUBLE)])
