@@ -14,6 +14,9 @@ from hpcclear.ranks.team import FLUSH_INTERVAL
 UNSAVED = "readings: simulations"
 """The stage whose samples are kept a reading at a time."""
 
+COMPILING = "compilation#"
+"""Beginning of the name of a design that is simulated at each start, so that every rank has its kernel."""
+
 RESPONSES = ("bifurcation#", "ensemble#")
 """Beginnings of the names of single responses, which are kept as a stage that is written again each time."""
 
@@ -34,7 +37,10 @@ class Event:
 def read(log: Path) -> list[Event]:
     """Events of one run; those of a rank in their order."""
     lines = [line.split("\t") for line in log.read_text().splitlines()] if log.exists() else []
-    return [Event(float(t), int(rank), what, frozenset(rest)) for t, rank, what, *rest in lines]
+    return [
+        Event(float(t), int(rank), what, frozenset(n for n in rest if not n.startswith(COMPILING)))
+        for t, rank, what, *rest in lines
+    ]
 
 
 def samples(events: list[Event], what: str) -> set[str]:

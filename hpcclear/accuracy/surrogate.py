@@ -106,17 +106,24 @@ def measure(
 def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
     """Simulate one design on the available ranks: every rank compiles the kernel, or loads it."""
     region = region_of(scene, case)
-    simulated(scene, region, 0.5 * (region.lower + region.upper)[None], ranks)
+    middle = 0.5 * (region.lower + region.upper)[None]
+    simulated(scene, region, middle, ranks, "compilation")
 
 
-def simulated(scene: Scene, region: Box, coordinates: Array, ranks: Ranks) -> tuple[Array, float]:
+def simulated(
+    scene: Scene,
+    region: Box,
+    coordinates: Array,
+    ranks: Ranks,
+    stage: str = "surrogate: simulations",
+) -> tuple[Array, float]:
     """The study's objective, shape (n,), SI, NaN where failed, at points in sampling coordinates, shape (n, d).
 
     With the core-seconds of one of them.
     """
     paths = tuple(scene.required_study.variable(name).paths for name in region.names)
     points = Points(region.names, to_physical(scene, region.names, coordinates), paths)
-    return objectives(scene, points, ranks, "surrogate: simulations")
+    return objectives(scene, points, ranks, stage)
 
 
 def objectives(scene: Scene, points: Points, ranks: Ranks, stage: str) -> tuple[Array, float]:
