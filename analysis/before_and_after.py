@@ -2,12 +2,15 @@
 
     python analysis/before_and_after.py 1386e2f                 # that commit against this checkout, about ten minutes
     python analysis/before_and_after.py 1386e2f --pairs 15 --designs 512
+    python analysis/before_and_after.py 1386e2f --record        # writes results/before_and_after.csv beside this file
 
 Each source has one process, which compiles first and is not timed then; processor time of `evaluate` counts. A line per scene
 says the median of the ratios, new over old, and their lower and upper quarter.
 """
 
 import argparse
+import csv
+import datetime
 import os
 import subprocess
 import sys
@@ -18,6 +21,10 @@ from pathlib import Path
 import numpy as np
 from same_bytes import ROOT, sources
 
+from hpcclear.base.host import processor
+
+RESULTS = ROOT / "analysis" / "results" / "before_and_after.csv"
+HEAD = ["scene", "pairs", "before_s", "ratio", "lower_quarter", "upper_quarter", "before", "processor", "date"]  # fmt: skip
 LINKAGES = "linkages/"
 CASES = {
     "Lankarani-Nikravesh": ("slider_crank", {"C": (3e-4, 1e-3)}),
@@ -76,6 +83,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=7)
     parser.add_argument("--designs", type=int, default=256)
     parser.add_argument("--only", help="cases whose names contain this")
+    parser.add_argument("--record", action="store_true", help=f"write {RESULTS.name}")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     words = parser.parse_args()
     if words.worker:
@@ -83,6 +91,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         old = Worker(sources(words.commit, Path(place) / "before"), words.designs)
         new = Worker(ROOT, words.designs)
+        rows, run = [HEAD], [words.commit or "HEAD", processor(), f"{datetime.date.today()}"]
         print(f"{'scene':24s} {'before, s':>10s} {'ratio':>7s} {'quarters':>14s}")
         for case in (one for one in CASES if (words.only or "") in one):
             old.seconds(case), new.seconds(case)  # compile
@@ -93,6 +102,11 @@ def main() -> None:
                 f"{case:24s} {np.median(before):10.3f} {middle:7.3f} {low:7.3f}-{high:.3f}",
                 flush=True,
             )
+            found = [f"{np.median(before):.3f}", *(f"{x:.3f}" for x in (middle, low, high))]
+            rows.append([case, f"{words.pairs}", *found, *run])
+    if words.record:
+        with RESULTS.open("w", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
 
 
 if __name__ == "__main__":
