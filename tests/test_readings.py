@@ -4,8 +4,10 @@ import itertools
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import SCENE
+from pydantic_core import PydanticCustomError
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.unit_names import OTHERS, REFUSED, UNITS
@@ -13,7 +15,9 @@ from hpcclear.base.units import UnitError, to_si
 from hpcclear.ensemble.maps import axis
 from hpcclear.identify.inputs import Unknown
 from hpcclear.scene import load_scene
+from hpcclear.scene.fields import CurveOf, MotionTable, Quantity
 from hpcclear.scene.paths import PHYSICAL, _entries_of_kinds, of_kinds, quantities
+from hpcclear.scene.piecewise import Piecewise, by_time
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.table import read_points
 from hpcclear.scene.variables import Variable
@@ -40,6 +44,7 @@ PLAIN = {
 MENDED = {
     "1,234.5": "1234.5", "1.234,5": "1234.5", "3,000,000": "3000000", "3.000.000": "3000000", "1'234.5": "1234.5",
     "5 000": "5000", "1,234,567.25": "1234567.25", "0,3": "0.3", "0,300": "0.300", "12,34": "12.34", "1,5e3": "1.5e3",
+    "3_000": "3000",
 }  # fmt: skip
 """Numbers that are refused, and how to write them."""
 
@@ -92,6 +97,36 @@ def test_every_place_names_both_readings(number, tmp_path):
     table = tmp_path / "points.csv"
     table.write_text(f"C;drive.speed\n0.0003;{text}\n", encoding="utf-8")
     both(read_points, table, scene)
+
+
+TABLES = {
+    "time": (by_time("N"), "s"), "angle": (CurveOf("N"), "rad"), "motion": (MotionTable(), "s"),
+    "distance": (Piecewise("m", "N"), "m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_one_number_with_decimals_decides_what_the_point_of_a_table_is(kind):
+    """2.0005 s has a decimal point, so 2.001 s of another row has one, and 1.250 N beside it."""
+    table, first = TABLES[kind]
+    second = "rad" if kind == "motion" else "N"
+    for decided, columns in (
+        (True, (["0", "1.250", "2.0005", "2.125"], ["0", "2", "2", "0"])),
+        (True, (["0", "1", "2.5", "3"], ["0", "1.250", "-1.250", "0"])),
+        (True, (["0", ".5", "2.125", "3.375"], ["0", "2", "1", "0"])),
+        (False, (["0", "1.250", "2.125", "3.375"], ["0", "2", "1", "0"])),
+        (False, (["0", "1", "2", "3"], ["0", "-1.125", "1", "0"])),
+        (False, (["0", "1.500e3", "2000", "2001"], ["0", "1.125", "1", "0"])),
+    ):
+        rows = [[f"{x} {first}", f"{y} {second}"] for x, y in zip(*columns, strict=True)]
+        if decided:
+            expected = np.array(columns, dtype=float).T
+            np.testing.assert_allclose(table.convert(rows), expected, rtol=1e-15)
+        else:
+            with pytest.raises(PydanticCustomError, match=r"may be -?[1-3]\.[0-9]{3} "):
+                table.convert(rows)
+    low, high = Quantity("m").range(["0.5 mm", "1.250 mm"], "")
+    assert (low, high) == (0.5e-3, 1.25e-3)
 
 
 # ---- widths in percent ------------------------------------------------------------------------------

@@ -60,7 +60,7 @@ READ = {
     "rad/s": {
         "rpm": RPM, "RPM": RPM, "Rpm": RPM, "r.p.m.": RPM, "rev/min": RPM, "Rev/min": RPM, "rev per min": RPM, "U/min": RPM,
         "r/min": RPM, "tr/min": RPM, "1/min": RPM, "1 / min": RPM, "/min": RPM, "min^-1": RPM, "min-1": RPM, "min⁻¹": RPM,
-        "min**-1": RPM, "min^(-1)": RPM, "min–1": RPM, "UPM": RPM, "rps": 60 * RPM, "rev/s": 60 * RPM, "1/s": 60 * RPM,
+        "min**-1": RPM, "min^(-1)": RPM, "min–1": RPM, "UPM": RPM, "rps": 60 * RPM, "rev/s": 60 * RPM,
         "rad/s": 1.0,
         "rads/s": 1.0, "rad·s⁻¹": 1.0, "rad s-1": 1.0, "deg/s": math.pi / 180, "°/s": math.pi / 180, "krad/s": 1e3,
     },
@@ -82,7 +82,7 @@ ANSWERED = {
     "N*m": {"NM": "N\\*m", "nm": "N\\*m", "ft-lb": "ft-lbf", "lb*in": "lbf\\*in", "Knm": "kN\\*m", "Nm/rad": "Write it in N"},
     "Pa": {"mpa": "'mPa' or 'MPa'", "kg/cm2": "kgf/cm2", "barg": "absolute", "psig": "absolute", "n/mm2": "N/mm"},
     "kg*m**2": {"kgm": "Write it in kg"},
-    "rad/s": {"Hz": "write rpm", "Mhz": "write rpm", "U": "Write it in rad/s"},
+    "rad/s": {"Hz": "write rpm", "Mhz": "write rpm", "1/s": "write rpm", "/h": "write rpm", "U": "Write it in rad/s"},
     "rad": {"Grad": "deg", "r": "turn"},
     "m/s": {"MM/S": "mm/s"},
     "N*s/m": {"Nms": "N\\*m\\*s", "Nm": "Write it in"},
@@ -91,7 +91,10 @@ ANSWERED = {
 
 NUMBERS = {
     "0,3 mm": "0.3 mm", "5 000 mm": "digits", "5\u202f000 mm": "digits", "5'000 mm": "digits", "1.000,5 mm": "digits",
-    "1.2·10^-3 m": "1.2e-3", "1.2x10^-3 m": "1.2e-3", "5² mm": "digits", "1/2 in": "Write a number",
+    "1.2·10^-3 m": "1.2e-3", "1.2x10^-3 m": "1.2e-3", "7·10⁻³ m": "7e-3 m", "0x10 m": "Write a number",
+    "3x10 m": "Write a number", "2,100e-3 m": "2.100e-3 m", "2,100·10^-3 m": "2.100e-3 m", "2,5×10**2 mm": "2.5e2 mm",
+    "1,000,00 m": "between them",
+    "5² mm": "digits", "1/2 in": "Write a number",
     "~3 mm": "Write a number",
     "3..5 mm": "digits", "mm": "Write a number", "3 [mm]": "Write a number", "3 mm)": "Write a number",
     "3 mm mm": "Write it in m",

@@ -25,6 +25,8 @@ BY_TIME = {
     "1/h": 1 / 3600, "h^-1": 1 / 3600, "ms^-1": 1000.0, "1/minute": 1 / 60,
 }  # fmt: skip
 """Turns a second where nothing says what is counted."""
+NAMEPLATE = {unit: turns for unit, turns in BY_TIME.items() if "min" in unit}
+"""Of these, what an angular speed may have: others may be radians."""
 OF_TURNS = {
     "rpm": 1 / 60, "rps": 1.0, "turn/s": 1.0, "turn/min": 1 / 60, "cycle/s": 1.0, "cycle/min": 1 / 60, "revolution/s": 1.0,
     "revolution/min": 1 / 60, "rev/min": 1 / 60, "r/min": 1 / 60, "U/min": 1 / 60, "tr/min": 1 / 60, "turn*s^-1": 1.0,
@@ -60,7 +62,7 @@ EVERY = {**BY_TIME, **OF_TURNS, **IN_HERTZ, **ANGLES}
 def by_hand(unit: str, target: str) -> float | None:
     """One `unit` in the target; None where it has to be refused."""
     if target == "rad/s":
-        turns = {**BY_TIME, **OF_TURNS}.get(unit)
+        turns = {**NAMEPLATE, **OF_TURNS}.get(unit)
         return None if turns is None else TURN * turns
     if target == "Hz":
         return {**BY_TIME, **OF_TURNS, **IN_HERTZ}.get(unit)
@@ -120,7 +122,7 @@ TORQUE = {
 SOME = {"rpm": 1 / 60, "turn/s": 1.0, "deg/s": 1 / 360, "rad/s": 1 / TURN}
 
 
-@pytest.mark.parametrize(("unit", "turns"), [*BY_TIME.items(), *SOME.items()])
+@pytest.mark.parametrize(("unit", "turns"), [*NAMEPLATE.items(), *SOME.items()])
 def test_entries_ranges_distributions_headings_and_axes_read_alike(unit, turns, tmp_path):
     speed = 600.0 * turns * TURN
     low, high = f"600 {unit}", f"900 {unit}"
@@ -140,7 +142,7 @@ def test_entries_ranges_distributions_headings_and_axes_read_alike(unit, turns, 
     assert (row.mean, row.deviation, row.half_width) == pytest.approx(expected, rel=1e-15)
     written = load_scene(JOBS / "quickstart.toml", [f"drive.speed={low}"])
     assert written.number("drive.speed") == scene.number("drive.speed")
-    assert bool(written.readings) == (unit in BY_TIME)
+    assert bool(written.readings) == (unit in NAMEPLATE)
     assert all(text.startswith("drive.speed: ") for text in written.readings)
     torque = scene_with({"drive": {**TORQUE, **{k: low for k in TORQUE if k.endswith("_speed")}}})
     for name in ("initial_speed", "expected_speed", "no_load_speed"):
@@ -150,6 +152,14 @@ def test_entries_ranges_distributions_headings_and_axes_read_alike(unit, turns, 
     assert read_points(table, base).values[:, 0] == pytest.approx([speed, 1.5 * speed], rel=1e-15)
     _, _, values = axis(base, f"drive.speed={low}:{high}:2")
     np.testing.assert_allclose(values, [speed, 1.5 * speed], rtol=1e-15)
+
+
+def test_turns_and_radians_are_not_guessed():
+    """One rule for whatever counts by time without a name: Hz, 1/s, 1/h."""
+    for unit in (*IN_HERTZ, *(BY_TIME.keys() - NAMEPLATE.keys())):
+        with pytest.raises(UnitError) as error:
+            to_si(f"50 {unit}", "rad/s")
+        assert error.value.remedy.startswith(f"{unit} may count turns or radians")
 
 
 @pytest.mark.parametrize(("unit", "turns"), [("1/min", 1 / 60), *SOME.items(), *IN_HERTZ.items()])
@@ -177,7 +187,7 @@ def test_a_rate_takes_no_turns():
             scene_with({"numerics.alpha": f"250 {unit}"})
 
 
-MOTOR = "drive={kind='torque', torque=5.0, initial_speed='60 rpm', expected_speed='20 s^-1', no_load_speed='30 turn/s'}"
+MOTOR = "drive={kind='torque', torque=5.0, initial_speed='60 rpm', expected_speed='1200 min^-1', no_load_speed='30 turn/s'}"
 
 
 @pytest.mark.parametrize(
@@ -187,7 +197,7 @@ MOTOR = "drive={kind='torque', torque=5.0, initial_speed='60 rpm', expected_spee
          ["drive.speed: 600 rpm (62.8319 rad/s)", "'600 min^-1' is read as 600 rpm"]),
         ("slider_crank.toml", [MOTOR],
          ["drive.initial_speed: 60 rpm", "drive.expected_speed: 1200 rpm", "drive.no_load_speed: 1800 rpm",
-          "drive.expected_speed: '20 s^-1'"]),
+          "drive.expected_speed: '1200 min^-1'"]),
         ("linkages/three_rrr.toml", [], ["servo0.frequency: 10 Hz", "servo1.frequency: 20 Hz", "servo2.frequency: 10 Hz"]),
         ("linkages/press.toml", [], ["speed: 300 rpm (31.4159 rad/s)"]),
     ],

@@ -6,7 +6,8 @@ stands in them. `unit_names` has the names.
 
 An angle is a dimension of its own here; plain dimensional analysis takes a turn a second for 6.28 Hz. Three quantities have a
 unit of 1/s, and each entry declares its own: "rad/s" an angular speed, "Hz" a frequency in cycles, "1/s" a rate that counts
-nothing. A turn is a cycle. An angular speed in 1/min means revolutions, as on nameplates, and that reading is noted (`noting`).
+nothing. A turn is a cycle. An angular speed in 1/min means revolutions, as on nameplates, and that reading is noted (`noting`);
+in Hz or 1/s it may be turns or radians, and is refused.
 """
 
 import itertools
@@ -45,15 +46,18 @@ _FOREIGN = str.maketrans(
     | dict.fromkeys("\u200b\u2060\ufeff")
 )
 """Signs that word processors put in place of those of a keyboard; of no width: dropped."""
-_DIGITS = re.compile(r"[+-]?[.,]?[0-9](?:[0-9.,'\u2019\s]*[0-9])?")
+_DIGITS = re.compile(r"[+-]?[.,]?[0-9](?:[0-9.,'\u2019_\s]*[0-9])?")
 _GROUPS = re.compile(
-    r"([+-]?[1-9][0-9]{0,2}(?:([.,'\u2019\s])[0-9]{3})(?:\2[0-9]{3})*)(?:[.,]([0-9]+))?"
+    r"([+-]?[1-9][0-9]{0,2}(?:([.,'\u2019_\s])[0-9]{3})(?:\2[0-9]{3})*)(?:(?!\2)[.,]([0-9]+))?"
 )
-_POWER_OF_TEN = re.compile(r"\s*[xX*·×⋅]\s*10")
+_POWER_OF_TEN = re.compile(
+    r"\s*[xX*·×⋅]\s*10(?:(?:\^|\*\*)\s*\(?\s*([+-]?\d{1,3})\)?|([⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3}))"
+)
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 _LONGEST = 80
 """Characters of a quantity or unit, so that nothing takes long over it."""
 _TURN = Fraction(2 * pi)
+_MINUTES = {"min", "minute", "minutes"}
 
 
 class UnitError(ValueError):
@@ -207,7 +211,7 @@ def _fitting(unit: str, target: str) -> Fraction | None:
         return scale / own
     if target == "Hz" and angle == 1:
         return scale / _TURN
-    if target == "rad/s" and all(one == {"second": 1} for one in names.values()):
+    if target == "rad/s" and names.keys() <= _MINUTES:
         return scale * _TURN
     return None
 
@@ -241,8 +245,8 @@ def _remedy(unit: str, target: str) -> str:
     """What to write in place of a unit that does not fit."""
     if not target:
         return "Write a plain number"
-    if target == "rad/s" and "hz" in unit.casefold():  # readings differ by 2 pi
-        return "Hz is ambiguous for an angular speed: write rpm, rad/s or turn/s"
+    if target == "rad/s" and ("hz" in unit.casefold() or fits(unit, "Hz")):
+        return f"{unit} may count turns or radians, 2 pi apart: write rpm, rad/s or turn/s"
     with_force = re.sub(r"\b(kg|lb|oz)(?!f)", r"\1f", SPELLINGS.get(unit, unit))
     near = _respelled(unit, lambda text: text != unit and fits(text, target))
     if not near and with_force != unit and fits(with_force, target):
@@ -418,16 +422,29 @@ def _is_written(text: str, unit: str) -> bool:
 def mended(text: str) -> str:
     """What to write where signs stand between the digits of a number: "0,3 mm", "1,234.5 rpm", "1.2·10^-3 m"."""
     number, rest = _digits(text)
-    if _POWER_OF_TEN.match(rest):
-        return f"Write powers of ten as in {number}e-3"
+    if raised := _POWER_OF_TEN.match(rest):
+        power = int(unicodedata.normalize("NFKC", raised[1] or raised[2]).replace("\u2212", "-"))
+        rest = f"e{power}{rest[raised.end() :]}"
+    whole = raised is None and not re.match(r"[eE][+-]?\d", rest)
     between = "Write the digits of a number without signs or spaces between them"
-    if grouped := _GROUPS.fullmatch(number):
+    grouped = _GROUPS.fullmatch(number)
+    if grouped and (
+        whole or not may_be_thousands(number)
+    ):  # before a power of ten they are decimals
         decimals = f".{grouped[3]}" if grouped[3] else ""
         return f"{between}: {re.sub(r'[^0-9+-]', '', grouped[1])}{decimals}{rest}"
     if re.fullmatch(r"[+-]?\d*,\d+", number):
         return f"Write a decimal point: {number.replace(',', '.')}{rest}"
+    if raised:
+        return f"Write powers of ten with an e, as in {number}{rest}"
     return (
         between
         if re.search(r"\d[^\d]+\d.*[^\d]|\d[^\d.]+\d|\.\.", number) or rest[:1].isdigit()
         else ""
     )
+
+
+def shows_point(text: object) -> bool:
+    """Whether the number of a text has a point before decimals: one that nobody takes for a sign of thousands."""
+    number = _digits(text)[0] if isinstance(text, str) else ""
+    return re.fullmatch(r"[+-]?\d*\.\d+", number) is not None and not may_be_thousands(number)

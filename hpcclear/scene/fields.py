@@ -3,7 +3,7 @@ counts, curves."""
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -17,7 +17,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from hpcclear.base.errors import nearest as nearest
-from hpcclear.base.units import UnitError, to_si
+from hpcclear.base.units import UnitError, shows_point, to_si
 from hpcclear.scene.wanted import hint
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
@@ -99,9 +99,9 @@ class Quantity(Converted):
     why: str = ""
     nonzero: bool = False
 
-    def convert(self, value: object, key: str = "") -> float:
-        """The value in SI; raises PydanticCustomError, with the key of the value."""
-        number = self.number(value, key)
+    def convert(self, value: object, key: str = "", decided: bool = False) -> float:
+        """The value in SI; raises PydanticCustomError, with the key of the value; `decided` as of `to_si`."""
+        number = self.number(value, key, decided)
         if not self.holds(number):
             why = f": {self.why}" if self.why else ""
             raise invalid(f"must be {self.bounds()}{why}", self._remedy(), key)
@@ -111,7 +111,7 @@ class Quantity(Converted):
         """A pair in rising order; errors as `convert`."""
         if not isinstance(value, (list, tuple)) or len(value) != 2:
             raise invalid("two bounds are expected here", "Write [lower, upper]", key)
-        lower, upper = (self.convert(bound, key) for bound in value)
+        lower, upper = self._together(value, key)
         if not lower < upper:
             reason = "the bounds are equal" if lower == upper else "the bounds are crossed"
             raise invalid(reason, "Write the smaller bound first; leave a constant out", key)
@@ -126,13 +126,18 @@ class Quantity(Converted):
         if not isinstance(value, (list, tuple)) or not least <= len(value) <= most:
             count = f"{least}" if least == most else f"from {least} to {most}"
             raise invalid(f"{count} numbers are expected here", "Write [first, second]", key)
-        return tuple(self.convert(one, key) for one in value)
+        return self._together(value, key)
 
-    def number(self, value: object, key: str = "") -> float:
+    def _together(self, values: Sequence[object], key: str) -> tuple[float, ...]:
+        """Numbers of one list: a point before decimals of one shows what those of the others are."""
+        decided = any(map(shows_point, values))
+        return tuple(self.convert(one, key, decided) for one in values)
+
+    def number(self, value: object, key: str = "", decided: bool = False) -> float:
         """The value in SI, finite, bounds not looked at; errors as `convert`."""
         if isinstance(value, str):
             try:
-                value = to_si(value, self.unit)
+                value = to_si(value, self.unit, decided)
             except UnitError as error:
                 raise invalid(error.reason, error.remedy, key) from None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -233,6 +238,20 @@ OF_FILE = {"type": "object", "title": "FileCurve"}
 """JSON schema of a curve from a file; the schema of a scene puts that of its table in its place."""
 
 
+def pairs_in(
+    value: Sequence[Any], x: str, y: str, form: str, remedy: str
+) -> tuple[tuple[float, float], ...]:
+    """Pairs in the units `x` and `y`; a point before decimals of one number shows what those of the others are.
+
+    Raises PydanticCustomError.
+    """
+    if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
+        raise invalid(f"every row of a table is a pair {form}", remedy)
+    first, second = Quantity(x), Quantity(y)
+    point = any(shows_point(one) for pair in value for one in pair)
+    return tuple((first.convert(a, "", point), second.convert(b, "", point)) for a, b in value)
+
+
 def _table_of_pairs(least: int) -> dict[str, Any]:
     """JSON schema of a table of at least so many pairs."""
     pair = {"type": "array", "items": _ENTRY, "minItems": 2, "maxItems": 2}
@@ -261,10 +280,7 @@ class CurveOf(Converted):
         remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...]"
         if not 2 <= len(value) <= LONGEST_CURVE:
             raise invalid(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
-        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
-            raise invalid("every row of a table is a pair [angle, value]", remedy)
-        angle, height = Quantity("rad"), Quantity(self.unit)
-        pairs = tuple((angle.convert(row[0]), height.convert(row[1])) for row in value)
+        pairs = pairs_in(value, "rad", self.unit, "[angle, value]", remedy)
         if any(second[0] <= first[0] for first, second in itertools.pairwise(pairs)):
             raise invalid(
                 "the crank angles must rise from row to row",
@@ -318,10 +334,7 @@ class MotionTable(Converted):
             raise invalid(
                 f"a table of from {LEAST_ROWS} to {LONGEST_CURVE} pairs is expected here", remedy
             )
-        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
-            raise invalid("every row of a table is a pair [time, angle]", remedy)
-        time, angle = Quantity("s"), Quantity("rad")
-        pairs = tuple((time.convert(row[0]), angle.convert(row[1])) for row in value)
+        pairs = pairs_in(value, "s", "rad", "[time, angle]", remedy)
         if pairs[0][0] != 0.0 or any(b[0] <= a[0] for a, b in itertools.pairwise(pairs)):
             raise invalid(
                 "the times must rise from 0 from row to row",

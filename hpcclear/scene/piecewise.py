@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Converted, Quantity, invalid
+from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Converted, Quantity, invalid, pairs_in
 
 MOST_ROWS = 16
 """Rows of a table: every one costs each step."""
@@ -37,10 +37,7 @@ class Piecewise(Converted):
         remedy = f"Write pairs [[x in {self.x}, y in {self.unit}], ...], x rising"
         if not isinstance(value, (list, tuple)) or not 2 <= len(value) <= self.most:
             raise invalid(f"a table of 2 to {self.most} pairs is expected here", remedy)
-        if any(not isinstance(row, (list, tuple)) or len(row) != 2 for row in value):
-            raise invalid("every row of a table is a pair", remedy)
-        first, second = Quantity(self.x), Quantity(self.unit)
-        rows = tuple((first.convert(x), second.convert(y)) for x, y in value)
+        rows = pairs_in(value, self.x, self.unit, "[x, y]", remedy)
         if any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
             raise invalid("the first numbers must rise from row to row", "Sort the rows")
         if self.least is not None and rows[0][0] < self.least:

@@ -6,7 +6,7 @@ them; names never decide a default, only what a variable drives does.
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -245,6 +245,10 @@ class Verification(Table):
     audit_samples: Annotated[int, Count(0, 10**6)] = 256
     """Largest number of simulations of each of the paper's designs under each interpretation of its text (at least 16);
     0: no comparison."""
+
+    elsewhere: ClassVar = {
+        "accuracy": ("belongs to [study]", "Write study.accuracy with this value")
+    }
 
     @model_validator(mode="after")
     def _consistent(self) -> "Verification":
