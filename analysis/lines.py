@@ -70,7 +70,7 @@ FEATURES = {
         "study/launched.py base/host.py",
     "statistics of millions of samples, parts of arrays":
         "statistics/streams/* ensemble/statistics.py ensemble/raw.py ensemble/split.py ensemble/parts.py "
-        "ensemble/bundles.py scene/pages.py ranks/nodes.py",
+        "scene/pages.py",
     "killed runs, lost ranks, damaged files":
         "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py "
         "results/places.py",

@@ -11,13 +11,11 @@ others beside it. Start-up is shown apart: it is paid once, whatever the work.
 """
 
 import argparse
-import functools
 import os
 import pickle
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
@@ -30,13 +28,11 @@ from scaling_model import (
     Costs,
     Outcome,
     simulate,
-    simulate_shared,
     simulate_sums,
 )
 
 from hpcclear.base.outcome import OUTCOME
 from hpcclear.ensemble.parts import part_length
-from hpcclear.ensemble.statistics import SHARED_FROM
 from hpcclear.ranks.schedule import HandOut, Need
 from hpcclear.results.provenance import provenance
 
@@ -44,7 +40,7 @@ LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)
 LONGER = {"measured samples": 1, "10 times as long": 10, "100 times as long": 100}
 LIMIT = 0.9
-SUMS, SHARED, KEPT = "sums", "shared", "shared, kept"
+SUMS = "sums"
 
 
 # ---- measurements ------------------------------------------------------------------------------------
@@ -125,12 +121,13 @@ def handed_cost() -> float:
 
 def partial_cost() -> float:
     """Seconds of root for a part of a block that arrives summed up: unpickled and merged."""
-    from hpcclear.ensemble.parts import packed, unpacked
+    from hpcclear.ensemble.parts import packed, partial_of, unpacked
     from hpcclear.statistics.streams.accumulator import Accumulator
     from hpcclear.statistics.streams.summary import summarise
 
     blocks, length = 40, 512
     sums = Accumulator((blocks + 1) * 4096)
+    sums.part = length
     records = np.zeros(4096, OUTCOME)
     records["sample"] = np.arange(4096)
     records["objective"] = np.random.default_rng(1).random(4096)
@@ -138,14 +135,12 @@ def partial_cost() -> float:
     edges = sums.edges
     assert edges is not None  # block 0 is in
     one = summarise(records[:length], edges, length)
-    firsts = range(4096, (blocks + 1) * 4096, length)
-    messages = [
-        pickle.dumps(packed(k, first, length, length, one)) for k, first in enumerate(firsts)
-    ]
+    firsts, kind = sums.parts_left(), partial_of(OUTCOME)
+    messages = [pickle.dumps(packed(kind, k, one)) for k in range(len(firsts))]
     started = time.process_time()
     for message in messages:
         for record in pickle.loads(message):  # made a moment ago, in this process
-            sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
+            sums.add_part(int(firsts[record["sample"]]), length, unpacked(record))
     return (time.process_time() - started) / len(messages)
 
 
@@ -179,31 +174,22 @@ def measure(samples: int) -> Costs:
         partial=partial_cost(),
         start=start_up(),
         batch=max(line.message - message, 0.0),
-        written=line.written,
     )
 
 
 # ---- model and figure ---------------------------------------------------------------------------
 
 
-ACROSS: dict[str, Callable[..., Outcome]] = {
-    SUMS: simulate_sums,
-    SHARED: simulate_shared,
-    KEPT: functools.partial(simulate_shared, keeps=True),
-}
-"""Statistics: summed up by ranks, by leaders of nodes, and by these with all samples written."""
-
-
 def model(costs: Costs, ranks: tuple[int, ...], seed: int = 1) -> xr.Dataset:
     """Every policy on every number of ranks, for samples as measured and for longer ones."""
-    names = [*POLICIES, *ACROSS]
+    names = [*POLICIES, SUMS]
     shape = (len(LONGER), len(names), len(ranks))
     table = {name: np.full(shape, np.nan) for name in Outcome._fields}
     for a, longer in enumerate(LONGER.values()):
         chosen = costs._replace(samples=costs.samples * longer)
         for b, name in enumerate(names):
             for c, count in enumerate(ranks):
-                run = ACROSS.get(name, simulate)
+                run = simulate_sums if name == SUMS else simulate
                 found = run(chosen, count, POLICIES.get(name, POLICIES["package"]), seed=seed)
                 for key, value in found._asdict().items():
                     table[key][a, b, c] = value
@@ -240,7 +226,7 @@ def draw(data: xr.Dataset, path: Path) -> None:
     figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.0), sharey=True, layout="constrained")
     for axis, length in zip(axes, data["samples"].values, strict=True):
         for style, policy in zip(
-            ("-o", "-s", "-^", "-v", "-D", "-P", "-X"), data["policy"].values, strict=True
+            ("-o", "-s", "-^", "-v", "-D"), data["policy"].values, strict=True
         ):
             shown = data["efficiency"].sel(samples=length, policy=policy)
             axis.plot(data["ranks"], shown, style, markersize=3, linewidth=1, label=policy)
@@ -258,15 +244,11 @@ def draw(data: xr.Dataset, path: Path) -> None:
 def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
     """Where the package's policy falls below the limit, and what root does there."""
     chosen = data.sel(samples=length, policy=policy)
-    if policy in (SHARED, KEPT):  # for few, things are not shared out twice
-        chosen = chosen.sel(ranks=chosen["ranks"] >= SHARED_FROM)
     short = chosen["efficiency"].values < LIMIT
     if not short.any():
         return f"{policy}: above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"
     first = int(np.argmax(short))
     ranks = int(chosen["ranks"][first])
-    if policy in (SHARED, KEPT):
-        return f"{policy}: below {LIMIT} from {ranks} ranks on"
     mean = float(data["cost_sample"].sel(quantile=0.5)) * LONGER[length]
     parts = WORK / (mean * part_length(round(ranks * WORK / mean), ranks, 4096, mean))
     each = (
@@ -306,7 +288,7 @@ def report(data: xr.Dataset) -> str:
             row = data["efficiency"].sel(samples=length, ranks=count).values
             shown = zip(row, widths, strict=True)
             lines.append(f"{count:>8}" + "".join(f"{value:>{width}.3f}" for value, width in shown))
-        lines += [bottleneck(data, str(length), name) for name in ("package", SUMS, SHARED, KEPT)]
+        lines += [bottleneck(data, str(length), name) for name in ("package", SUMS)]
     return "\n".join(lines)
 
 

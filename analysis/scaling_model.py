@@ -13,14 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.ensemble.bundles import bundle_length
 from hpcclear.ensemble.parts import part_length
 from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
 from hpcclear.ranks.team import FLUSH_INTERVAL
 from hpcclear.statistics.streams.summary import BLOCK
 
 LANES = 32
-NODE = 64  # ranks of a node
 LATENCY = 5e-6  # s, network
 WORK = 60.0  # s of work for a rank
 MOST_REQUESTS = 2_000_000  # beyond, root's load alone decides
@@ -38,7 +36,6 @@ class Costs(NamedTuple):
     partial: float  # root, for each part of a block that arrives summed up already
     start: float  # from the launch of a process to its first simulation
     batch: float = 0.0  # root, besides, for a message with records, however many
-    written: float = 0.0  # who keeps samples in files, for each
 
     @property
     def mean(self) -> float:
@@ -139,10 +136,8 @@ class _Team:
 class _Root:
     """Root's clock and books."""
 
-    def __init__(
-        self, costs: Costs, team: _Team, total: int, policy: Policy, *, works: bool = True
-    ) -> None:
-        self.costs, self.team, self.policy, self.works = costs, team, policy, works
+    def __init__(self, costs: Costs, team: _Team, total: int, policy: Policy) -> None:
+        self.costs, self.team, self.policy = costs, team, policy
         self.size = len(team.each)
         self.left = total
         self.now = 0.0
@@ -173,7 +168,7 @@ class _Root:
     def work(self) -> None:
         """A quantum of root's own samples, if it has any; else wait for a message."""
         stock = self._own / self.team.each[0]
-        if self.works and self.left > 0 and stock < self._ask_below:
+        if self.left > 0 and stock < self._ask_below:
             rate = 1.0 / self.team.each[0] if self.team.given[0] else 0.0
             size, self._ask_below = self.policy(
                 self.left, self.size, Need(self.team.lanes, int(stock), rate)
@@ -285,52 +280,3 @@ def simulate_sums(
     summed = costs._replace(samples=parts, record=costs.partial, handed=0.0, batch=0.0)
     team = _Team(summed, ranks, 1, seed)
     return _run(_Root(summed, team, max(total // length, 1), policy), 0.5 * LANES / length)
-
-
-def simulate_shared(
-    costs: Costs,
-    ranks: int,
-    policy: Policy,
-    *,
-    work: float = WORK,
-    seed: int = 1,
-    keeps: bool = False,
-) -> Outcome:
-    """`simulate_sums` with leaders of nodes between root and the ranks (`hpcclear.ensemble.bundles`).
-
-    A node is a root and few ranks that never have more than two bundles in stock; to root it is one rank, that takes bundles.
-    Root itself simulates nothing. What a node loses at its end and what nodes lose waiting for root is multiplied: the worst of
-    both. `keeps`: all samples are written, by leaders, or by ranks that make a block in time.
-    """
-    nodes, size = max((ranks - 1) // NODE, 1), min(ranks - 1, NODE)
-    total = max(round(nodes * size * work / costs.mean), nodes)
-    length = bundle_length(total, nodes, ranks, costs.mean, keeps)
-
-    by_block = keeps and part_length(total, ranks, BLOCK, costs.mean) == BLOCK
-    item = BLOCK if by_block else 1  # samples that the leader hands out at once
-
-    def stocked(remaining: int, members: int, need: Need) -> Allotment:
-        return policy(min(remaining, 2 * length // item), members, need)
-
-    if by_block:
-        each = np.array([BLOCK * (costs.mean + costs.written)])
-        inside = costs._replace(samples=each, record=costs.partial, handed=0.0)
-        team = _Team(inside, size, 1, seed)
-        node = _run(_Root(inside, team, total // nodes // BLOCK, stocked), 0.5 * LANES / BLOCK)
-        node = node._replace(efficiency=node.efficiency * BLOCK * costs.mean / inside.mean)
-    else:
-        inside = costs._replace(record=costs.record + keeps * costs.written)
-        node = _run(_Root(inside, _Team(inside, size, LANES, seed), total // nodes, stocked))
-    each = np.array([length * costs.mean / size])  # the sum of so many hardly varies
-    bundles = costs._replace(samples=each, record=costs.partial, handed=0.0, batch=0.0)
-    root = _Root(
-        bundles, _Team(bundles, nodes + 1, 1, seed), max(total // length, 1), policy, works=False
-    )
-    found = _run(root, idle=0.0)
-    between = found.efficiency * (nodes + 1) / nodes  # root is none of those who work
-    return Outcome(
-        node.efficiency * between * (ranks - 1) / ranks,
-        found.root_load,
-        found.makespan / node.efficiency,
-        found.requests,
-    )

@@ -42,7 +42,6 @@ FULL = pytest.mark.full
 SILENCE = 6.0
 DOCUMENTED = {0, 1, 2, 3}
 PLAIN = ["-m", "hpcclear"]
-SHARED = [str(ROOT / "tests" / "mpi_programs" / "hpcclear_shared.py")]
 
 
 @pytest.fixture
@@ -210,43 +209,14 @@ def contents(output: Path) -> dict[str, bytes]:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("box", [2, pytest.param(4, marks=FULL)], indirect=True)
-def test_leaders_of_nodes_share_out_what_one_process_makes(box, tmp_path):
+def test_statistics_of_several_nodes_are_those_of_one_process(box, tmp_path):
     here, there = (tmp_path / name / "sums.nc" for name in ("here", "there"))
     for place in (here, there):
         place.parent.mkdir()
     assert finish(start(statistics(here, 20_000), 0, PLAIN))[0] == 0
-    code, output = ended(box, box.start(statistics(there, 20_000), 3, SHARED), 200.0)
+    code, output = ended(box, box.start(statistics(there, 20_000), 3), 200.0)
     assert code == 0, output
     assert len(contents(there)) == 1 + 5 + 1
-    assert contents(there) == contents(here)
-
-
-@FULL
-@pytest.mark.parametrize("what", ["cut", "root", "leader", "remote", "node", "term"])
-def test_whatever_dies_of_a_shared_run_nothing_is_left_and_it_goes_on(box, tmp_path, what):
-    here, there = (tmp_path / name / "sums.nc" for name in ("here", "there"))
-    for place in (here, there):
-        place.parent.mkdir()
-    words = statistics(there, 120_000, "--checkpoint-interval", "0.5")
-    job = box.start(words, 3, SHARED, HPCCLEAR_SILENCE=str(SILENCE))
-    patience = time.monotonic() + crowded(120.0)
-    while len(contents(there) if there.exists() else list(there.parent.glob("sums-raw/*"))) < 8:
-        assert job.poll() is None, job.communicate()[0]
-        assert time.monotonic() < patience, "the job does not begin"
-        time.sleep(0.1)
-    if what in ("leader", "remote"):
-        os.kill(box.nodes[1].ranks()[3 if what == "leader" else 4], signal.SIGKILL)
-    else:
-        strike(box, what)
-    code, text = ended(box, job)
-    assert code in (
-        {3} if what == "term" else {1} if what == "cut" else DOCUMENTED | {9, 137, 255}
-    ), text
-    assert not there.exists()
-    again = box.nodes[0].words([sys.executable, *SHARED, *words])  # whose lock it is
-    path = os.environ | {"PYTHONPATH": str(ROOT)}
-    assert subprocess.run(again, env=path, timeout=crowded(300.0)).returncode == 0
-    assert finish(start(statistics(here, 120_000), 2, PLAIN))[0] == 0
     assert contents(there) == contents(here)
 
 

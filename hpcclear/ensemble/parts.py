@@ -4,17 +4,15 @@ A part is a run of sample numbers that is a node of its block's tree (`statistic
 to a single bit how long parts are, who sums them up and in which order they come in.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.outcome import Flag, Status
 from hpcclear.ranks.progress import Progress, Style
-from hpcclear.statistics.streams.accumulator import Accumulator
-from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF, Summary, rows_of, summarise
+from hpcclear.statistics.streams.summary import BLOCK, LEAF, Summary, empty, rows_of, summarise
 
 if TYPE_CHECKING:
     from hpcclear.ranks.schedule import Points, Worker
@@ -22,36 +20,6 @@ if TYPE_CHECKING:
 
 PARTS_A_RANK = 32
 """A rank gets at least so many parts while they can be short enough, so that none is busy long after the others."""
-
-
-def partial_of(record: np.dtype) -> np.dtype:
-    """Type of one part's summary as a record, for the way from rank to root; `record`: of its samples."""
-    rows = len(rows_of(record["mean_gap"].shape[0]))
-    return np.dtype(
-        [
-            ("sample", np.int64),  # which part
-            ("first", np.int64),  # its first sample
-            (
-                "length",
-                np.int64,
-            ),  # of the node of the tree; the last part of a design may hold less
-            ("samples", np.int64),
-            ("count", np.int64, (rows,)),
-            ("mean", float, (rows,)),
-            ("squares", float, (rows,)),
-            ("minimum", float, (rows,)),
-            ("maximum", float, (rows,)),
-            ("histogram", np.uint32, (rows, BINS + 2)),
-            ("status", np.int64, (len(Status),)),
-            ("flags", np.int64, (len(Flag),)),
-        ]
-    )
-
-
-def is_partial(records: np.ndarray) -> bool:
-    """Whether records are summaries of parts, not samples."""
-    return "histogram" in (records.dtype.names or ())
-
 
 LONGEST = 2.0
 """Seconds of work that a part holds at most, if samples allow: what a rank that is killed has not reported."""
@@ -69,51 +37,26 @@ def part_length(samples: int, ranks: int, block: int, seconds: float = 0.0) -> i
     return length
 
 
-def packed(
-    kind: np.dtype, part: int, first: int, length: int, samples: int, summary: Summary
-) -> np.ndarray:
-    """One summary as a record of `partial_of`, the `kind`, shape (1,)."""
+def partial_of(record: np.dtype) -> np.dtype:
+    """Type of one part's summary as a record, for the way from rank to root; `record`: of its samples."""
+    like = vars(empty(len(rows_of(record["mean_gap"].shape[0]))))
+    return np.dtype(
+        [("sample", np.int64), *((name, one.dtype, one.shape) for name, one in like.items())]
+    )
+
+
+def packed(kind: np.dtype, part: int, summary: Summary) -> np.ndarray:
+    """The summary of the part of this number as a record of `partial_of`, the `kind`, shape (1,)."""
     record = np.zeros(1, kind)
-    record["sample"], record["first"], record["length"], record["samples"] = (
-        part, first, length, samples,
-    )  # fmt: skip
-    for field in fields(Summary):
-        record[field.name] = getattr(summary, field.name)
+    record["sample"] = part
+    for name, values in vars(summary).items():
+        record[name] = values
     return record
 
 
 def unpacked(record: np.void) -> Summary:
     """The summary in one record of `partial_of`."""
-    row = {field.name: record[field.name] for field in fields(Summary)}
-    row["histogram"] = row["histogram"].astype(np.int64)
-    return Summary(**row)
-
-
-def take_parts(sums: Accumulator, records: np.ndarray) -> None:
-    """Let an accumulator take summaries, records of `partial_of` (m,)."""
-    for record in records:
-        sums.add_part(int(record["first"]), int(record["length"]), unpacked(record))
-
-
-class Parts:
-    """What is left of a design, as parts: rows of first sample and length, made when they are requested.
-
-    Parameters
-    ----------
-    sums : Accumulator
-        Knows what was taken already.
-    length : int
-        Samples a part, as `part_length`.
-    """
-
-    def __init__(self, sums: Accumulator, length: int) -> None:
-        self._rows = sums.parts_left(length)
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __getitem__(self, index: Integers) -> Array:
-        return self._rows[np.asarray(index, np.int64)].astype(float)
+    return Summary(*(record[field.name] for field in fields(Summary)))
 
 
 class Summariser:
@@ -129,29 +72,20 @@ class Summariser:
         Type of the records of samples.
     edges : ndarray, shape (rows, bins + 1)
         Of the histograms.
-    on_block : callable, optional
-        Gets number and records (in index order) of every part, which is a block then; it may keep raw samples.
+    length : int
+        Samples of a part.
     """
 
     lanes = 1  # parts at once: one is worked on while the next fills lanes that it leaves
 
     def __init__(
-        self,
-        worker: "Worker",
-        points: "Points",
-        record: np.dtype,
-        edges: Array,
-        on_block: Callable[[int, np.ndarray], object] | None = None,
+        self, worker: "Worker", points: "Points", record: np.dtype, edges: Array, length: int
     ) -> None:
-        self._worker, self._points, self._edges = worker, points, edges
-        self._on_block = on_block
+        self._worker, self._points, self._edges, self._length = worker, points, edges, length
         self._record, self._kind = record, partial_of(record)
-        self._waiting: list[
-            tuple[int, int, int]
-        ] = []  # number, first sample and length of parts not begun
-        self._open: dict[int, np.ndarray] = {}  # records by part; sample -1: not here yet
-        self._places: dict[int, tuple[int, int]] = {}  # first sample and length of each part
-        self._missing: dict[int, int] = {}
+        self._waiting: list[tuple[int, int]] = []  # number and first sample of parts not begun
+        # first sample and records of parts begun; sample -1: not here yet
+        self._open: dict[int, tuple[int, np.ndarray]] = {}
 
     @property
     def pending(self) -> int:
@@ -161,66 +95,46 @@ class Summariser:
     @property
     def samples_in_hand(self) -> list[int]:
         """Samples of parts in hand that have not finished, ascending."""
-        begun = (
-            self._places[part][0] + k
-            for part, records in self._open.items()
-            for k in np.flatnonzero(records["sample"] < 0).tolist()
-        )
-        waiting = (k for _, *place in self._waiting for k in self._samples(*place).tolist())
-        return sorted([*begun, *waiting])
+        begun = [np.flatnonzero(r["sample"] < 0) + first for first, r in self._open.values()]
+        waiting = [self._samples(first) for _, first in self._waiting]
+        return sorted(int(k) for part in (*begun, *waiting) for k in part)
 
-    def _samples(self, first: int, length: int) -> Integers:
-        return np.arange(first, min(first + length, len(self._points)))
+    def _samples(self, first: int) -> Integers:
+        return np.arange(first, min(first + self._length, len(self._points)))
 
     def submit(self, index: Integers, points: Array) -> None:
-        """Queue parts: numbers (m,), rows of first sample and length (m, 2)."""
-        places = points.astype(np.int64).tolist()
-        self._waiting += [
-            (part, *place) for part, place in zip(index.tolist(), places, strict=True)
-        ]
+        """Queue parts: numbers (m,), their first samples (m, 1)."""
+        self._waiting += zip(index.tolist(), points[:, 0].astype(int).tolist(), strict=True)
         self._begin()
 
     def _begin(self) -> None:
         """Begin as many parts as fill a block: memory of records does not grow with the parts in hand."""
         while self._waiting and self._worker.pending < BLOCK:
-            part, first, length = self._waiting.pop(0)
-            samples = self._samples(first, length)
+            part, first = self._waiting.pop(0)
+            samples = self._samples(first)
             records = np.zeros(samples.size, self._record)
             records["sample"] = -1
-            self._open[part], self._places[part] = records, (first, length)
-            self._missing[part] = samples.size
+            self._open[part] = first, records
             self._worker.submit(samples, self._points[samples])
 
     def advance(self, seconds: float) -> np.ndarray:
         """Work for about `seconds`; summaries (`partial_of`) of the parts finished meanwhile."""
         records = self._worker.advance(seconds)
-        done = []
-        if records.size:
-            for part in list(self._open):
-                first, length = self._places[part]
-                slots = records["sample"] - first
-                mine = (slots >= 0) & (slots < length)
-                self._open[part][slots[mine]] = records[mine]
-                self._missing[part] -= int(np.count_nonzero(mine))
-                if self._missing[part] == 0:
-                    done.append(self._finish(part))
-            self._begin()
-        return np.concatenate(done) if done else np.zeros(0, self._kind)
-
-    def _finish(self, part: int) -> np.ndarray:
-        records = self._open.pop(part)
-        first, length = self._places.pop(part)
-        del self._missing[part]
-        if self._on_block is not None:
-            self._on_block(first // length, records)
-        summary = summarise(records, self._edges, length)
-        return packed(self._kind, part, first, length, records.size, summary)
+        done = [np.zeros(0, self._kind)]
+        for part, (first, held) in list(self._open.items()) if records.size else ():
+            slots = records["sample"] - first
+            mine = (slots >= 0) & (slots < held.size)
+            held[slots[mine]] = records[mine]
+            if (held["sample"] >= 0).all():
+                del self._open[part]
+                summary = summarise(held, self._edges, self._length)
+                done.append(packed(self._kind, part, summary))
+        self._begin()
+        return np.concatenate(done)
 
 
 def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
-    """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated, and written
-    there if `payload["raw"]` says where (`hpcclear.ensemble.raw.raw_files`)."""
-    from hpcclear.ensemble.raw import raw_files
+    """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated."""
     from hpcclear.scene import load_scene
     from hpcclear.scene.pages import MonteCarloPoints
     from hpcclear.scene.record import record_of
@@ -228,20 +142,18 @@ def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     worker = payload["make"](payload["samples"], ranks)
     scene = load_scene(payload["design"], trust=True)
     points = MonteCarloPoints(scene, payload["total"])
-    files = raw_files(payload["raw"], scene, points)
-    write = None if files is None else files.write
-    return Summariser(worker, points, record_of(scene), payload["edges"], write)
+    return Summariser(worker, points, record_of(scene), payload["edges"], payload["length"])
 
 
 class PartsProgress(Progress):
-    """Progress of a stage of parts, reported in samples."""
+    """Progress over the samples of a whole design, of which a stage makes some, as samples or as parts."""
 
     def __init__(self, label: str, style: Style, samples: int, done: int) -> None:
         super().__init__(label, style)
         self._samples, self._before = samples, done
 
     def start(self, total: int, completed: np.ndarray) -> None:
-        """Begin with records `completed` (m,) there already; the number of parts says nothing to a reader."""
+        """Begin with the design as far as it is there; the numbers of a stage say nothing to a reader."""
         super().start(self._samples, completed)
         self._done = self._before
         self._origin = (self._began, self._done)
@@ -249,9 +161,10 @@ class PartsProgress(Progress):
         self._history.append(self._origin)
 
     def add(self, records: np.ndarray) -> None:
-        """Count the samples of finished parts, records of `partial_of` (m,), or samples that came on their own."""
-        if not is_partial(records):
+        """Count finished samples, or those of finished parts, records of `partial_of` (m,)."""
+        status = records["status"]
+        if status.ndim == 1:
             super().add(records)
             return
-        self._done += int(records["samples"].sum())
-        self._failed += int(records["status"][:, 1:].sum())
+        self._done += int(status.sum())
+        self._failed += int(status[:, 1:].sum())

@@ -1,15 +1,14 @@
-"""Samples themselves of a run of statistics, kept in files by whoever has all samples of a block: root, a leader, a rank."""
+"""Samples themselves of a run of statistics, kept in files by root, a block each."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import collection, dataset
-from hpcclear.scene import Scene
 from hpcclear.scene.pages import MonteCarloPoints
 from hpcclear.statistics.streams.summary import BLOCK
 
@@ -70,18 +69,3 @@ class RawFiles:
     @staticmethod
     def _name(number: int) -> str:
         return f"samples-{number:08d}.nc"
-
-
-def raw_files(
-    raw: Mapping[str, Any] | None, scene: Scene, points: MonteCarloPoints
-) -> RawFiles | None:
-    """What writes the samples of a scene's points, from what travels to ranks; None if they are not kept.
-
-    Parameters
-    ----------
-    raw : mapping or None
-        ``folder``, ``attributes`` and ``joints``; see `RawFiles`.
-    """
-    if raw is None:
-        return None
-    return RawFiles(Path(raw["folder"]), points, raw["attributes"], scene.objective, raw["joints"])

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,49 +11,47 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
-from hpcclear.ensemble.bundles import BlockBundles, Bundles, bundle_length, make_simulator
 from hpcclear.ensemble.identity import statistics_key
 from hpcclear.ensemble.parts import (
-    Parts,
     PartsProgress,
-    is_partial,
     make_summariser,
     part_length,
     partial_of,
-    take_parts,
+    unpacked,
 )
-from hpcclear.ensemble.raw import NAMES, RawFiles, raw_files
+from hpcclear.ensemble.raw import NAMES, RawFiles
 from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks import leading
-from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import COLUMNS, Points, Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.pages import MonteCarloPoints
-from hpcclear.statistics.streams.accumulator import Accumulator, Remaining
+from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import BLOCK, QUANTITIES, Summary, rows_of
 
 STAGE = "statistics"
 
-SHARED_FROM = 256
-"""Ranks from which on root deals with the leaders of nodes only (`hpcclear.ensemble.bundles`)."""
+TOGETHER = 256
+"""Blocks of samples that are handed out in one stage where root keeps them."""
+
+_BUSY = COLUMNS.index("busy")
 
 
 class _Left:
-    """The points that are left, in the order they are handed out."""
+    """The points of some samples, in the order they are handed out."""
 
-    def __init__(self, points: MonteCarloPoints, remaining: Remaining) -> None:
-        self._points, self._remaining = points, remaining
+    def __init__(self, points: MonteCarloPoints, samples: Integers) -> None:
+        self._points, self._samples = points, samples
 
     def __len__(self) -> int:
-        return len(self._remaining)
+        return len(self._samples)
 
     def __getitem__(self, index: Integers) -> Array:
-        return self._points[self._remaining.samples(index)]
+        return self._points[self._samples[index]]
 
 
 def run_statistics(
@@ -162,25 +159,17 @@ class _Streaming:
     def __init__(
         self, scene: Scene, points: MonteCarloPoints, session: Session, raw: Path | None
     ) -> None:
-        few = points.page(0)
         session.describe(scene)
-        self._payload = payload_of(scene, few)
+        self._payload = payload_of(scene, points.page(0))
         self._design = scene.resolved()
         self._objective = scene.objective
         self._points = points
         self._session = session
-        self._raw = None
-        self._partial = partial_of(session.record)
         self._checkpoint = session.opened()
+        self._files: RawFiles | None = None
         if raw is not None:
-            self._raw = {
-                "folder": str(raw.absolute()),
-                "attributes": session.attributes,
-                "joints": session.joints,
-            }
-        self._files = raw_files(self._raw, scene, points)
-        leaders = session.ranks.mail.leaders
-        self._leaders = len(leaders) if session.ranks.size >= SHARED_FROM else 0
+            about = session.attributes, scene.objective, session.joints
+            self._files = RawFiles(raw, points, *about)
         self._sums = self._new_sums()
         earlier = self._checkpoint.load_stage(STAGE)
         session.notify_problems()
@@ -188,7 +177,7 @@ class _Streaming:
             session.notify("what was summed up without keeping the samples is simulated again")
         elif earlier is not None:
             self._sums.restore(earlier)
-            if raw is not None and (gone := RawFiles.missing(raw, self._whole_blocks())):
+            if raw is not None and (gone := RawFiles.missing(raw, self._sums.summed_blocks())):
                 session.notify(
                     f"{gone[0]} is missing in {raw}: what was summed up is simulated again"
                 )
@@ -199,45 +188,26 @@ class _Streaming:
         write = self._files.write if self._files else None
         return Accumulator(len(self._points), self._session.record, on_block=write)
 
-    def _whole_blocks(self) -> Iterator[int]:
-        """Numbers of the blocks of which all samples are summed up."""
-        for first, length, _ in self._sums.parts():
-            if length >= BLOCK:
-                last = min(first + length, self._sums.total)
-                yield from range(first // BLOCK, -(-last // BLOCK))
-
     def run(self) -> Results:
-        """Simulate, and write the statistics."""
+        """Simulate, and write the statistics.
+
+        Ranks send samples of the first block, which decides the histograms, of blocks that an earlier run left begun, and
+        where root keeps samples of all blocks. Of the rest they send sums of parts.
+        """
+        sums, seconds = self._sums, 0.0
         with saving(self._save):
-            if self._raw is not None:
-                self._sums.forget_parts()
-            left = self._sums.remaining().begun(self._raw is not None or self._sums.edges is None)
-            seconds = self._run_samples(left)
-            if not self._sums.complete:
-                self._run_rest(seconds)
+            some = TOGETHER if self._files is not None else int(sums.edges is None)
+            while (left := sums.remaining(some)).size:
+                seconds = self._run_samples(left)
+                some = TOGETHER if self._files is not None else 0
+            if not sums.complete:
+                self._run_parts(seconds)
             if self._files is not None:
                 with self._session.ranks.stage("files"), self._session.ranks.writing():
                     message = self._files.finish()
                 if message:
                     self._session.notify(message)
         return self._session.write(self._dataset())
-
-    def _run_rest(self, seconds: float) -> None:
-        """What is left in whole blocks; `seconds` of a rank for a sample, 0 if not known.
-
-        Where samples are kept, who sums up a block writes it: a rank where it makes one in time, else a leader or root. Without
-        leaders ranks on other nodes write nothing: they may not see root's files.
-        """
-        mail = self._session.ranks.mail
-        length = part_length(
-            self._sums.total - self._sums.taken, self._session.ranks.size, BLOCK, seconds
-        )
-        if self._leaders:
-            self._run_bundles(seconds, by_block=self._raw is not None and length == BLOCK)
-        elif self._raw is None or (length == BLOCK and mail.node_size == mail.size):
-            self._run_sums(Task(STAGE, make_summariser, self._summing(), self._partial), length)
-        else:
-            self._run_samples(self._sums.remaining())
 
     def _dataset(self) -> Results:
         return statistics_dataset(
@@ -254,70 +224,55 @@ class _Streaming:
         if time.monotonic() - self._saved > self._checkpoint.interval:
             self._save()
 
-    def _run(
-        self, task: Task, points: Points, take: Callable[[np.ndarray], None], progress: Progress
-    ) -> None:
+    def _run(self, task: Task, points: Points, take: Callable[[np.ndarray], None]) -> None:
+        style, sums = self._session.options.style, self._sums
         leading.run_points(
             self._session.ranks,
             task,
             points,
             on_records=take,
             save=self._save_when_due,
-            progress=progress,
+            progress=PartsProgress("samples", style, sums.total, sums.taken),
             keep=False,
         )
 
-    def _run_samples(self, left: Remaining) -> float:
-        """Let ranks send samples: those of the first block, which decides the histograms, of blocks that an earlier run left
-        with samples, of one that measures their cost; or all, if root keeps them. Returns seconds of a rank for one."""
-        if len(left) == 0:
-            return 0.0
+    def _run_samples(self, left: Integers) -> float:
+        """Let ranks send the samples of these numbers (n,); returns seconds of a rank for one."""
 
         def take(records: np.ndarray) -> None:
             numbered = records.copy()
-            numbered["sample"] = left.samples(records["sample"])
+            numbered["sample"] = left[records["sample"]]
             self._sums.add(numbered)
 
-        progress = Progress("samples", self._session.options.style)
+        spent = self._session.ranks.stage_seconds
+        before = spent[STAGE][:, _BUSY].sum() if STAGE in spent else 0.0
         task = Task(STAGE, make_evaluator, self._payload, self._session.record)
-        self._run(task, _Left(self._points, left), take, progress)
-        busy = self._session.ranks.stage_seconds[STAGE][:, COLUMNS.index("busy")].sum()
-        return float(busy) / len(left)
+        self._run(task, _Left(self._points, left), take)
+        return float(spent[STAGE][:, _BUSY].sum() - before) / len(left)
 
-    def _run_bundles(self, seconds: float, by_block: bool) -> None:
-        """Let the leaders of nodes share samples, or blocks, out and sum them up, so that root's work does not grow with the
-        ranks."""
-        left, ranks = self._sums.total - self._sums.taken, self._session.ranks.size
-        length = bundle_length(left, self._leaders, ranks, seconds, self._raw is not None)
-        block = min(length, BLOCK)
-        self._sums.forget_parts(block)
-        payload = self._summing() | {"block": block}
-        make, share = (make_summariser, BlockBundles) if by_block else (make_simulator, Bundles)
-        self._run_sums(Task(STAGE, make, payload, self._partial, share=share), length)
-
-    def _summing(self) -> dict[str, Any]:
-        """What those who sum up need to know."""
-        return {
+    def _run_parts(self, seconds: float) -> None:
+        """Hand out what is left as parts; `seconds` of a rank for a sample, 0 if not known."""
+        sums = self._sums
+        if not sums.part:
+            sums.part = part_length(
+                sums.total - sums.taken, self._session.ranks.size, BLOCK, seconds
+            )
+        firsts = sums.parts_left()
+        payload = {
             "make": make_evaluator,
             "samples": self._payload,
             "design": self._design,
             "total": len(self._points),
-            "edges": self._sums.edges,
-            "raw": self._raw,
+            "edges": sums.edges,
+            "length": sums.part,
         }
 
-    def _run_sums(self, task: Task, length: int) -> None:
-        """Hand out what is left as parts of at most `length` samples."""
-        sums = self._sums
-        progress = PartsProgress("samples", self._session.options.style, sums.total, sums.taken)
-        self._run(task, Parts(sums, length), self._add_sums, progress)
+        def take(records: np.ndarray) -> None:
+            for record in records:
+                sums.add_part(int(firsts[record["sample"]]), sums.part, unpacked(record))
 
-    def _add_sums(self, records: np.ndarray) -> None:
-        """Take summaries, or samples that a stop left without."""
-        if is_partial(records):
-            take_parts(self._sums, records)
-        else:
-            self._sums.add(records)
+        task = Task(STAGE, make_summariser, payload, partial_of(self._session.record))
+        self._run(task, firsts[:, None].astype(float), take)
 
 
 def statistics_dataset(

@@ -1,18 +1,14 @@
-"""A design on its way through the ranks: root hands samples out and works along (`run_points`), each rank has a queue of them.
-
-A rank serves whoever announced the stage to it; where there are many, that is a leader on its node (`nodes`).
-"""
+"""A design on its way through the ranks: root hands samples out and works along, each rank has a queue of them."""
 
 import contextlib
 import math
 import time
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hpcclear.ranks.mailbox import Backoff, Mail, Message, Tag
+from hpcclear.ranks.mailbox import Backoff, Message, Tag
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.schedule import (
     COLUMNS,
@@ -25,7 +21,10 @@ from hpcclear.ranks.schedule import (
     Task,
     Worker,
 )
-from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
+from hpcclear.ranks.stopping import RankFailed, Stopped
+
+if TYPE_CHECKING:
+    from hpcclear.ranks.team import Ranks
 
 EARLY = 1.0
 """Seconds from the beginning of a stage in which the first samples are waited for."""
@@ -125,38 +124,8 @@ class WorkQueue:
         return records
 
 
-class Process(Protocol):
-    """What a lead needs of its own process; see `hpcclear.ranks.team.Ranks`."""
-
-    mail: Mail
-    stop_switch: StopSwitch
-    rank: int
-    size: int
-
-    def make_queue(self, task: Any, /) -> tuple[WorkQueue, float]:
-        """A worker for a task, and the seconds it took to make it."""
-
-    def forget_queue(self) -> None:
-        """No sample is in hand any more."""
-
-    def timed(self, name: str, /) -> AbstractContextManager[np.ndarray]:
-        """Book the wall time inside; the table to fill, shape (ranks, 4), columns as in `COLUMNS`."""
-
-    def raise_if_stopped(self) -> None:
-        """Raise `Stopped` if requested to end early."""
-
-    def pass_on_stop(self) -> None:
-        """Report to root a signal that only this rank may have received."""
-
-    def heed(self, message: Message, /) -> None:
-        """Act on what a rank may say at any time."""
-
-    def writing(self) -> AbstractContextManager[None]:
-        """Count the time inside as output."""
-
-
 def run_points(
-    ranks: Process,
+    ranks: "Ranks",
     task: Task,
     points: Points,
     *,
@@ -198,10 +167,8 @@ def run_points(
     """
     earlier = np.empty(0, task.dtype) if completed is None else completed.astype(task.dtype)
     progress = Progress("", style="quiet") if progress is None else progress
-    shared = task.share is not None
-    members = ranks.mail.leaders if shared else list(range(1, ranks.size))
-    working = len(members) if shared else task.workers or ranks.size
-    lead = RootLead(ranks, HandOut(len(points), earlier["sample"], working), points, members)
+    book = HandOut(len(points), earlier["sample"], task.workers or ranks.size)
+    lead = Lead(ranks, book, points)
     lead.on_records, lead.save, lead.progress = on_records, save, progress
     lead.kept = Kept(len(points), earlier) if keep else None
     progress.start(len(points), earlier)
@@ -213,104 +180,28 @@ def run_points(
 
 
 class Lead:
-    """A design on its way through ranks, seen from who hands it out.
+    """Root's part in a stage: a design on its way through the ranks, seen from who hands it out."""
 
-    Parameters
-    ----------
-    ranks : Process
-        This one.
-    members : iterable of int
-        The ranks that are served.
-    """
-
-    def __init__(
-        self, ranks: Process, book: HandOut, points: Points, members: Iterable[int]
-    ) -> None:
+    def __init__(self, ranks: "Ranks", book: HandOut, points: Points) -> None:
         self._ranks, self._mail = ranks, ranks.mail
         self._points = points
-        self._present = set(members)  # ranks that will still say DONE
+        self._present = set(range(1, ranks.size))  # ranks that will still say DONE
         self._early = time.monotonic() + EARLY
-        self._closing = False
+        self._closing = self._failed = False
         self.book = book
-
-    def _answer(self, message: Message) -> None:
-        """Book what a rank sends, and give it what it requests."""
-        source, tag, body = message
-        if tag == Tag.ASK:
-            records, need = body
-            self._accept(records)
-            if not self._closing:
-                self._give(source, need)
-        elif tag == Tag.RECORDS:
-            self._accept(body)
-        elif tag == Tag.DONE:
-            records, times = body
-            self._present.discard(source)
-            self._book_times(times)
-            self._accept(records)
-        else:
-            self._hear_more(message)
-
-    def _give(self, source: int, need: Need) -> None:
-        """Send a rank samples."""
-        index, ask_below = self.book.grant(need)
-        self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
-
-    def _work_along(self, queue: WorkQueue, backoff: Backoff) -> None:
-        """Take samples oneself when it is time, and work on them for a moment; sleep if there is nothing to do."""
-        if queue.hungry and self._can_answer:
-            index, ask_below = self.book.grant(queue.need)
-            queue.take(index, self._points[index], ask_below)
-        if queue.idle:
-            backoff.wait()
-        else:
-            self._accept(queue.work(GLANCE if self._awaited else QUANTUM))
-
-    @property
-    def _awaited(self) -> bool:
-        """Whether others wait for their first samples or share the last."""
-        return bool(self._present) and (time.monotonic() < self._early or self.book.ending)
-
-    @property
-    def _can_answer(self) -> bool:
-        """Whether it is known now what a requesting rank may have; nothing, if no more will come."""
-        return True
-
-    def _accept(self, records: np.ndarray | None) -> None:
-        """Book finished records, and do with them what is to be done."""
-        raise NotImplementedError
-
-    def _book_times(self, times: list[tuple[int, float, float]]) -> None:
-        """Note rank, busy and set-up seconds of ranks that are through."""
-        raise NotImplementedError
-
-    def _hear_more(self, message: Message) -> None:
-        """Act on a message that is not about samples."""
-        raise NotImplementedError
-
-
-class RootLead(Lead):
-    """Root's part in a stage; parameters as `Lead`."""
-
-    def __init__(
-        self, ranks: Process, book: HandOut, points: Points, members: Iterable[int]
-    ) -> None:
-        super().__init__(ranks, book, points, members)
-        self._members = sorted(self._present)
-        self._failed = False
         self.progress = Progress("", style="quiet")
         self.on_records: Callable[[np.ndarray], object] | None = None
         self.save: Callable[[], object] | None = None
         self.kept: Kept | None = None
 
-    def work(self, task: object, spent: np.ndarray) -> None:
+    def work(self, task: Task, spent: np.ndarray) -> None:
         """Run the stage; whatever ends it, everything finished is collected and delivered.
 
         `spent`: seconds of each rank, columns as `COLUMNS`, to be filled in.
         """
         self._spent = spent
         self._ranks.raise_if_stopped()
-        self._mail.notify(self._members, Tag.STAGE, task)
+        self._mail.notify_others(Tag.STAGE, task)
         try:
             self._hand_out(task)
         except BaseException as error:
@@ -319,7 +210,7 @@ class RootLead(Lead):
             raise
         self._gather(until=None)
 
-    def _hand_out(self, task: object) -> None:
+    def _hand_out(self, task: Task) -> None:
         """Answer the others and work along until every sample is finished."""
         queue, self._spent[0, _COMPILE] = self._ranks.make_queue(task)
         backoff = Backoff()
@@ -333,10 +224,25 @@ class RootLead(Lead):
             self._spent[0, _BUSY] = queue.busy
             self.progress.refresh()
 
+    def _work_along(self, queue: WorkQueue, backoff: Backoff) -> None:
+        """Take samples oneself when it is time, and work on them for a moment; sleep if there is nothing to do."""
+        if queue.hungry:
+            index, ask_below = self.book.grant(queue.need)
+            queue.take(index, self._points[index], ask_below)
+        if queue.idle:
+            backoff.wait()
+        else:
+            self._accept(queue.work(GLANCE if self._awaited else QUANTUM))
+
+    @property
+    def _awaited(self) -> bool:
+        """Whether others wait for their first samples or share the last."""
+        return bool(self._present) and (time.monotonic() < self._early or self.book.ending)
+
     def _gather(self, until: float | None) -> None:
         """End the stage on every rank; after an error or a stop, do not wait for ever."""
         self._closing = True
-        self._mail.notify(self._members, Tag.END)
+        self._mail.notify_others(Tag.END)
         backoff = Backoff()
         while self._present and (until is None or time.monotonic() < until):
             message = self._mail.poll()
@@ -348,15 +254,27 @@ class RootLead(Lead):
                 with contextlib.suppress(RankFailed):
                     self._answer(message)
 
-    def _book_times(self, times: list[tuple[int, float, float]]) -> None:
-        for rank, busy, setup in times:
-            self._spent[rank, [_BUSY, _COMPILE]] = busy, setup
-
-    def _hear_more(self, message: Message) -> None:
-        if message.tag == Tag.ERROR:
-            self._present.discard(message.source)
-            self._accept(message.body[2])
-        self._ranks.heed(message)
+    def _answer(self, message: Message) -> None:
+        """Book what a rank sends, and give it what it requests."""
+        source, tag, body = message
+        if tag == Tag.ASK:
+            records, need = body
+            self._accept(records)
+            if not self._closing:
+                index, ask_below = self.book.grant(need)
+                self._mail.send(source, Tag.BLOCK, (index, self._points[index], ask_below))
+        elif tag == Tag.RECORDS:
+            self._accept(body)
+        elif tag == Tag.DONE:
+            records, times = body
+            self._present.discard(source)
+            self._spent[source, [_BUSY, _COMPILE]] = times
+            self._accept(records)
+        else:
+            if tag == Tag.ERROR:
+                self._present.discard(source)
+                self._accept(body[2])
+            self._ranks.heed(message)
 
     def _accept(self, records: np.ndarray | None) -> None:
         """Book finished records and hand them on; after a failure, do no more than keep them."""

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -28,7 +27,7 @@ class Leave(BaseException):
 
 
 class Tag(IntEnum):
-    """What a message says; the first five come from root, or of a stage from who hands out its samples."""
+    """What a message says; the first five come from root."""
 
     STAGE = 1  # a stage begins: its task
     CALL = 2  # do this once: (name, function, payload)
@@ -37,7 +36,7 @@ class Tag(IntEnum):
     LEAVE = 5  # the program is over: exit code
     ASK = 6  # wants samples: (finished records or None, need)
     RECORDS = 7  # finished records
-    DONE = 8  # stage or call are over here: (finished records or None, [(rank, busy and set-up seconds)])
+    DONE = 8  # stage or call are over here: (finished records or None, (busy, set-up seconds))
     STOP = 9  # has to stop: reason
     ERROR = 10  # failed: (report or InputError, finished records or None)
     LEFT = 11  # has heard LEAVE
@@ -86,10 +85,6 @@ class Mail:
         The same within this node, and the cores its ranks may use together.
     neighbours : list of int
         Ranks that this one exchanges pulses with (`hpcclear.ranks.watch`).
-    leaders : list of int
-        The first rank of each node except root.
-    group : list of int
-        Of a leader: the other ranks of its node but for root.
     """
 
     def __init__(self, mpi: Any = None, finalizes: bool = True) -> None:
@@ -102,8 +97,6 @@ class Mail:
         self._processes: dict[int, Process] = {}
         self._connections, self._address = Connections(), None
         self.neighbours: list[int] = []
-        self.leaders: list[int] = []
-        self.group: list[int] = []
         cores = host.cores()
         if mpi is None:
             self.rank, self.size = 0, 1
@@ -118,21 +111,18 @@ class Mail:
         self._look_around(mpi.Query_thread() >= mpi.THREAD_SERIALIZED)
 
     def _look_around(self, threads: bool) -> None:
-        """Who leads each node, and whom this rank exchanges pulses with, if it may from a thread.
+        """Find whom this rank exchanges pulses with, if it may from a thread.
 
         Root: the first rank of every other node, and all of its own; the first of a node: root and its others.
         """
         beside = self._node.allgather((self.rank, identity()))
         here = [rank for rank, _ in beside]
-        first, working = here[0], [rank for rank in here if rank != 0]
-        every = self._comm.allgather((first, working[0] if working else 0))
-        self.leaders = sorted({leader for _, leader in every} - {0})
-        if self.rank in self.leaders:
-            self.group = working[1:]
+        first = here[0]
+        every = self._comm.allgather(first)
         if threads and self.rank != first:
             self.neighbours = [first]
         elif threads:
-            firsts = sorted({head for head, _ in every} - {0})
+            firsts = sorted(set(every) - {0})
             self.neighbours = [*(firsts if first == 0 else [0]), *here[1:]]
         known = {rank: Process(it) for rank, it in beside if it and rank in self.neighbours}
         self._processes = {rank: process for rank, process in known.items() if process.visible}
@@ -150,14 +140,11 @@ class Mail:
 
     def notify_others(self, tag: Tag, body: object = None) -> None:
         """Post one message to every other rank."""
-        self.notify((other for other in range(self.size) if other != self.rank), tag, body)
-
-    def notify(self, others: Iterable[int], tag: Tag, body: object = None) -> None:
-        """Post one message to each of these ranks."""
         if self._mpi is not None:
             data = self._mpi.pickle.dumps(body)
-            for other in others:
-                self._post(other, tag, data)
+            for other in range(self.size):
+                if other != self.rank:
+                    self._post(other, tag, data)
 
     def _post(self, to: int, tag: Tag, data: bytes) -> None:
         with self._lock:

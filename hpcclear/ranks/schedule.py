@@ -57,26 +57,6 @@ class Points(Protocol):
         """Rows of the samples `index`, float64 (m, d)."""
 
 
-class Sharing(Protocol):
-    """What a leader does with bundles of samples, besides handing these out."""
-
-    @property
-    def points(self) -> Points:
-        """Points of the samples, by their numbers."""
-
-    def open(self, index: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
-        """Numbers of the samples in each of the bundles that came from root: their numbers (m,) and rows (m, d)."""
-
-    def take(self, records: np.ndarray) -> None:
-        """Take finished samples, records (m,)."""
-
-    def finished(self) -> np.ndarray:
-        """For root, once: a record for each bundle that is complete, shape (m,)."""
-
-    def unfinished(self) -> list[np.ndarray]:
-        """For root, at the end: records of whatever was taken of others, by type, shape (m,) each."""
-
-
 Maker = Callable[[Any, Any], Worker]
 """Makes a rank's worker from the payload of a stage and its `hpcclear.ranks.team.Ranks`; called on every rank."""
 
@@ -95,9 +75,6 @@ class Task:
     """Of the records; has a field ``sample``."""
     workers: int | None = None
     """How many ranks get samples, root first; by default all. The others only make their worker."""
-    share: Callable[[Any], Sharing] | None = None
-    """Of the payload: makes what the first rank of each node shares its bundles out with. Then the points are bundles, and
-    root, which hands them out, simulates nothing."""
 
 
 class Need(NamedTuple):
@@ -209,18 +186,12 @@ class HandOut:
         """Indices of samples for the requesting rank (none when nothing is left), and when it requests more."""
         self._rate = need.rate
         size, ask_below = allot(self.remaining, self._ranks, need)
-        index = self._waiting(self._next, self._next + size)
-        self._next += size
+        first, self._next = self._next, self._next + size
+        index = (
+            np.arange(first, self._next) if self._queue is None else self._queue[first : self._next]
+        )
         self.outstanding += size
         return index, ask_below
-
-    def extend(self, samples: np.ndarray) -> None:
-        """More samples to hand out, by their numbers (m,)."""
-        left = self._waiting(self._next, self._next + self.remaining)
-        self._queue, self._next = np.concatenate([left, samples]), 0
-
-    def _waiting(self, first: int, last: int) -> np.ndarray:
-        return np.arange(first, last) if self._queue is None else self._queue[first:last]
 
     def accept(self, records: np.ndarray) -> None:
         """Book finished records."""

@@ -17,7 +17,6 @@ import numpy as np
 from hpcclear.base.stopwatch import Stopwatch
 from hpcclear.ranks.leading import WorkQueue
 from hpcclear.ranks.mailbox import Backoff, Leave, Mail, Message, Tag
-from hpcclear.ranks.nodes import NodeLead
 from hpcclear.ranks.schedule import COLUMNS, GLANCE, QUANTUM, Task
 from hpcclear.ranks.stopping import RankFailed, Stopped, StopSwitch
 
@@ -137,7 +136,7 @@ class Ranks:
                     backoff.wait()
                 elif message.tag == Tag.DONE:
                     waited_for.discard(message.source)
-                    spent[message.source, COLUMNS.index("compile")] = message.body[1][0][2]
+                    spent[message.source, COLUMNS.index("compile")] = message.body[1][1]
                 else:
                     self.heed(message)
             self.raise_if_stopped()
@@ -187,7 +186,7 @@ class Ranks:
             self._known, self._recent = mark, np.zeros(2)
         self._queue = WorkQueue(task.make(task.payload, self), recent=self._recent)
         working = self.size if task.workers is None else task.workers
-        self._queue.exhausted = self.rank >= working or (task.share is not None and self.is_root)
+        self._queue.exhausted = self.rank >= working
         return self._queue, time.perf_counter() - started
 
     def serve(self, ahead: Sequence[str] = ()) -> NoReturn:
@@ -204,22 +203,16 @@ class Ranks:
                 raise Leave(message.body)
             elif message.tag == Tag.STAGE:
                 self._stage = message.body.name
-                if message.body.share is not None and message.source == 0:
-                    sharing = message.body.share(message.body.payload)
-                    NodeLead(self, sharing, self.mail.group).work(message.body)
-                else:
-                    self._serve_stage(message.body, message.source)
+                self._serve_stage(message.body)
                 self._queue = None
                 backoff.reset()
             elif message.tag == Tag.CALL:
                 self._stage, function, payload = message.body
-                self.mail.send(
-                    0, Tag.DONE, (None, [(self.rank, 0.0, self._call(function, payload))])
-                )
+                self.mail.send(0, Tag.DONE, (None, (0.0, self._call(function, payload))))
                 backoff.reset()
 
-    def _serve_stage(self, task: Task, leader: int) -> None:
-        """Request samples before the last ones are done, send records along, until who hands them out ends it."""
+    def _serve_stage(self, task: Task) -> None:
+        """Request samples before the last ones are done, send records along, until root ends the stage."""
         queue, setup = self.make_queue(task)
         asked, sent_at, backoff = False, time.monotonic(), Backoff()
         while (message := self.mail.poll()) is None or message.tag != Tag.END:
@@ -232,16 +225,16 @@ class Ranks:
                 backoff.reset()
             overdue = queue.idle or time.monotonic() - sent_at > FLUSH_INTERVAL
             if queue.hungry and not asked:
-                self.mail.send(leader, Tag.ASK, (self.outbox(), queue.need))
+                self.mail.send(0, Tag.ASK, (self.outbox(), queue.need))
                 asked, sent_at = True, time.monotonic()
             elif self._unsent and overdue:
-                self.mail.send(leader, Tag.RECORDS, self.outbox())
+                self.mail.send(0, Tag.RECORDS, self.outbox())
                 sent_at = time.monotonic()
             if queue.idle:
                 backoff.wait()
             else:
                 self._unsent.append(queue.work(GLANCE if queue.soon_hungry else QUANTUM))
-        self.mail.send(leader, Tag.DONE, (self.outbox(), [(self.rank, queue.busy, setup)]))
+        self.mail.send(0, Tag.DONE, (self.outbox(), (queue.busy, setup)))
 
     def outbox(self) -> np.ndarray | None:
         """Finished records that root has not got yet; empties the box."""

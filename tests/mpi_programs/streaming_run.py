@@ -1,8 +1,6 @@
 """Statistics of made-up outcomes of a scene's Monte Carlo points, streamed: streaming_run.py OUT.nc SAMPLES [LIMIT].
 
-SHARED=1: leaders of nodes share samples out, however few ranks there are. RAW=directory: samples are kept. BLOCKS=1: by the
-ranks that make them, however few blocks each gets. APART=1: every rank on a node of its own, where only root sees the directory
-of samples. FAILS=rank: its worker raises once it has finished some thousand samples.
+RAW=directory: samples are kept. FAILS=rank: its worker raises once it has finished some thousand samples.
 """
 
 import os
@@ -14,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.outcome import OUTCOME, Flag, Status
-from hpcclear.ensemble import parts, statistics
-from hpcclear.ensemble.raw import RawFiles
+from hpcclear.ensemble import statistics
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks import launcher
@@ -82,26 +79,14 @@ def scene_of(samples: int):
     return load_scene(SCENE, ['study.method="monte-carlo"', f"study.samples={samples}"])
 
 
-def refused(*arguments: object) -> None:
-    raise PermissionError("this node has no such directory")
-
-
 def main(output: str, samples: str, limit: str = "") -> int:
     def program(ranks: Ranks) -> None:
-        if "APART" in os.environ:
-            ranks.mail.node_size = 1
         options = Options(style="quiet")
         raw = Path(os.environ["RAW"]) if "RAW" in os.environ else None
         run_statistics(scene_of(int(samples)), Path(output), ranks, raw=raw, options=options)
         print("peak MB", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
     statistics.make_evaluator = make_made_up  # type: ignore[assignment]
-    if "SHARED" in os.environ:
-        statistics.SHARED_FROM = 2
-    if "APART" in os.environ and launcher.launched_rank() != 0:
-        RawFiles.write = refused  # type: ignore[assignment]
-    if "BLOCKS" in os.environ:
-        parts.PARTS_A_RANK = 1
     with StopSwitch(ends_process=True) as stop:
         if limit:
             stop.limit_time(float(limit))

@@ -56,19 +56,6 @@ class Summary:
         freedom = np.where(self.count > 1, self.count - 1, 1)
         return np.where(self.count > 1, np.sqrt(self.squares / freedom), np.nan)
 
-    def quantile(self, probability: float, edges: Array) -> Array:
-        """Quantiles read off the histogram, linear within a bin; NaN in the outer bins, shape (rows,)."""
-        found = np.full(len(self.histogram), np.nan)
-        for row, counts in enumerate(self.histogram):
-            below = np.concatenate([[0], np.cumsum(counts)])
-            wanted = probability * below[-1]
-            cell = int(np.searchsorted(below, wanted, side="left")) - 1
-            if below[-1] > 0 and 1 <= cell <= len(counts) - 2:
-                share = (wanted - below[cell]) / counts[cell]
-                low, high = edges[row, cell - 1], edges[row, cell]
-                found[row] = low + share * (high - low)
-        return found
-
 
 class Moments(NamedTuple):
     """Number of values, mean and sum of squared differences from it, arrays of one shape."""
