@@ -11,8 +11,9 @@ from pathlib import Path
 
 from hpcclear.ranks.team import FLUSH_INTERVAL
 
-UNSAVED = "readings: simulations"
-"""The stage whose samples are kept a reading at a time."""
+UNSAVED = ("readings: simulations", "surrogate: ", "random inputs: ", "parallel: ")
+"""Beginnings of the names of stages that are kept a reading or a panel of `accuracy` at a time, not by samples: batches that are
+timed are whole."""
 
 COMPILING = "compilation#"
 """Beginning of the name of a design that is simulated at each start, so that every rank has its kernel."""
@@ -57,7 +58,9 @@ def saved_and_since(events: list[Event]) -> tuple[set[str], float]:
             received |= event.samples
         elif event.what in ("saving", "saving a stage"):
             writing, began = set(received), event.time
-            if event.what == "saving":  # only the result of a reading is kept, not its samples
+            if (
+                event.what == "saving"
+            ):  # only the result of a reading or panel is kept, not its samples
                 writing = {sample for sample in writing if not sample.startswith(UNSAVED)}
         elif event.what in ("saved", "saved a stage"):
             saved, since = saved | writing, began
