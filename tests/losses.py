@@ -12,8 +12,8 @@ from pathlib import Path
 from hpcclear.ranks.team import FLUSH_INTERVAL
 
 UNSAVED = ("readings: simulations", "surrogate: ", "random inputs: ", "parallel: ")
-"""Beginnings of the names of stages that are kept a reading or a panel of `accuracy` at a time, not by samples: batches that are
-timed are whole."""
+"""Beginnings of the names of stages that are kept a reading or a panel of `accuracy` at a time, not by samples: a
+batch that is timed is whole."""
 
 COMPILING = "compilation#"
 """Beginning of the name of a design that is simulated at each start, so that every rank has its kernel."""
