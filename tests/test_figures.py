@@ -39,7 +39,7 @@ PLAIN = {
     data.kriging: ("surfaces", "parity"),
     data.front: ("front",),
     data.response: (
-        *("response", "penetration", "energy", "spectrum"),
+        *("response", "penetration", "energy"),
         *("orbit", "force_polar", "phase", "poincare"),
     ),
     data.timing: ("timing",),
@@ -155,9 +155,6 @@ FIGURES: dict[str, Callable[[], Figure]] = {
         {name: data.response(2) for name in ("original", "light gamma", "light delta")}
     ),
     "comparison, one": lambda: report.comparison_figure({"mine": data.response(2)}),
-    "bifurcation": lambda: report.bifurcation_figure(
-        [data.response(clearance=c) for c in (1e-4, 2e-4, 3e-4)]
-    ),
     "energy, all entries": lambda: report.energy_figure(_loaded()),
     "phase, guided": lambda: report.phase_figure(_guided()),
     "timing, many stages": lambda: report.timing_figure(_many_stages()),
@@ -231,7 +228,6 @@ def test_every_axis_has_a_label_with_its_unit(figure: Figure) -> None:
 
 
 CUT_ON_PURPOSE = {
-    "spectrum": "what is a millionth of the highest line is the window's own",
     "energy": "a residual of a hundred-thousandth of the largest is round-off, on an axis of decades",
     "fit": "an R2 far below 0 or an error of twice the scatter says no more than that the fit failed",
 }
@@ -289,16 +285,6 @@ def test_a_steady_response_that_starts_late_keeps_its_revolutions() -> None:
     assert motion.whole_turns(late) == 2
     assert motion.whole_turns(motion.latest(late, 5)) == 2
     np.testing.assert_allclose(motion.section(late, "slider_position"), 0.17)
-
-
-def test_spectrum_finds_amplitude_and_order() -> None:
-    response = data.response(8, instants=500)
-    order, amplitude = motion.spectrum(
-        response, 3.0 * np.cos(5.0 * response["crank_angle"].to_numpy()) + 7.0
-    )
-    peak = int(np.argmax(amplitude))
-    assert order[peak] == pytest.approx(5.0)
-    assert amplitude[peak] == pytest.approx(3.0, rel=1e-6)
 
 
 def test_drawing_leaves_a_figure_as_it_was():

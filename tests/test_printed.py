@@ -10,8 +10,7 @@ from click.testing import CliRunner
 from commands import finish, start
 from test_figures import _other_goals
 
-from hpcclear import load_scene, report
-from hpcclear.base.errors import InputError
+from hpcclear import report
 from hpcclear.base.objectives import Usual
 from hpcclear.cli import cli
 from hpcclear.cli.response import describe_response
@@ -216,49 +215,3 @@ def test_contact_is_drawn_along_the_bore_and_never_across_it(seed):
             assert np.nanmin(depth) > 0.3 * (1.0 - 2e-4)  # steps of 2 degrees sag by 1.5e-4
         joined = np.isfinite(drawn["contact arc"]).all(axis=1)
         assert joined.sum() >= (shown["penetration"].to_numpy()[:, 0] > 0.0).sum()
-
-
-VARIED = {
-    "drive.speed": ([100.0, 200.0, 300.0], "speed of the drive (rpm)", 30.0 / np.pi),
-    "mechanism.rod.mass": ([0.1, 0.2, 0.3], "mass of the rod (kg)", 1.0),
-    "mechanism.rod.length": ([0.12, 0.14, 0.16], "length of the rod (mm)", 1e3),
-    "effects.contact.restitution": ([0.5, 0.6, 0.7], "restitution of the contact (–)", 1.0),
-    "joints.crank_rod.clearance": (
-        [1e-4, 2e-4, 4e-4],
-        "radial clearance of the joint crank_rod (mm)",
-        1e3,
-    ),
-    "clearances": ([1e-4, 2e-4, 4e-4], "clearance $C$ (mm)", 1e3),
-}
-
-
-def of_scenes(scene, paths, values) -> list[xr.Dataset]:
-    found = []
-    for value in values:
-        response = data.response()
-        response.attrs["scene"] = scene.with_(dict.fromkeys(paths, value)).text
-        found.append(response)
-    return found
-
-
-@pytest.mark.parametrize("path", VARIED)
-def test_a_bifurcation_is_drawn_over_what_was_varied(path):
-    values, label, factor = VARIED[path]
-    paths = (
-        ("joints.crank_rod.clearance", "joints.rod_slider.clearance")
-        if path == "clearances"
-        else (path,)
-    )
-    figure = report.bifurcation_figure(of_scenes(load_scene(SLIDER_CRANK), paths, values))
-    assert figure.axes[1].get_xlabel() == label
-    across = np.unique(figure.axes[0].lines[0].get_xdata())
-    assert across == pytest.approx(factor * np.array(values))
-
-
-def test_responses_that_differ_in_two_entries_make_no_bifurcation():
-    scene = load_scene(SLIDER_CRANK)
-    several = of_scenes(scene, ("drive.speed",), [100.0]) + of_scenes(
-        scene, ("mechanism.rod.mass",), [0.1]
-    )
-    with pytest.raises(InputError, match="differ in several entries"):
-        report.bifurcation_figure(several)

@@ -1,109 +1,33 @@
 """Figures, each a function of a dataset, and the HTML page.
 
-A figure is loaded when it is first used: a command that prints a few numbers of a response needs none. Figures need matplotlib
+Every function of `hpcclear.report.figures` whose name ends in ``_figure`` is an attribute of this package, and `save` too. They
+are loaded when one is first used: a command that prints a few numbers of a response needs none. Figures need matplotlib
 (the extra ``analysis``), which is imported when the first one is drawn.
 """
 
+import pkgutil
+from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from hpcclear.report.figures.compared import overlay_figure
-    from hpcclear.report.figures.designs import comparison_figure, front_figure
-    from hpcclear.report.figures.effects import effects_figure
-    from hpcclear.report.figures.identified import (
-        features_figure,
-        growth_figure,
-        posterior_figure,
-    )
-    from hpcclear.report.figures.maps import bifurcation_figure, map_figure
-    from hpcclear.report.figures.portraits import (
-        force_polar_figure,
-        orbit_figure,
-        phase_figure,
-        poincare_figure,
-    )
-    from hpcclear.report.figures.response import (
-        energy_figure,
-        penetration_figure,
-        response_figure,
-        spectrum_figure,
-    )
-    from hpcclear.report.figures.samples import samples_figure
-    from hpcclear.report.figures.sketch import sketch_figure
-    from hpcclear.report.figures.style import save
-    from hpcclear.report.figures.surrogates import (
-        fit_figure,
-        parity_figure,
-        sensitivity_figure,
-        sobol_figure,
-        surfaces_figure,
-    )
-    from hpcclear.report.figures.timing import timing_figure
-    from hpcclear.report.figures.wear import fan_figure, profile_figure, survival_figure
-
-__all__ = [
-    "bifurcation_figure",
-    "comparison_figure",
-    "effects_figure",
-    "energy_figure",
-    "fan_figure",
-    "features_figure",
-    "fit_figure",
-    "force_polar_figure",
-    "front_figure",
-    "growth_figure",
-    "map_figure",
-    "orbit_figure",
-    "overlay_figure",
-    "parity_figure",
-    "penetration_figure",
-    "phase_figure",
-    "poincare_figure",
-    "posterior_figure",
-    "profile_figure",
-    "response_figure",
-    "samples_figure",
-    "save",
-    "sensitivity_figure",
-    "sketch_figure",
-    "sobol_figure",
-    "spectrum_figure",
-    "surfaces_figure",
-    "survival_figure",
-    "timing_figure",
-]
-
-_IN = {
-    "compared": ("overlay_figure",),
-    "designs": ("comparison_figure", "front_figure"),
-    "effects": ("effects_figure",),
-    "identified": ("features_figure", "growth_figure", "posterior_figure"),
-    "maps": ("bifurcation_figure", "map_figure"),
-    "portraits": ("force_polar_figure", "orbit_figure", "phase_figure", "poincare_figure"),
-    "response": ("energy_figure", "penetration_figure", "response_figure", "spectrum_figure"),
-    "samples": ("samples_figure",),
-    "sketch": ("sketch_figure",),
-    "style": ("save",),
-    "surrogates": (
-        "fit_figure",
-        "parity_figure",
-        "sensitivity_figure",
-        "sobol_figure",
-        "surfaces_figure",
-    ),
-    "timing": ("timing_figure",),
-    "wear": ("fan_figure", "profile_figure", "survival_figure"),
-}
-"""Modules of `figures`, and what is public of each."""
+from hpcclear.report import figures
 
 
-def __getattr__(name: str) -> object:
-    for module, names in _IN.items():
-        if name in names:
-            return getattr(import_module(f"{__name__}.figures.{module}"), name)
+@cache
+def _public() -> dict[str, Any]:
+    modules = [
+        import_module(f"{figures.__name__}.{m.name}")
+        for m in pkgutil.iter_modules(figures.__path__)
+    ]
+    named = [(name, one) for module in modules for name, one in vars(module).items()]
+    return {name: one for name, one in named if name == "save" or name.endswith("_figure")}
+
+
+def __getattr__(name: str) -> Any:
+    if (name == "save" or name.endswith("_figure")) and name in _public():
+        return _public()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    return [*globals(), *_public()]

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +10,6 @@ from hpcclear.report import targets
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
 
 MARGIN = 100.0
 """Errors count as resolved from this many times the reference's own error on."""
@@ -32,13 +27,7 @@ _WORDS = {
 }
 
 
-def _legend_above(figure: "Figure", axes: "Axes") -> None:
-    """One legend for all panels: that of the panel given."""
-    handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=2)
-
-
-def _foot(figure: "Figure", found: Results, *sentences: str) -> None:
+def _foot(figure: "style.Figure", found: Results, *sentences: str) -> None:
     """Where the numbers come from, below a figure."""
     versions = str(found.attrs.get("versions", ""))
     lines = [*sentences, str(found.attrs.get("processor", "")), versions]
@@ -46,7 +35,7 @@ def _foot(figure: "Figure", found: Results, *sentences: str) -> None:
     figure.supxlabel(labels.literal(text), x=0.02, ha="left", fontsize=style.SMALL)
 
 
-def _decades(axis: "Axis") -> None:
+def _decades(axis: "style.Axis") -> None:
     """Few decade ticks, so that labels do not meet in half a column."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -58,7 +47,7 @@ FEW_DECADES = 50.0
 """Ratio of the ends of a time axis above which only decades have a tick: more labels would meet."""
 
 
-def _plain(axis: "Axes") -> None:
+def _plain(axis: "style.Axes") -> None:
     """A logarithmic time axis above a panel, with plain numbers at its ticks."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -67,17 +56,10 @@ def _plain(axis: "Axes") -> None:
     axis.xaxis.set_major_locator(LogLocator(subs=subs, numticks=12))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.xaxis.set_minor_formatter(NullFormatter())
-    axis.tick_params(labelsize=style.SMALL, length=2.0, pad=1.0)
-
-
-def _small(axes: Any) -> None:
-    """Minor labels of short logarithmic axes of the same size as the others."""
-    for panel in np.ravel(axes):
-        panel.tick_params(axis="both", which="minor", labelsize=style.SMALL)
 
 
 @style.drawn
-def integration_figure(found: Results) -> "Figure":
+def integration_figure(found: Results) -> "style.Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
     quantities = [str(q) for q in found["quantity"].to_numpy()]
     figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
@@ -88,8 +70,7 @@ def integration_figure(found: Results) -> "Figure":
         axes[row, 0].set_ylabel(f"{_WORDS.get(quantity, quantity)}\nrelative error (–)")
     axes[-1, 0].set_xlabel("wall time (ms)")
     axes[-1, 1].set_xlabel("force evaluations (–)")
-    style.settle(axes)
-    _legend_above(figure, axes[0, 0])
+    style.legend(figure, axes[0, 0], "upper")
     _foot(
         figure,
         found,
@@ -99,23 +80,15 @@ def integration_figure(found: Results) -> "Figure":
     return figure
 
 
-def _ladder(axes: "Axes", here: Results, work: str) -> None:
+def _ladder(axes: "style.Axes", here: Results, work: str) -> None:
     """One line a method; what the reference cannot resolve is hollow."""
     factor = 1e3 if work == "seconds" else 1.0
     floor = MARGIN * float(here["reference_error"])
     for k, method in enumerate(here["integrator"].to_numpy()):
         x, y = here[work].to_numpy()[k] * factor, here["error"].to_numpy()[k]
-        look = k % len(style.CYCLE)
-        colour, dashes = style.CYCLE[look], style.DASHES[(look + k // len(style.CYCLE)) % 7]
-        label = labels.literal(str(method))
-        axes.loglog(x, y, ls=dashes, color=colour, lw=0.8)
-        for hollow in (False, True):
-            chosen = (y < floor) == hollow
-            axes.plot(
-                x[chosen], y[chosen], ls="none", marker=style.MARKERS[look], ms=2.8, color=colour,
-                mfc="white" if hollow else colour, mew=0.6,
-            )  # fmt: skip
-        axes.plot([], [], ls=dashes, marker=style.MARKERS[look], ms=2.8, color=colour, label=label)
+        look, unresolved = {**style.look(k), "ms": 2.8, "mew": 0.6}, y < floor
+        axes.loglog(x, y, lw=0.8, label=labels.literal(str(method)), **look)
+        axes.plot(x[unresolved], y[unresolved], mfc="white", **{**look, "ls": "none"})
     if np.isfinite(floor):
         axes.axhspan(axes.get_ylim()[0], floor, color="#eeeeee", zorder=0)
     for axis in (axes.xaxis, axes.yaxis):
@@ -123,18 +96,13 @@ def _ladder(axes: "Axes", here: Results, work: str) -> None:
 
 
 @style.drawn
-def averaging_figure(found: Results) -> "Figure":
+def averaging_figure(found: Results) -> "style.Figure":
     """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
     panel, error = axes[0, 0], found["averaging_error"]
     for k, transient in enumerate(found["transient"].to_numpy()):
         y = error.sel(transient=transient).to_numpy()
-        again, look = divmod(k, len(style.CYCLE))  # the second round has hollow marks
-        panel.loglog(
-            found["averaged"], y, color=style.CYCLE[look], ls=style.DASHES[look],
-            marker=style.MARKERS[look], label=str(transient),
-            **({"mfc": "white"} if again else {}),
-        )  # fmt: skip
+        panel.loglog(found["averaged"], y, label=str(transient), **style.look(k))
     floor = float(found["averaging_floor"])
     if floor > 0.0:
         panel.axhline(floor, color="black", lw=0.6, ls=(0, (6, 2)))
@@ -142,16 +110,11 @@ def averaging_figure(found: Results) -> "Figure":
             f"scatter of replicas {floor:.0e}", (0.99, floor), xycoords=("axes fraction", "data"),
             ha="right", va="bottom", fontsize=style.SMALL,
         )  # fmt: skip
-    handles, names = panel.get_legend_handles_labels()
-    figure.legend(
-        handles, names, title="transient revolutions", loc="outside upper center", ncols=5
-    )
-    panel.set_xlabel("averaged revolutions (–)")
-    panel.set_ylabel("relative error of $f$ (–)")
+    style.legend(figure, panel, "upper", title="transient revolutions", ncols=5)
+    panel.set(xlabel="averaged revolutions (–)", ylabel="relative error of $f$ (–)")
     turn = 1e3 * float(found["turn_seconds"])
     above = panel.secondary_xaxis("top", functions=(lambda x: x * turn, lambda t: t / turn))
     above.set_xlabel("core time of the averaged revolutions (ms)")
-    style.settle([panel])
     _plain(above)
     _foot(
         figure,
@@ -162,7 +125,7 @@ def averaging_figure(found: Results) -> "Figure":
 
 
 @style.drawn
-def surrogate_figure(found: Results) -> "Figure":
+def surrogate_figure(found: Results) -> "style.Figure":
     """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
     figure, axes = style.grid(3, 1, 145.0, sharex=True)
     size, each = found["training"].to_numpy(), float(found["sample_seconds"])
@@ -173,15 +136,7 @@ def surrogate_figure(found: Results) -> "Figure":
     )
     for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
         for k, surrogate in enumerate(found["surrogate"].to_numpy()):
-            y = values[k]
-            panel.loglog(
-                size,
-                y,
-                color=style.CYCLE[k],
-                ls=style.DASHES[k],
-                marker=style.MARKERS[k],
-                label=surrogate,
-            )
+            panel.loglog(size, values[k], label=surrogate, **style.look(k))
         panel.set_ylabel(words)
     axes[0, 0].legend()
     axes[-1, 0].set_xlabel("training samples (–)")
@@ -189,15 +144,13 @@ def surrogate_figure(found: Results) -> "Figure":
     axes[-1, 0].minorticks_off()
     above = axes[0, 0].secondary_xaxis("top", functions=(lambda x: x * each, lambda t: t / each))
     above.set_xlabel("simulation time (core-seconds)")
-    style.settle(axes)
-    _small(axes)
     _plain(above)
     _foot(figure, found, f"{found.attrs.get('study', '')}; fresh test points.")
     return figure
 
 
 @style.drawn
-def random_inputs_figure(found: Results) -> "Figure":
+def random_inputs_figure(found: Results) -> "style.Figure":
     """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
     bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
@@ -209,13 +162,10 @@ def random_inputs_figure(found: Results) -> "Figure":
             bars = [y - one["moment_lower"].to_numpy(), one["moment_upper"].to_numpy() - y]
             for column, x in enumerate((found["draws"], one["moment_seconds"])):
                 axes[row, column].errorbar(
-                    x.to_numpy(), y, bars, color=style.CYCLE[k], ls=style.DASHES[k],
-                    marker=style.MARKERS[k], elinewidth=0.6, label=str(estimate),
-                )  # fmt: skip
-        for column in (0, 1):
-            panel = axes[row, column]
-            panel.set_xscale("log")
-            panel.set_yscale("log")
+                    x.to_numpy(), y, bars, elinewidth=0.6, label=str(estimate), **style.look(k)
+                )
+        for panel in axes[row]:
+            panel.set(xscale="log", yscale="log")
             panel.axhline(
                 abs(float(here["moment_bias"])), color="black", lw=0.6, ls=(0, (6, 2)),
                 label="surrogate's bias",
@@ -229,9 +179,7 @@ def random_inputs_figure(found: Results) -> "Figure":
     axes[-1, 1].set_xlabel("core time (s)")
     for panel in axes.flat:
         _decades(panel.xaxis)
-    style.settle(axes)
-    _small(axes)
-    _legend_above(figure, axes[0, 1])
+    style.legend(figure, axes[0, 1], "upper")
     _foot(
         figure,
         found,
@@ -242,7 +190,7 @@ def random_inputs_figure(found: Results) -> "Figure":
 
 
 @style.drawn
-def parallel_figure(found: Results) -> "Figure":
+def parallel_figure(found: Results) -> "style.Figure":
     """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
     number = found["ranks"].to_numpy()
@@ -252,21 +200,18 @@ def parallel_figure(found: Results) -> "Figure":
     left.plot(number, number * weak[0] / weak, "s--", color=style.CYCLE[1], label="batch a rank")
     left.plot(number, number, color=style.PALETTE["grey"], lw=0.6, label="ideal")
     left.set_xticks(number, [str(n) for n in number])
-    left.set_xlabel("ranks (–)")
-    left.set_ylabel("speed-up (–)")
+    left.set(xlabel="ranks (–)", ylabel="speed-up (–)")
     left.legend()
     lost = found["lost_seconds"].to_numpy()
     right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.PALETTE["sky"])
     right.set_yticks(np.arange(len(lost)), [str(x) for x in found["loss"].to_numpy()])
-    right.set_xlabel("lost (core-seconds)")
-    right.set_ylabel("time lost to (what)")
-    style.settle(axes)
+    right.set(xlabel="lost (core-seconds)", ylabel="time lost to (what)")
     _foot(figure, found, f"{found.attrs.get('batch', '')}.")
     return figure
 
 
 @style.drawn
-def spending_figure(found: Results) -> "Figure":
+def spending_figure(found: Results) -> "style.Figure":
     """Error of a steady mean against core time, a line a tolerance; below, what each tolerance is off by."""
     figure, axes = style.grid(2, 1, 150.0, height_ratios=(2.2, 1.0))
     top, bottom = axes[:, 0]
@@ -275,37 +220,27 @@ def spending_figure(found: Results) -> "Figure":
     model = np.where(model > 0.0, model, np.nan)
     best = float(found["cheapest_tolerance"][np.abs(found["aim"].to_numpy() - AIM).argmin()])
     for k, rtol in enumerate(tolerance):
-        look = k % len(style.CYCLE)
         if rtol == best:
             top.loglog(seconds[k], model[k], color="#cccccc", lw=5.0, solid_capstyle="round")
-        top.loglog(seconds[k], model[k], color=style.CYCLE[look], ls=style.DASHES[look], lw=0.8)
-        top.plot(
-            seconds[k], found["spent_error"].to_numpy()[k], ls="none", marker=style.MARKERS[look],
-            ms=2.8, color=style.CYCLE[look],
-        )  # fmt: skip
-        top.plot(
-            [], [], color=style.CYCLE[look], ls=style.DASHES[look], marker=style.MARKERS[look],
-            ms=2.8, label=f"{rtol:.0e}" + (" (cheapest)" if rtol == best else ""),
-        )  # fmt: skip
+        look = {**style.look(k), "ms": 2.8}
+        top.loglog(seconds[k], model[k], lw=0.8, **{**look, "marker": ""})
+        top.plot(seconds[k], found["spent_error"].to_numpy()[k], **{**look, "ls": "none"})
+        top.plot([], [], label=f"{rtol:.0e}" + (" (cheapest)" if rtol == best else ""), **look)
     top.plot(
         found["cheapest_seconds"], found["aim"], ls="none", marker="*", ms=6.0, color="black",
         mfc="white", label="cheapest to an error",
     )  # fmt: skip
-    top.set_xlabel("core time, spin-up included (s)")
-    top.set_ylabel("relative error of $f$ (–)")
+    top.set(xlabel="core time, spin-up included (s)", ylabel="relative error of $f$ (–)")
     bias, doubt = (found[name].to_numpy() for name in ("tolerance_bias", "tolerance_bias_error"))
     bottom.errorbar(
         tolerance, np.abs(bias), 2.0 * doubt, ls="none", marker="o", ms=2.8, elinewidth=0.6,
         color=style.CYCLE[0],
     )  # fmt: skip
-    bottom.set_xscale("log")
-    bottom.set_yscale("log")
+    bottom.set(
+        xscale="log", yscale="log", xlabel="relative tolerance (–)", ylabel="bias of $f$ (–)"
+    )
     bottom.invert_xaxis()
-    bottom.set_xlabel("relative tolerance (–)")
-    bottom.set_ylabel("bias of $f$ (–)")
-    style.settle(axes)
-    handles, names = top.get_legend_handles_labels()
-    figure.legend(handles, names, title="relative tolerance", loc="outside upper center", ncols=2)
+    style.legend(figure, top, "upper", title="relative tolerance")
     _foot(
         figure,
         found,
@@ -316,7 +251,7 @@ def spending_figure(found: Results) -> "Figure":
 
 
 @style.drawn
-def total_figure(found: Results) -> "Figure":
+def total_figure(found: Results) -> "style.Figure":
     """Total error of f of one design against run time: the cheapest settings, three targets, and the scene's own settings."""
     figure, axes = style.grid(1, 1, 90.0)
     panel, best = axes[0, 0], targets.front(found)
@@ -331,34 +266,30 @@ def total_figure(found: Results) -> "Figure":
             1e3 * own.seconds, own.error, ls="none", marker="s", ms=9.0, color=style.PALETTE["vermilion"],
             mfc="none", label="your settings", zorder=4,
         )  # fmt: skip
-    _with_room(panel)
+    box = (
+        panel.dataLim
+    )  # wide enough for a tick: 1, 2 or 5 of the time, a power of ten of the error
+    panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
     for way, aims, mark in zip(*_recommended(panel, found), _TARGET_MARKS, strict=False):
         panel.plot(
             1e3 * way.seconds, way.error, ls="none", marker=mark, ms=_MARK, color="black", mfc="white",
             label="for " + ", ".join(f"{aim * 100:g}" for aim in aims) + " %", zorder=5,
         )  # fmt: skip
-    panel.set_xlabel("core time of one design (ms)")
-    panel.set_ylabel("relative error of $f$ (–)")
-    style.settle([panel])
+    panel.set(xlabel="core time of one design (ms)", ylabel="relative error of $f$ (–)")
     _decades(panel.yaxis)
     _plain(panel)
-    _legend_above(figure, panel)
+    style.legend(figure, panel, "upper")
     _foot(figure, found, targets.caption(found))
     return figure
-
-
-def _with_room(panel: "Axes") -> None:
-    """Set ranges of logarithmic axes wide enough for a tick, 1, 2 or 5 of the time and a power of ten of the error."""
-    box = panel.dataLim
-    panel.set_xlim(0.7 * box.x0, 1.8 * box.x1)
-    panel.set_ylim(0.3 * box.y0, 3.4 * box.y1)
 
 
 _TARGET_MARKS, _MARK = "*Dp", 6.0
 """Marks of recommended settings, and their size in points."""
 
 
-def _recommended(panel: "Axes", found: Results) -> tuple[list[targets.Way], list[list[float]]]:
+def _recommended(
+    panel: "style.Axes", found: Results
+) -> tuple[list[targets.Way], list[list[float]]]:
     """Recommended settings and the targets of each; settings whose marks would cover each other are one, the more accurate."""
     kept: list[targets.Way] = []
     aims: list[list[float]] = []
@@ -377,45 +308,27 @@ def _recommended(panel: "Axes", found: Results) -> tuple[list[targets.Way], list
     return kept, aims
 
 
-FIGURES: "dict[str, Callable[[Results], Figure]]" = {
-    "total": total_figure,
-    "spending": spending_figure,
-    "integration": integration_figure,
-    "averaging": averaging_figure,
-    "surrogate": surrogate_figure,
-    "random_inputs": random_inputs_figure,
-    "parallel": parallel_figure,
-}
-"""The figures of a dataset, by the name of their file."""
-
-_CAPTIONS = {
-    "spending": "Error of a steady mean against run time, by tolerance, and the bias of each tolerance.",
-    "integration": "Error of one revolution against run time and force evaluations, by integrator.",
-    "averaging": "Error of f against averaged revolutions, by transient.",
-    "surrogate": "Accuracy of the surrogates against training samples.",
-    "random_inputs": "Error of mean and standard deviation against Monte Carlo samples.",
-    "parallel": "Speed-up on the available ranks, and time lost.",
-}
-
-
 def _total_caption(found: Results) -> str:
     return f"Total error of f of one design against core time. {targets.caption(found)}"
 
 
-PARTS = tuple(
-    FigureOf(
-        "accuracy", f"accuracy-{name.replace('_', '-')}", draw, _CAPTIONS.get(name, _total_caption), k, apart=True
-    )
-    for k, (name, draw) in enumerate(FIGURES.items())
+_FIGURES: tuple[tuple[Callable[..., Any], tuple[str, ...], str | Callable[..., str]], ...] = (
+    (total_figure, ("spent_error", "averaging_error"), _total_caption),
+    (spending_figure, ("spent_error",), "Error of a steady mean against run time by tolerance, and the bias of each."),
+    (integration_figure, ("error",), "Error of one revolution against run time and force evaluations, by integrator."),
+    (averaging_figure, ("averaging_error",), "Error of f against averaged revolutions, by transient."),
+    (surrogate_figure, ("r2",), "Accuracy of the surrogates against training samples."),
+    (random_inputs_figure, ("moment_error",), "Error of mean and standard deviation against Monte Carlo samples."),
+    (parallel_figure, ("strong_seconds",), "Speed-up on the available ranks, and time lost."),
 )  # fmt: skip
 
-MAIN = {
-    "total": ("spent_error", "averaging_error"),
-    "spending": ("spent_error",),
-    "integration": ("error",),
-    "averaging": ("averaging_error",),
-    "surrogate": ("r2",),
-    "random_inputs": ("moment_error",),
-    "parallel": ("strong_seconds",),
-}
+FIGURES = {draw.__name__.removesuffix("_figure"): draw for draw, *_ in _FIGURES}
+"""The figures of a dataset, by the name of their file."""
+
+MAIN = dict(zip(FIGURES, (shown for _, shown, _ in _FIGURES), strict=True))
 """The variables that each of them shows: it can be drawn as soon as the first is there, and again with each other one."""
+
+PARTS = tuple(
+    FigureOf("accuracy", f"accuracy-{name.replace('_', '-')}", draw, caption, k, apart=True)
+    for k, (name, (draw, _, caption)) in enumerate(zip(FIGURES, _FIGURES, strict=True))
+)

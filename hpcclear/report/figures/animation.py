@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +15,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, moving, style
 from hpcclear.results import files
 from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 RATE = 25
 """Frames a second: a frame takes 40 ms, which a GIF can say."""
@@ -81,7 +77,7 @@ def _pictures(shown: Results, count: int) -> Iterator[Array]:
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _scene(shown: Results) -> "tuple[Figure, Any]":
+def _scene(shown: Results) -> "tuple[style.Figure, Any]":
     """The figure without what moves, and a function that gives these artists at an instant."""
     with style.matplotlib().rc_context({**style.RC, "backend": "agg"}):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -109,23 +105,19 @@ def _scene(shown: Results) -> "tuple[Figure, Any]":
 class _Mechanism:
     """Bodies as lines and areas through their points."""
 
-    def __init__(self, axes: "Axes", shown: Results) -> None:
+    def __init__(self, axes: "style.Axes", shown: Results) -> None:
         self._bodies, self._points, _ = moving.bodies(shown)
         unit = labels.scale("m", self._points)
-        self._points = self._points * unit.factor
+        self._points = unit(self._points)
         low, high = self._points.min(axis=(0, 1)), self._points.max(axis=(0, 1))
         margin = 0.08 * float((high - low).max())
-        axes.set(
-            xlim=(low[0] - margin, high[0] + margin),
-            ylim=(low[1] - margin, high[1] + margin),
-            aspect="equal",
-        )
-        axes.set_xlabel(unit.label("x"))
-        axes.set_ylabel(unit.label("y"))
-        colours = [style.CYCLE[k % 7] for k in range(len(self._bodies))]
+        (left, bottom), (right, top) = low - margin, high + margin
+        axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+        axes.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
+        look: style.Look = {"lw": 2.0, "ms": 3.5, "animated": True}
         self._lines = [
-            axes.plot([], [], "o-", color=colour, lw=2.0, ms=3.5, animated=True)[0]
-            for colour in colours
+            axes.plot([], [], "o-", color=style.CYCLE[k % 7], **look)[0]
+            for k in range(len(self._bodies))
         ]
 
     def at(self, k: int) -> list[Any]:
@@ -136,15 +128,14 @@ class _Mechanism:
         return self._lines
 
 
-def _forces(axes: "Axes", shown: Results) -> Any:
+def _forces(axes: "style.Axes", shown: Results) -> Any:
     """Contact forces over the revolutions, and the line that marks the instant."""
     unit, turn = labels.of(shown["contact_force"]), motion.turns(shown)
     for row, (joint, label) in enumerate(motion.joints(shown).items()):
-        force = shown["contact_force"].sel(joint=joint).to_numpy() * unit.factor
+        force = unit(shown["contact_force"].sel(joint=joint))
         axes.plot(turn, force, color=style.CYCLE[row % 7], lw=0.8, label=labels.literal(label))
     axes.legend(loc="upper right", ncols=3)
-    axes.set_ylabel(unit.label("contact force"))
-    axes.set_xlabel(motion.turns_label(shown))
+    axes.set(xlabel=motion.turns_label(shown), ylabel=unit.label("contact force"))
     return axes.axvline(turn[0], color=style.PALETTE["black"], lw=1.0, animated=True)
 
 

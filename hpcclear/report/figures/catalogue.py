@@ -2,17 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
 
-from hpcclear.report.figures import designs, response
+from hpcclear.report.figures import designs, response, style
 from hpcclear.report.parts import FigureOf, Files, declared
 from hpcclear.results.content import Results
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-
-def drawings(files: Files, responses: Mapping[str, Results]) -> "dict[str, Callable[[], Figure]]":
+def drawings(
+    files: Files, responses: Mapping[str, Results]
+) -> "dict[str, Callable[[], style.Figure]]":
     """Return what draws each figure that results allow, by its name.
 
     Parameters

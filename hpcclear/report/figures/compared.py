@@ -8,36 +8,31 @@ from hpcclear.base.units import factor
 from hpcclear.report.figures import labels, style
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hpcclear.report.compare import Comparison
 
 
 @style.drawn
-def overlay_figure(comparison: "Comparison") -> "Figure":
+def overlay_figure(comparison: "Comparison") -> "style.Figure":
     """Each quantity over the measured time or angle, in the units of the measurement: the measured points, and the simulation
     at all of its instants."""
-    figure, axes = style.grid(
-        len(comparison.quantities), 1, 10.0 + 38.0 * len(comparison.quantities), sharex=True
-    )
+    count = len(comparison.quantities)
+    figure, axes = style.grid(count, 1, 10.0 + 38.0 * count, sharex=True)
     base = "s" if comparison.axis == "time" else "rad"
     across = scale(comparison.shown, base)
     order = np.argsort(comparison.x, kind="stable")
-    x = comparison.x[order] * across.factor
-    along = comparison.series_x * across.factor
+    x, along = across(comparison.x[order]), across(comparison.series_x)
     steps = np.diff(along, prepend=along[:1])
     begins = steps * np.sign(np.median(steps)) < 0.0  # an angle that starts again from 0
     for panel, one in zip(axes[:, 0], comparison.quantities, strict=True):
         unit = scale(one.shown, one.unit)
-        dots: dict[str, object] = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
-        panel.plot(x, one.measured[order] * unit.factor, ".", label="measured", **dots)
-        line = np.where(begins, np.nan, one.series * unit.factor)
+        dots: style.Look = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
+        panel.plot(x, unit(one.measured[order]), ".", label="measured", **dots)
+        line = np.where(begins, np.nan, unit(one.series))
         panel.plot(along, line, color=style.PALETTE["blue"], label="simulated")
         panel.set_ylabel(unit.label(labels.literal(one.label.replace(" of ", "\nof ", 1))))
     axes[0, 0].legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.25), borderaxespad=0.0)
     name = "measured time" if comparison.axis == "time" else "measured crank angle"
     axes[-1, 0].set_xlabel(across.label(name))
-    style.settle(axes, 4)
     figure.align_ylabels()
     return figure
 

@@ -1,6 +1,6 @@
 """Tables of a scene as they are drawn: loads and torques against the crank angle, motions against time."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.planar import turns_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 HEIGHT = 26.0
 """mm of one curve."""
@@ -67,7 +64,7 @@ def tabulated(scene: Scene) -> list[Tabulated]:
 
 
 @style.drawn
-def tables_figure(found: Results) -> "Figure":
+def tables_figure(found: Results) -> "style.Figure":
     """Return the tables of the scene of a response (kind ``response``), below one another; raises InputError without any."""
     tables = tabulated(scene_of_text(str(found.attrs["scene"]), "scene"))
     if not tables:
@@ -79,7 +76,7 @@ def tables_figure(found: Results) -> "Figure":
     return figure
 
 
-def draw(figure: "Figure", curves: list[Tabulated], top: float, height: float) -> None:
+def draw(figure: "style.Figure", curves: list[Tabulated], top: float, height: float) -> None:
     """Draw curves below one another, from `top` down, each `height` high; shares of the figure."""
     for number, curve in enumerate(curves):
         bottom = top - (number + 1) * height
@@ -93,20 +90,13 @@ def draw(figure: "Figure", curves: list[Tabulated], top: float, height: float) -
             axes.set_xticks(np.arange(0.0, 360.0 * curve.turns + 1.0, 90.0 * curve.turns))
         else:
             axes.set_xlim(0.0, places[-1])
-        if curve.acting is not None:
-            lines = _drawn(curve.acting)
-        else:
-            lines = places, values
-        color = style.CYCLE[2]
-        axes.plot(factor * lines[0], shown.factor * lines[1], lw=0.9, color=color)
+        x, y = (places, values) if curve.acting is None else _drawn(curve.acting)
+        axes.plot(factor * x, shown(y), lw=0.9, color=style.CYCLE[2])
         if len(curve.rows) <= _FEW:
-            axes.plot(factor * places, shown.factor * values, ".", ms=3.0, color=color)
+            axes.plot(factor * places, shown(values), ".", ms=3.0, color=style.CYCLE[2])
         label = f"{curve.over} ({'°' if curve.turns else 's'})"
         axes.set_xlabel(label, fontsize=style.SMALL, labelpad=1.0)
-        axes.tick_params(labelsize=style.SMALL)
-        axes.set_title(
-            labels.literal(shown.label(curve.key)), fontsize=style.SMALL, pad=2.0, loc="left"
-        )
+        axes.set_title(labels.literal(shown.label(curve.key)), fontsize=style.SMALL, pad=2.0)
 
 
 def _drawn(curve: Pieces) -> tuple[Array, Array]:
@@ -119,7 +109,5 @@ def _drawn(curve: Pieces) -> tuple[Array, Array]:
 
 
 PARTS = (
-    FigureOf(
-        "response", "tables", tables_figure, "tables of the scene, as they are simulated", 100
-    ),
-)
+    FigureOf("response", "tables", tables_figure, "tables of the scene, as they are simulated", 100),
+)  # fmt: skip

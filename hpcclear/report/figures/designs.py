@@ -4,21 +4,19 @@ import itertools
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 @style.drawn
-def front_figure(front: Results, verification: Results | None = None) -> "Figure":
+def front_figure(front: Results, verification: Results | None = None) -> "style.Figure":
     """Pareto fronts of all cases, and the designs that were simulated (the paper's Fig. 9).
 
     Axes are what each case makes small: mean and standard deviation, if it requests nothing else; of more than two things
@@ -51,10 +49,7 @@ def front_figure(front: Results, verification: Results | None = None) -> "Figure
         line[-1].set_ylabel(y.label)
         for panel in line if number == len(pairs) - 1 or not alike else ():
             panel.set_xlabel(x.label)
-    handles, words = axes[0, -1].get_legend_handles_labels()
-    once = dict(zip(words, handles, strict=True))
-    figure.legend(list(once.values()), list(once), loc="outside lower center", ncols=2)
-    style.settle(axes, 5 if columns == 1 else 3)
+    style.legend(figure, axes[0, -1], "lower")
     return figure
 
 
@@ -116,58 +111,39 @@ def _runs(panel: Any, one: Results, x: _Goal, y: _Goal) -> None:
     """The solutions of every run of a case."""
     for k, run in enumerate(one["run"].to_numpy()):
         row = one.sel(run=run)
-        points = [row[goal.searched].to_numpy() * goal.scale.factor for goal in (x, y)]
-        options: dict[str, object] = {"color": style.CYCLE[k % 7], "ms": 2.0, "mew": 0.0}
-        panel.plot(*points, style.MARKERS[k % 7], label=f"run {run}", **options)
+        points = [goal.scale(row[goal.searched]) for goal in (x, y)]
+        panel.plot(
+            *points, label=f"run {run}", **{**style.look(k), "ls": "none", "ms": 2.0, "mew": 0.0}
+        )
 
 
 def _verified(
-    panel: Any,
-    verification: Results,
-    case: str,
-    x: _Goal,
-    y: _Goal,
-    *,
-    all_designs: bool,
+    panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, *, all_designs: bool
 ) -> None:
     """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
-    count = verification.sizes["design"]
-    cases = (
-        [str(c) for c in verification["case"].to_numpy()]
-        if "case" in verification
-        else [case] * count
-    )
-    for k in range(count):
-        if cases[k] != case:
-            continue
+    for k in range(verification.sizes["design"]):
         one = verification.isel(design=k)
         label, marker = _mark(one)
-        if marker != "o" and not all_designs:
+        if ("case" in one and str(one["case"].item()) != case) or not (
+            all_designs or marker == "o"
+        ):
             continue
-        at = [float(one[f"{goal.verified}_true"]) * goal.scale.factor for goal in (x, y)]
-        options: dict[str, object] = {
-            "fmt": marker,
-            "ms": 3.4,
-            "mfc": "white",
-            "mew": 0.7,
-            "zorder": 4,
-        }
+        at = _place(one, x, y, "true")
         bars = [_bars(one, goal.verified, goal.scale) for goal in (x, y)]
         panel.errorbar(
-            *at,
-            xerr=bars[0],
-            yerr=bars[1],
-            color="black",
-            ecolor=style.PALETTE["grey"],
-            elinewidth=0.5,
-            label=label,
-            **options,
-        )
+            *at, xerr=bars[0], yerr=bars[1], color="black", ecolor=style.PALETTE["grey"], elinewidth=0.5,
+            label=label, fmt=marker, ms=3.4, mfc="white", mew=0.7, zorder=4,
+        )  # fmt: skip
         if f"{x.verified}_surrogate" in one and f"{y.verified}_surrogate" in one:
-            guess = [
-                float(one[f"{goal.verified}_surrogate"]) * goal.scale.factor for goal in (x, y)
-            ]
-            panel.plot([guess[0], at[0]], [guess[1], at[1]], "k-", lw=0.5, zorder=3)
+            panel.plot(
+                *zip(_place(one, x, y, "surrogate"), at, strict=True), "k-", lw=0.5, zorder=3
+            )
+
+
+def _place(one: Results, x: _Goal, y: _Goal, end: str) -> tuple[float, float]:
+    """Where a design stands, by simulation ("true") or by the surrogate."""
+    across, up = (float(goal.scale(one[f"{goal.verified}_{end}"])) for goal in (x, y))
+    return across, up
 
 
 def _ends(panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, count: int) -> None:
@@ -185,11 +161,12 @@ def _ends(panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, coun
     for end, letter, side in zip(ENDS, _GREEK, sides, strict=False):
         if f"{case} {end}" in names:
             one = verification.isel(design=names.index(f"{case} {end}"))
-            at = [float(one[f"{goal.verified}_true"]) * goal.scale.factor for goal in (x, y)]
+            at = _place(one, x, y, "true")
             if count > 2 and at[0] > np.mean(panel.get_xlim()):
                 side = -side[0] - 5, side[1]
-            options = {"xytext": side, "textcoords": "offset points", "fontsize": style.SMALL}
-            drawn = panel.annotate(letter, at, **options)
+            drawn = panel.annotate(
+                letter, at, side, textcoords="offset points", fontsize=style.SMALL
+            )
             if count > 2:
                 drawn.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
 
@@ -212,7 +189,7 @@ def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
 
 
 @style.drawn
-def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) -> "Figure":
+def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) -> "style.Figure":
     """Responses of optimised designs beside the baseline design's, α left and β right (the paper's Fig. 10), further ends
     behind them.
 
@@ -229,7 +206,9 @@ def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) ->
     InputError
         No response at all, or one with fewer revolutions.
     """
-    motion.check_some(responses, "Give the response of each design")
+    if not responses:
+        reason = "there is no response to draw"
+        raise InputError("responses", 0, reason, "Give the response of each design")
     columns = _columns(list(responses))
     quantities = motion.quantities(next(iter(responses.values())))
     height = 24.0 + 33.0 * len(quantities)
@@ -247,25 +226,16 @@ def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) ->
             for design in (d for d in order if d in members):
                 k = kinds.index(_kind(design))
                 turn = motion.turns(shown[design])
-                options: dict[str, Any] = {
-                    "color": style.CYCLE[(k - 1) % 7],
-                    "lw": 0.7,
-                    "label": _kind(design),
-                }
-                panel.plot(turn - turn[0], series[design].to_numpy() * unit.factor, **options)
+                text = labels.literal("baseline" if _kind(design) == "original" else _kind(design))
+                look: style.Look = {"color": style.CYCLE[(k - 1) % 7], "lw": 0.7, "label": text}
+                panel.plot(turn - turn[0], unit(series[design]), **look)
         line[0].set_ylabel(unit.label(words.replace(" (", "\n(") if joint else f"{words}\n"))
     for panel, title in zip(axes[0], columns, strict=True):
         panel.set_title(title)
     for panel in axes[-1]:
         label = motion.turns_label(next(iter(shown.values())))
         panel.set_xlabel(label.replace("revolutions", "rev."))
-    entries: dict[str, Any] = {}
-    for panel in axes[0]:
-        entries |= {w: h for h, w in zip(*panel.get_legend_handles_labels(), strict=True)}
-    texts = [labels.literal("baseline" if text == "original" else text) for text in entries]
-    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 3, "columnspacing": 1.0}
-    figure.legend(list(entries.values()), texts, **where)
-    style.settle(axes, 4)
+    style.legend(figure, axes[0], "lower", ncols=3, columnspacing=1.0)
     figure.align_ylabels(axes[:, 0])
     return figure
 

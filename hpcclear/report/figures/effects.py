@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 from hpcclear.results.names import ALL_ON, SECONDS_BY_ROUND
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CONFIDENCE = 0.95
 """Confidence level of what is saved."""
@@ -168,7 +165,7 @@ def distinguished(content: Results) -> list[str]:
 
 
 @style.drawn
-def effects_figure(effects: Results, timing: Results | None = None) -> "Figure":
+def effects_figure(effects: Results, timing: Results | None = None) -> "style.Figure":
     """Change of f by each effect, with confidence interval, on a logarithmic scale, and its run time.
 
     Of a dataset of kind ``effects``, and of the file of times beside it; without that, time is reported by evaluations.
@@ -180,35 +177,28 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "Figure":
     rows += [chosen] if chosen not in (0, *rows) else []
     figure, axes = style.grid(1, 2, 22.0 + 7.0 * len(rows), sharey=True, width_ratios=(3, 2))
     change, limit = (100 * effects[name].to_numpy()[rows, 0] for name in ("change", "limit"))
-    colours = [
-        style.PALETTE[("green", "vermilion", "grey")[int(effects["decision"][k])]] for k in rows
-    ]
+    colours = ("green", "vermilion", "grey")  # by `Verdict`
     places = np.arange(len(rows))[::-1]
     floor = 10.0 ** np.floor(np.log10(10.0 * float(effects.attrs["tolerance"])))
     panel, cost = axes[0]
-    panel.barh(places, np.maximum(np.abs(change), floor), color=colours, height=0.6)
-    for place, value, half in zip(places, np.abs(change), limit, strict=True):
-        ends = np.maximum([value - half, value + half], floor)
-        panel.plot(ends, [place, place], color=style.PALETTE["black"], lw=0.9)
-    panel.set_xscale("log")
-    panel.set_xlim(floor, None)
-    panel.axvline(
-        100 * float(effects.attrs["tolerance"]), color=style.PALETTE["orange"], ls="--", lw=0.9
-    )
+    ends = np.maximum(np.abs(change) + np.outer((-1, 1), limit), floor)
+    length = np.maximum(np.abs(change), floor)
+    panel.barh(
+        places, length, color=[style.PALETTE[colours[int(effects["decision"][k])]] for k in rows],
+        height=0.6, xerr=np.abs(ends - length), error_kw={"lw": 0.9},
+    )  # fmt: skip
+    panel.set(xscale="log", xlim=(floor, None))
+    tolerance = 100 * float(effects.attrs["tolerance"])
+    panel.axvline(tolerance, color=style.PALETTE["orange"], ls="--", lw=0.9)
     panel.set_yticks(places, [_wrapped(named(effects, k), k == chosen) for k in rows])
     panel.set_xlabel("|change of mean $f$| (%)")
     saved = [saving(effects, k, seconds) for k in rows]
-    shares = np.array([100 * one.share for one in saved])
-    cost.barh(places, shares, color=style.PALETTE["blue"], height=0.6)
-    for place, share, one in zip(places, shares, saved, strict=True):
-        if np.isfinite(one.half):
-            ends = [share - 100 * one.half, share + 100 * one.half]
-            cost.plot(ends, [place, place], color=style.PALETTE["black"], lw=0.9)
-    cost.set_xlim(
-        -50, 100
-    )  # what takes longer than half as much again is no saving, however much longer
+    shares, halves = np.array([(100 * one.share, 100 * one.half) for one in saved]).T
+    cost.barh(
+        places, shares, color=style.PALETTE["blue"], height=0.6, xerr=halves, error_kw={"lw": 0.9}
+    )
+    cost.set_xlim(-50, 100)  # what takes longer than half as much again is no saving
     cost.set_xlabel("run time saved (%)")
-    style.settle(axes, 3)
     return figure
 
 

@@ -1,7 +1,6 @@
 """How well surrogates fit: R2 on test points, and words for those that do not."""
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,9 +8,6 @@ from hpcclear.report.figures import style
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
 from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 LOW = 0.9
 """R2 on test points below which a surrogate is called indicative, as `study.sensitivity.r2` has it by default."""
@@ -77,7 +73,7 @@ def _poor(of: Recommended) -> Iterator[Line]:
 PARTS = (LinesOf(50, ("sensitivity", "kriging"), _poor),)
 
 
-def mark(axes: "Axes", r2: float, height: float = 0.5) -> None:
+def mark(axes: "style.Axes", r2: float, height: float = 0.5) -> None:
     """Write across a panel what is wrong with the fit that it shows, at this height of it."""
     if text := verdict(r2):
         box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5}

@@ -1,6 +1,6 @@
 """Figure of guides with clearance in a response (kind ``response``): where sliders stand, and which corners touch when."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,10 +9,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 class Touch(NamedTuple):
@@ -42,7 +38,7 @@ def touches(response: Results) -> list[Touch]:
 
 
 @style.drawn
-def guide_figure(response: Results, revolutions: int = 2) -> "Figure":
+def guide_figure(response: Results, revolutions: int = 2) -> "style.Figure":
     """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last revolutions.
 
     Parameters
@@ -68,19 +64,18 @@ def guide_figure(response: Results, revolutions: int = 2) -> "Figure":
     for panel, name in zip(axes[:2, 0], ("guide_offset", "guide_tilt"), strict=True):
         unit = labels.of(shown[name])
         for row, guide in enumerate(guides):
-            values = shown[name].sel(guide=guide).to_numpy() * unit.factor
+            values = unit(shown[name].sel(guide=guide))
             panel.plot(turn, values, color=style.CYCLE[row % 7], lw=0.7, label=guide)
         panel.set_ylabel(unit.label(name.replace("guide_", "")))
     if len(guides) > 1:
         axes[0, 0].legend(loc="upper right", ncols=len(guides))
     _corners(axes[2, 0], shown, turn)
     axes[2, 0].set_xlabel(motion.turns_label(shown))
-    style.settle(axes)
     figure.align_ylabels()
     return figure
 
 
-def _corners(panel: "Axes", shown: Results, turn: Array) -> None:
+def _corners(panel: "style.Axes", shown: Results, turn: Array) -> None:
     """A row for each corner, filled while it touches, with a tick where a contact begins."""
     rows = [str(label) for label in shown["joint"].to_numpy() if "." in str(label)]
     for row, label in enumerate(rows):
@@ -97,7 +92,5 @@ def _corners(panel: "Axes", shown: Results, turn: Array) -> None:
 
 
 PARTS = (
-    FigureOf(
-        "response", "guide", guide_figure, "offset, tilt and contacts in guides", 40, along="guide"
-    ),
-)
+    FigureOf("response", "guide", guide_figure, "offset, tilt and contacts in guides", 40, along="guide"),
+)  # fmt: skip

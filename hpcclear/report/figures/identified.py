@@ -1,16 +1,11 @@
 """Figures of identified unknowns (kind ``identify``): posterior, fit of the features, growth."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 BINS = 60
 DAY = 86400.0
@@ -24,7 +19,7 @@ def _check(content: Results) -> None:
 
 
 @style.drawn
-def posterior_figure(content: Results) -> "Figure":
+def posterior_figure(content: Results) -> "style.Figure":
     """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``.
 
     Raises
@@ -43,21 +38,20 @@ def posterior_figure(content: Results) -> "Figure":
             colour = style.CYCLE[k % len(style.CYCLE)]
             values = content["posterior"].to_numpy()[k, :, u]
             density = np.histogram(values, edges)[0] / (len(values) * np.diff(edges) * scale.factor)
-            panel.stairs(
-                density, edges * scale.factor, color=colour, label=labels.literal(str(record))
-            )
-            ends = content["interval"].to_numpy()[k, u] * scale.factor
+            panel.stairs(density, scale(edges), color=colour, label=labels.literal(str(record)))
+            ends = scale(content["interval"].to_numpy()[k, u])
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
-        panel.set_xlabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
-        panel.set_ylabel(f"density (1/{scale.unit})")
+        panel.set(
+            xlabel=scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))),
+            ylabel=f"density (1/{scale.unit})",
+        )
         panel.legend(loc="upper right")
-    style.settle(axes)
     return figure
 
 
 @style.drawn
-def features_figure(content: Results) -> "Figure":
+def features_figure(content: Results) -> "style.Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
 
     Raises
@@ -71,27 +65,24 @@ def features_figure(content: Results) -> "Figure":
     score = (measured - predicted) / last["predicted_deviation"].to_numpy()
     figure, axes = style.grid(1, 1, 60.0)
     panel = axes[0, 0]
-    panel.axhspan(
-        -2.0, 2.0, color=style.PALETTE["sky"], alpha=0.3, lw=0, label="two standard deviations"
-    )
+    look = {
+        "color": style.PALETTE["sky"],
+        "alpha": 0.3,
+        "lw": 0,
+        "label": "two standard deviations",
+    }
+    panel.axhspan(-2.0, 2.0, **look)
     panel.plot(np.arange(len(score)), score, "o", color=style.PALETTE["blue"])
     worst = int(last["worst_feature"])
-    panel.plot(
-        [worst],
-        [score[worst]],
-        "s",
-        color=style.PALETTE["vermilion"],
-        label=str(last["feature"].to_numpy()[worst]),
-    )
-    panel.set_xlabel("number of the feature (–)")
-    panel.set_ylabel("standard score (–)")
+    name = str(last["feature"].to_numpy()[worst])
+    panel.plot(worst, score[worst], "s", color=style.PALETTE["vermilion"], label=name)
+    panel.set(xlabel="number of the feature (–)", ylabel="standard score (–)")
     panel.legend(loc="best")
-    style.settle(axes)
     return figure
 
 
 @style.drawn
-def growth_figure(content: Results) -> "Figure":
+def growth_figure(content: Results) -> "style.Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
 
     Raises
@@ -110,19 +101,20 @@ def growth_figure(content: Results) -> "Figure":
         low, middle, high = (content["interval"].to_numpy()[:, u, k] for k in range(3))
         scale = labels.scale(unit, high)
         panel.errorbar(
-            days, scale.factor * middle, scale.factor * np.array([middle - low, high - middle]), fmt="o",
+            days, scale(middle), scale([middle - low, high - middle]), fmt="o",
             color=style.PALETTE["blue"], capsize=2.0, label="median, 95 % interval",
         )  # fmt: skip
         rate = float(content["rate"][1, u]) * DAY
         line = np.mean(middle[good]) + rate * (days - np.mean(days[good]))
-        panel.plot(days, scale.factor * line, color=style.PALETTE["grey"], label="median rate")
+        panel.plot(days, scale(line), color=style.PALETTE["grey"], label="median rate")
         if "limit" in content.attrs:
             limit = scale.factor * float(content.attrs["limit"])
             panel.axhline(limit, color=style.PALETTE["orange"], ls="--", label="limit")
-        panel.set_xlabel("time since the first record (days)")
-        panel.set_ylabel(scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))))
+        panel.set(
+            xlabel="time since the first record (days)",
+            ylabel=scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))),
+        )
         panel.legend(loc="best")
-    style.settle(axes)
     return figure
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
 from hpcclear.results.content import Results, Variable
@@ -34,6 +35,10 @@ class Scale(NamedTuple):
 
     factor: float
     unit: str
+
+    def __call__(self, values: ArrayLike | Variable) -> Array:
+        """Numbers in SI, or a variable of a file, in this unit."""
+        return np.asarray(values, float) * self.factor
 
     def label(self, words: str) -> str:
         """An axis label."""
@@ -170,11 +175,8 @@ WIDE = 32
 
 def axis(variable: Variable) -> str:
     """What a variable is called on an axis, in words: "radial clearance of the joint A"."""
-    words, path = (
-        str(variable.attrs.get("long_name", "")),
-        str(variable.attrs.get("scene_path", "")),
-    )
-    if path:
+    words = str(variable.attrs.get("long_name", ""))
+    if path := str(variable.attrs.get("scene_path", "")):
         return entry(path, words)
     return wrapped(words or variable.name.replace("_", " "))
 
@@ -206,10 +208,10 @@ def design_variables(content: Results) -> list[Variable]:
 
 def clearance(content: Results) -> Variable | None:
     """The design variable that is a clearance, if there is one."""
-    for variable in design_variables(content):
-        if str(variable.attrs.get("long_name", "")).startswith("radial clearance"):
-            return variable
-    return None
+    every = design_variables(content)
+    return next(
+        (v for v in every if str(v.attrs.get("long_name")).startswith("radial clearance")), None
+    )
 
 
 def literal(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,9 +10,6 @@ from hpcclear.base.arrays import Array
 from hpcclear.report.figures import labels, style
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import Planar, PlanarBody
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Pose = tuple[float, float, float]
 """Of a body: its mass centre, m, and its angle, rad."""
@@ -68,7 +65,7 @@ class Placed:
 class Words:
     """Words beside places, each where it covers no other: written when all are known."""
 
-    def __init__(self, axes: "Axes") -> None:
+    def __init__(self, axes: "style.Axes") -> None:
         self._axes = axes
         self._asked: list[tuple[Array, str, str]] = []
 
@@ -106,7 +103,7 @@ def _overlap(one: Array, other: Array) -> float:
     return float(np.prod(np.maximum(sides, 0.0)))
 
 
-def draw(axes: "Axes", scene: Scene, poses: Mapping[str, Pose]) -> None:
+def draw(axes: "style.Axes", scene: Scene, poses: Mapping[str, Pose]) -> None:
     """The linkage where `poses` has its bodies: at its start, or a template's at an angle that shows more."""
     mechanism = scene.linkage
     placed, words = Placed(mechanism, poses), Words(axes)
@@ -137,7 +134,7 @@ def draw(axes: "Axes", scene: Scene, poses: Mapping[str, Pose]) -> None:
     words.write()
 
 
-def _body(axes: "Axes", points: dict[str, Array], pose: Pose, colour: str) -> None:
+def _body(axes: "style.Axes", points: dict[str, Array], pose: Pose, colour: str) -> None:
     """A bar, a plate, or a block where there is one point; its mass centre."""
     corners = np.array(list(points.values()))
     if len(corners) == 1:
@@ -152,7 +149,7 @@ def _body(axes: "Axes", points: dict[str, Array], pose: Pose, colour: str) -> No
     axes.plot(*pose[:2], "o", color="white", mec=colour, mew=0.9, ms=4.0, zorder=5)
 
 
-def _guide(axes: "Axes", placed: Placed, joint: Any, size: float) -> None:
+def _guide(axes: "style.Axes", placed: Placed, joint: Any, size: float) -> None:
     """The line that a point slides on, a little beyond both."""
     point, start = placed.at(joint.point), placed.at(joint.line)
     angle = placed.angles[joint.line.split(".")[0]] + joint.angle
@@ -162,7 +159,7 @@ def _guide(axes: "Axes", placed: Placed, joint: Any, size: float) -> None:
     axes.plot(*np.transpose(ends), color="#aaaaaa", lw=1.2, ls="--", zorder=0)
 
 
-def _actions(axes: "Axes", scene: Scene, placed: Placed, size: float, words: Words) -> None:
+def _actions(axes: "style.Axes", scene: Scene, placed: Placed, size: float, words: Words) -> None:
     """Drives as arcs, forces and gravity as arrows, in their positive directions."""
     mechanism = scene.linkage
     green = style.CYCLE[2]
@@ -188,16 +185,18 @@ def _actions(axes: "Axes", scene: Scene, placed: Placed, size: float, words: Wor
         words.add((x, y - 0.6 * size), "g", green)
 
 
-def arrow(axes: "Axes", start: Any, end: Any, colour: str, **more: Any) -> None:
+def arrow(axes: "style.Axes", start: Any, end: Any, colour: str, **more: Any) -> None:
     """An arrow between two places."""
     options = {"arrowstyle": "->", "color": colour, "lw": 1.0, "shrinkA": 0.0, "shrinkB": 0.0}
     first, last = ((float(place[0]), float(place[1])) for place in (start, end))
     axes.annotate("", last, first, arrowprops=options | more)
 
 
-def word(axes: "Axes", place: Any, text: str, colour: str, offset: tuple[float, float]) -> None:
+def word(
+    axes: "style.Axes", place: Any, text: str, colour: str, offset: tuple[float, float]
+) -> None:
     """A word beside a place, so many points off, whatever the scale."""
-    options: dict[str, Any] = {"color": colour, "ha": "center", "va": "center"}
+    options: style.Look = {"color": colour, "ha": "center", "va": "center"}
     options |= {"textcoords": "offset points", "fontsize": style.NORMAL, "zorder": 7}
     axes.annotate(text, (float(place[0]), float(place[1])), offset, **options)
 

@@ -2,24 +2,19 @@
 
 import itertools
 import textwrap
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Regime, Status
-from hpcclear.report.figures import labels, motion, style
-from hpcclear.report.figures.varied import RPM, varied
+from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.grids import cells_of
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+_RPM = labels.Scale(30.0 / np.pi, "rpm")
 _PERIODS = (0.5, 1.5, 2.5, 4.5, 8.5, 20.5)
 _REGIMES = [regime for regime in Regime if regime is not Regime.UNJUDGED]
 _PERIOD = "period (revolutions)\nwhite: none found"
@@ -27,7 +22,7 @@ _EXPONENT = "largest Lyapunov exponent\nper revolution"
 
 
 @style.drawn
-def map_figure(content: Results) -> "Figure":
+def map_figure(content: Results) -> "style.Figure":
     """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval.
 
     Of a dataset that `hpcclear map` wrote.
@@ -44,37 +39,30 @@ def map_figure(content: Results) -> "Figure":
 
 def entry(variable: Variable) -> tuple[Array, str]:
     """Values (n,) of an entry of the scene in a readable unit, and the label of its axis; angular speeds in rpm."""
-    unit = RPM if variable.attrs.get("units") == "rad/s" else labels.of(variable)
+    unit = _RPM if variable.attrs.get("units") == "rad/s" else labels.of(variable)
     words = labels.axis(variable)
     label = unit.label(words) if unit.unit != "–" else words
-    return variable.to_numpy() * unit.factor, label
+    return unit(variable), label
 
 
-def _plane(cells: Results, names: list[str]) -> "Figure":
+def _plane(cells: Results, names: list[str]) -> "style.Figure":
     figure, axes = style.grid(3, 1, 175.0, sharex=True)
     (x, across), (y, up) = (entry(cells[name]) for name in names)
     exponent = cells["lyapunov_exponent"].to_numpy().T
     finite = np.abs(exponent[np.isfinite(exponent)])
     most = float(np.quantile(finite, 0.98)) if finite.size else 1.0
     colours, boundaries = style.matplotlib().colormaps, style.matplotlib().colors.BoundaryNorm
-    steps = np.arange(len(_REGIMES) + 1) + 0.5
+    count = len(_REGIMES)
+    by_regime = {
+        "cmap": colours["viridis"].resampled(count),
+        "norm": boundaries(np.arange(count + 1) + 0.5, count),
+    }
     regime = np.where(cells["status"].to_numpy() == Status.OK, cells["regime"].to_numpy(), np.nan)
     panels: tuple[tuple[str, Array, dict[str, Any]], ...] = (
         (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -most, "vmax": most}),
-        (
-            _PERIOD,
-            cells["period"].to_numpy().T,
-            {"cmap": "viridis", "norm": boundaries(_PERIODS, 256)},
-        ),
-        (
-            "regime",
-            regime.T,
-            {
-                "cmap": colours["viridis"].resampled(len(_REGIMES)),
-                "norm": boundaries(steps, len(_REGIMES)),
-            },
-        ),
-    )
+        (_PERIOD, cells["period"].to_numpy().T, {"cmap": "viridis", "norm": boundaries(_PERIODS, 256)}),
+        ("regime", regime.T, by_regime),
+    )  # fmt: skip
     for panel, (words, values, options) in zip(axes[:, 0], panels, strict=True):
         drawn = panel.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
         bar = figure.colorbar(drawn, ax=panel, label=words)
@@ -84,18 +72,14 @@ def _plane(cells: Results, names: list[str]) -> "Figure":
             middles = [0.5 * sum(pair) for pair in pairs]
             bar.set_ticks(middles, labels=[f"{a}" if a == b else f"{a} to {b}" for a, b in spans])
         elif words == "regime":
-            bar.set_ticks(
-                [float(one) for one in _REGIMES], labels=[one.name.lower() for one in _REGIMES]
-            )
+            bar.set_ticks([*map(float, _REGIMES)], labels=[one.name.lower() for one in _REGIMES])
         panel.set_ylabel(up)
         panel.grid(False)
-        style.settle([bar.ax])
     axes[-1, 0].set_xlabel(across)
-    style.settle(axes)
     return figure
 
 
-def _line(cells: Results, name: str) -> "Figure":
+def _line(cells: Results, name: str) -> "style.Figure":
     figure, axes = style.grid(4, 1, 150.0, sharex=True)
     x, across = entry(cells[name])
     unit = labels.of(cells["objective"])
@@ -115,79 +99,40 @@ def _line(cells: Results, name: str) -> "Figure":
     axes[2, 0].set_yticks([int(one) for one in _REGIMES], [one.name.lower() for one in _REGIMES])
     axes[2, 0].set_ylim(0.5, len(_REGIMES) + 0.5)
     axes[-1, 0].set_xlabel(across)
-    style.settle(axes)
     return figure
 
 
 @style.drawn
-def bifurcation_figure(
-    responses: "Results | Sequence[Results]", revolutions: int | None = None
-) -> "Figure":
-    """Values once a revolution against the entry of the scene that is varied.
+def bifurcation_figure(content: Results) -> "style.Figure":
+    """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``).
 
     A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots.
-
-    Parameters
-    ----------
-    responses : xarray.Dataset or sequence of xarray.Dataset
-        Kind ``bifurcation``. Or responses (kind ``response``) of scenes that differ in one physical entry (or in several that
-        have the same value), with many revolutions: their objective, and the velocity of the slider at crank angle 0. Of
-        files that do not say so, the clearance is found from the motion.
-    revolutions : int, optional
-        Of responses, the last ones of each are drawn; half of all by default.
 
     Raises
     ------
     InputError
-        No response at all, one with fewer revolutions, or scenes that differ in several entries.
+        The dataset is no bifurcation.
     """
-    if isinstance(responses, Results):
-        return _observed(responses)
-    motion.check_some(responses, "Give one response for each value")
-    figure, axes = style.grid(2, 1, 110.0, sharex=True)
-    steady = [motion.steady(response, revolutions) for response in responses]
-    varying = varied(responses)
-    rows = (
-        ("objective $f$ of a revolution", "m", [motion.objective_by_turn(r) for r in steady]),
-        (
-            f"{labels.words(motion.followed(steady[0])[1])} at crank angle 0",
-            str(motion.followed(steady[0])[1].attrs["units"]),
-            [motion.section(r, motion.followed(r)[1]) for r in steady],
-        ),
-    )
-    for panel, (words, units, values) in zip(axes[:, 0], rows, strict=True):
-        x = np.repeat(varying.values, [len(v) for v in values]) * varying.scale.factor
-        _dots(panel, x, np.concatenate(values), units, words)
-    axes[1, 0].set_xlabel(varying.scale.label(varying.words))
-    style.settle(axes)
-    return figure
-
-
-def _observed(content: Results) -> "Figure":
-    """Of a file of kind ``bifurcation``."""
     variables = labels.design_variables(content)
     if not variables or content.attrs.get("hpcclear_kind") != "bifurcation":
         reason = "the dataset is no bifurcation"
         remedy = "Make one with hpcclear map --bifurcation"
         raise InputError("kind", content.attrs.get("hpcclear_kind"), reason, remedy)
     figure, axes = style.grid(1, 1, 70.0)
-    x, across = entry(variables[0])
-    seen = content["observed"]
-    words, units = str(seen.attrs["long_name"]), str(seen.attrs["units"])
-    _dots(
-        axes[0, 0], np.repeat(x, content.sizes["crossing"]), seen.to_numpy().ravel(), units, words
-    )
-    axes[0, 0].set_xlabel(across)
-    style.settle(axes)
-    return figure
-
-
-def _dots(panel: "Axes", x: Array, values: Array, units: str, words: str) -> None:
-    unit = labels.scale(units, values)
+    varied, across = entry(variables[0])
+    x = np.repeat(varied, content.sizes["crossing"])
+    unit, panel = labels.of(content["observed"]), axes[0, 0]
     size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
-    y = values * unit.factor
-    panel.plot(x, y, ".", ms=size, mew=0.0, color=style.PALETTE["blue"], rasterized=len(x) > 5000)
-    panel.set_ylabel("\n".join(textwrap.wrap(unit.label(words), 30)))
+    look: style.Look = {
+        "ms": size,
+        "mew": 0.0,
+        "color": style.PALETTE["blue"],
+        "rasterized": len(x) > 5000,
+    }
+    panel.plot(x, unit(content["observed"]).ravel(), ".", **look)
+    words = unit.label(str(content["observed"].attrs["long_name"]))
+    panel.set(xlabel=across, ylabel="\n".join(textwrap.wrap(words, 30)))
+    return figure
 
 
 PARTS = (

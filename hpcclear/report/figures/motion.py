@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import numpy as np
 
 from hpcclear.base.arrays import Array
@@ -12,12 +10,6 @@ from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.results.content import Results, Variable
 
 TURN = 2.0 * np.pi
-
-
-def check_some(responses: Collection[object], remedy: str) -> None:
-    """InputError unless there is a response to draw."""
-    if not responses:
-        raise InputError("responses", 0, "there is no response to draw", remedy)
 
 
 def phase(response: Results) -> Array:
@@ -212,21 +204,3 @@ def section(response: Results, name: str | Variable | Array, phase: float = 0.0)
     return np.column_stack([np.interp(at, angle, column) for column in columns]).reshape(
         len(at), *values.shape[1:]
     )
-
-
-def spectrum(response: Results, values: Array) -> tuple[Array, Array]:
-    """Amplitudes over the crank order (multiples of the crank's mean frequency), Hann window.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Whole revolutions.
-    values : array, shape (time,)
-        In any unit; the amplitudes have the same.
-    """
-    time, angle = response["time"].to_numpy(), turns(response)
-    even = np.linspace(time[0], time[-1], len(time))[:-1]
-    signal = np.interp(even, time, values)
-    window = np.hanning(len(even) + 1)[:-1]
-    amplitude = 2.0 * np.abs(np.fft.rfft((signal - signal.mean()) * window)) / window.sum()
-    return np.arange(len(amplitude)) / (angle[-1] - angle[0]), amplitude

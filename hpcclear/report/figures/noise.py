@@ -1,7 +1,5 @@
 """Force levels of one response: third octaves with their confidence intervals, and orders."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hpcclear.base.errors import InputError
@@ -10,16 +8,12 @@ from hpcclear.report.noise import band_name
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, Variable
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 FALL = 80.0
 """Levels that are further below the highest are not shown, dB."""
 
 
 @style.drawn
-def noise_figure(response: Results) -> "Figure":
+def noise_figure(response: Results) -> "style.Figure":
     """Third-octave levels of the force on the frame and of contact forces with 95 % confidence intervals, and the root mean
     squares of their orders.
 
@@ -40,30 +34,20 @@ def noise_figure(response: Results) -> "Figure":
         colour = style.CYCLE[row % 7]
         _levels(axes[0, 0], (level, lower, upper), name, colour)
         unit = labels.scale("N", [float(np.max(one)) for *_, one in forces.values()])
-        axes[1, 0].loglog(
-            orders.labels["order"],
-            orders.to_numpy() * unit.factor,
-            color=colour,
-            lw=0.7,
-            label=name,
-        )
-    axes[0, 0].set_xscale("log")
+        axes[1, 0].loglog(orders.labels["order"], unit(orders), color=colour, lw=0.7, label=name)
+    axes[0, 0].set(xscale="log", ylabel="level (dB re 1 µN)", title="third octaves")
     axes[0, 0].set_ylim(bottom=highest - FALL)
     bands = response["band"].to_numpy()[::3]
     axes[0, 0].set_xticks(bands, [band_name(one) for one in bands], rotation=45.0)
     axes[0, 0].minorticks_off()
-    axes[0, 0].set_ylabel("level (dB re 1 µN)")
-    axes[0, 0].set_title("third octaves")
     axes[0, 0].legend(loc="lower right")
-    axes[1, 0].set_title("orders")
+    axes[1, 0].set(title="orders", xlabel="order (multiples of the crank frequency)")
     axes[1, 0].set_ylabel(unit.label("RMS of the order"))
-    axes[1, 0].set_xlabel("order (multiples of the crank frequency)")
-    style.settle(axes)
     return figure
 
 
 def _levels(
-    panel: "Axes", ends: tuple[Variable, Variable, Variable], name: str, colour: str
+    panel: "style.Axes", ends: tuple[Variable, Variable, Variable], name: str, colour: str
 ) -> None:
     """A line with its interval; an end at nothing is at the bottom."""
     level, lower, upper = ends

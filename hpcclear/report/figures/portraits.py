@@ -1,6 +1,6 @@
 """Figures of one response (kind ``response``) without a time axis: orbits, forces by direction, phase space."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,16 +10,11 @@ from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
 _FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
 
 
 @style.drawn
-def orbit_figure(response: Results, revolutions: int | None = None) -> "Figure":
+def orbit_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
     """Orbit of the journal centres in the clearance circle, contact distinguished from free flight.
 
     Parameters
@@ -33,66 +28,56 @@ def orbit_figure(response: Results, revolutions: int | None = None) -> "Figure":
     joints = motion.joints(shown)
     figure, axes = style.grid(len(joints), 1, 85.0 * len(joints))
     unit = labels.scale("m", motion.eccentricity(shown))
-    clearances = motion.clearances(shown) * unit.factor
+    clearances = unit(motion.clearances(shown))
     for row, (joint, panel) in enumerate(zip(joints, axes[:, 0], strict=True)):
-        x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() * unit.factor for c in "xy")
+        x, y = (unit(shown[f"eccentricity_{c}"].sel(joint=joint)) for c in "xy")
         contact = shown["penetration"].sel(joint=joint).to_numpy() > 0.0
         radius, angle = np.hypot(x, y), np.arctan2(y, x)
-        panel.plot(
-            *_flight(x, y, _rolls(angle, contact)), color=_FLIGHT, lw=0.7, label="free flight"
-        )
+        look: style.Look = {"color": _FLIGHT, "lw": 0.7, "label": "free flight"}
+        panel.plot(*_flight(x, y, _rolls(angle, contact)), **look)
         panel.plot(*_along(radius, angle, contact), color=_CONTACT, lw=0.7, label="contact")
         _circle(panel, clearances[row])
         arc = _along(np.full_like(angle, clearances[row]), angle, contact)
         panel.plot(*arc, color=style.PALETTE["black"], lw=2.4, label="contact arc")
         panel.set_title(f"{joints[joint]}: {motion.contact(shown, joint)}")
         _equal(panel, unit)
-    handles, words = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside lower center", ncols=2)
-    style.settle(axes)
+    style.legend(figure, axes[0, 0], "lower")
     return figure
 
 
 @style.drawn
-def force_polar_figure(response: Results, revolutions: int | None = None) -> "Figure":
+def force_polar_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
     """Contact force over its direction in the fixed frame; parameters as for `orbit_figure`."""
     shown = motion.steady(response, revolutions)
     joints = motion.joints(shown)
-    figure, axes = style.grid(
-        len(joints), 1, 82.5 * len(joints), subplot_kw={"projection": "polar"}
-    )
+    polar = {"projection": "polar"}
+    figure, axes = style.grid(len(joints), 1, 82.5 * len(joints), subplot_kw=polar)
     force = labels.of(shown["contact_force"])
     angle, sense = motion.crank_angle(shown)
     turn = sense * angle / motion.TURN
     for joint, panel in zip(joints, axes[:, 0], strict=True):
         x, y = (shown[f"eccentricity_{c}"].sel(joint=joint).to_numpy() for c in "xy")
-        radius = shown["contact_force"].sel(joint=joint).to_numpy() * force.factor
+        radius = force(shown["contact_force"].sel(joint=joint))
         contact = radius > 0.0
         colour = np.mod(turn, 1.0)[contact] * 360.0
-        options: dict[str, object] = {
+        look: style.Look = {
+            "s": 3.0,
             "cmap": _cyclic(),
             "vmin": 0.0,
             "vmax": 360.0,
             "linewidths": 0,
         }
-        drawn = panel.scatter(
-            np.arctan2(y, x)[contact], radius[contact], c=colour, s=3.0, **options
-        )
+        drawn = panel.scatter(np.arctan2(y, x)[contact], radius[contact], c=colour, **look)
         panel.set_title(joints[joint])
         panel.set_rlabel_position(112.5)
         panel.set_ylabel(force.label("contact force"), labelpad=22.0)
         panel.set_xlabel("direction of the force on the bearing (°)")
-    bar = figure.colorbar(
-        drawn, ax=axes[:, 0].tolist(), location="bottom", aspect=40, pad=0.02, shrink=0.8
-    )
-    bar.set_label("crank angle (°)")
-    bar.set_ticks([0, 90, 180, 270, 360])
-    style.settle([*axes[:, 0], bar.ax])
+    _bar(figure, drawn, axes[:, 0], "crank angle (°)").set_ticks([0, 90, 180, 270, 360])
     return figure
 
 
 @style.drawn
-def phase_figure(response: Results, revolutions: int | None = None) -> "Figure":
+def phase_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
     Of a linkage, speed of its last body over its angle or place. Parameters as for `orbit_figure`.
@@ -108,25 +93,27 @@ def phase_figure(response: Results, revolutions: int | None = None) -> "Figure":
     turn = motion.turns(shown)
     for panel, both in zip(axes[:, 0], pairs, strict=True):
         x, y = (labels.of(one) for one in both)
-        points = np.column_stack(
-            [one.to_numpy() * unit.factor for one, unit in zip(both, (x, y), strict=True)]
-        )
+        points = np.column_stack([x(both[0]), y(both[1])])
         parts = np.stack([points[:-1], points[1:]], axis=1)
         line = LineCollection(list(parts), array=turn[1:], cmap=style.COLOURS, linewidths=0.6)
         panel.add_collection(line)
         panel.autoscale_view()
-        panel.set_xlabel(x.label(labels.axis(both[0])))
-        panel.set_ylabel(y.label(labels.axis(both[1])))
-    bar = figure.colorbar(line, ax=axes[:, 0].tolist(), location="bottom", aspect=50, pad=0.02)
-    bar.set_label(motion.turns_label(shown))
-    style.settle([*axes[:, 0], bar.ax])
+        panel.set(xlabel=x.label(labels.axis(both[0])), ylabel=y.label(labels.axis(both[1])))
+    _bar(figure, line, axes[:, 0], motion.turns_label(shown))
     return figure
+
+
+def _bar(figure: "style.Figure", drawn: Any, panels: Any, words: str) -> Any:
+    """The colour bar below all panels."""
+    return figure.colorbar(
+        drawn, ax=list(panels), location="bottom", aspect=50, pad=0.02, label=words
+    )
 
 
 @style.drawn
 def poincare_figure(
     response: Results, phase: float = 0.0, revolutions: int | None = None
-) -> "Figure":
+) -> "style.Figure":
     """Poincaré section: output (slider, or a linkage's last body) and journal centres once a revolution, at one crank angle.
 
     A periodic motion is one point, a motion of period n is n points, anything else a cloud; the more revolutions
@@ -148,12 +135,9 @@ def poincare_figure(
     top = figure.add_subplot(cells[0, :])
     output = motion.followed(shown)
     x, y = (labels.of(one) for one in output)
-    position, velocity = (
-        motion.section(shown, one, phase) * unit.factor
-        for one, unit in zip(output, (x, y), strict=True)
-    )
+    position, velocity = (labels.of(one)(motion.section(shown, one, phase)) for one in output)
     order = np.arange(1, len(position) + 1)
-    options: dict[str, Any] = {
+    options: style.Look = {
         "c": order,
         "cmap": style.COLOURS,
         "s": 10.0,
@@ -161,12 +145,11 @@ def poincare_figure(
         "zorder": 3,
     }
     drawn = top.scatter(position, velocity, **options)
-    top.set_xlabel(x.label(labels.axis(output[0])))
-    top.set_ylabel(y.label(labels.axis(output[1])))
+    top.set(xlabel=x.label(labels.axis(output[0])), ylabel=y.label(labels.axis(output[1])))
     top.set_title(f"{len(order)} crossings of crank angle {np.degrees(phase):g}°")
     unit = labels.scale("m", motion.eccentricity(shown))
-    clearances = motion.clearances(shown) * unit.factor
-    across, up = (motion.section(shown, f"eccentricity_{c}", phase) * unit.factor for c in "xy")
+    clearances = unit(motion.clearances(shown))
+    across, up = (unit(motion.section(shown, f"eccentricity_{c}", phase)) for c in "xy")
     panels = [figure.add_subplot(cells[1, joint]) for joint in range(len(joints))]
     reach = 1.08 * np.nanmax([*clearances, *np.abs(np.ravel([across, up]))])
     for joint, panel in enumerate(panels):
@@ -178,9 +161,7 @@ def poincare_figure(
     for panel in panels[1:]:
         panel.set_ylabel("")
     top.ticklabel_format(useOffset=False)
-    bar = figure.colorbar(drawn, ax=[top, *panels], location="bottom", aspect=50, pad=0.02)
-    bar.set_label("crossing (number)")
-    style.settle([top, *panels, bar.ax], 4)
+    _bar(figure, drawn, [top, *panels], "crossing (number)")
     return figure
 
 
@@ -223,13 +204,12 @@ def _along(radius: Array, angle: Array, contact: Booleans) -> tuple[Array, Array
     return path[:, 0], path[:, 1]
 
 
-def _circle(axes: "Axes", radius: float) -> None:
+def _circle(axes: "style.Axes", radius: float) -> None:
     """The clearance circle; nothing for a joint without clearance."""
     if np.isfinite(radius):
         angle = np.linspace(0.0, 2.0 * np.pi, 361)
-        axes.plot(
-            radius * np.cos(angle), radius * np.sin(angle), "k--", lw=0.7, label="clearance circle"
-        )
+        look: style.Look = {"lw": 0.7, "label": "clearance circle"}
+        axes.plot(radius * np.cos(angle), radius * np.sin(angle), "k--", **look)
 
 
 def _cyclic() -> Any:
@@ -239,21 +219,20 @@ def _cyclic() -> Any:
     return ListedColormap(style.matplotlib().colormaps["twilight"](np.linspace(0.13, 0.87, 256)))
 
 
-def _equal(axes: "Axes", unit: labels.Scale, reach: float | None = None) -> None:
+def _equal(axes: "style.Axes", unit: labels.Scale, reach: float | None = None) -> None:
     """Equal scales, the bearing centre in the middle."""
     if reach is None:
         reach = 1.05 * float(np.abs(axes.dataLim.get_points()).max())
     reach = reach or 1.0  # a joint without clearance stays in the middle
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    axes.set_xlabel(unit.label("eccentricity x"))
-    axes.set_ylabel(unit.label("eccentricity y"))
+    axes.set(xlabel=unit.label("eccentricity x"), ylabel=unit.label("eccentricity y"))
 
 
 CROSSINGS = 200
 """Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
 
 
-def section_figure(found: Results) -> "Figure":
+def section_figure(found: Results) -> "style.Figure":
     """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
     count = motion.whole_turns(found) - int(found.attrs.get("transient_turns", 0))
     if count < CROSSINGS:
@@ -264,12 +243,8 @@ def section_figure(found: Results) -> "Figure":
 
 
 PARTS = (
-    FigureOf(
-        "response", "orbit", orbit_figure, "journal-centre orbits in the clearance circle", 10
-    ),
-    FigureOf(
-        "response", "force-direction", force_polar_figure, "contact force by its direction", 20
-    ),
+    FigureOf("response", "orbit", orbit_figure, "journal-centre orbits in the clearance circle", 10),
+    FigureOf("response", "force-direction", force_polar_figure, "contact force by its direction", 20),
     FigureOf("response", "phase", phase_figure, "phase portraits", 50),
     FigureOf("response", "poincare", section_figure, "Poincaré section, once a revolution", 60),
-)
+)  # fmt: skip

@@ -1,6 +1,6 @@
 """Figures of a design that went through the dynamics (kind ``samples``)."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,13 +10,9 @@ from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results, Variable
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 @style.drawn
-def samples_figure(samples: Results) -> "Figure":
+def samples_figure(samples: Results) -> "style.Figure":
     """Objective against every design variable, coloured by clearance; its spread, histogram and failures.
 
     Of a dataset of kind ``samples``.
@@ -29,42 +25,38 @@ def samples_figure(samples: Results) -> "Figure":
     variables = labels.design_variables(samples)
     if not variables:
         reason = "there is no design variable to draw the objective against"
-        raise InputError(
-            "samples",
-            list(map(str, samples.data_vars)),
-            reason,
-            "Vary at least one entry of the scene",
-        )
+        remedy = "Vary at least one entry of the scene"
+        raise InputError("samples", list(samples.data_vars), reason, remedy)
     main = labels.clearance(samples)
     main = variables[0] if main is None else main
     others = [v for v in variables if v.name != main.name]
     rows = (len(others) + 1) // 2
     figure = style.page(70.0 + (34.0 * rows + 12.0 if others else 0.0))
     figure.suptitle(_title(samples), x=0.02, ha="left")
-    cells = figure.add_gridspec(
-        1 + rows + bool(others), 1, height_ratios=[2.2] + [1.0] * rows + [0.07] * bool(others)
-    )
+    heights = [2.2] + [1.0] * rows + [0.07] * bool(others)
+    cells = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     unit = labels.of(samples["objective"])
-    first = _first_rows(
-        figure, cells[0].subgridspec(2, 2, width_ratios=[3, 1], height_ratios=[2, 1]), samples, main
-    )
+    top = cells[0].subgridspec(2, 2, width_ratios=[3, 1], height_ratios=[2, 1])
+    first = _first_rows(figure, top, samples, main)
     for i, variable in enumerate(others):
         if i % 2 == 0:
             row = cells[1 + i // 2].subgridspec(1, 2)
         panel = figure.add_subplot(row[i % 2], sharey=first)
         drawn = _cloud(panel, variable, samples["objective"], _values(main))
         panel.tick_params(labelleft=i % 2 == 0)
-        panel.set_xlabel(labels.of(variable).label(labels.axis(variable)))
-        panel.set_ylabel(unit.label("$f$") if i % 2 == 0 else "")
-        style.settle([panel], 3)
+        panel.set(
+            xlabel=labels.of(variable).label(labels.axis(variable)),
+            ylabel=unit.label("$f$") if i % 2 == 0 else "",
+        )
     if others:
         bar = figure.colorbar(drawn, cax=figure.add_subplot(cells[-1]), orientation="horizontal")
         bar.set_label("colour of the points: " + labels.of(main).label(labels.axis(main)))
-        style.settle([bar.ax])
     return figure
 
 
-def _first_rows(figure: "Figure", cells: Any, samples: Results, main: Variable) -> "Axes":
+def _first_rows(
+    figure: "style.Figure", cells: Any, samples: Results, main: Variable
+) -> "style.Axes":
     """Objective against clearance and its histogram, the spread below, and what the marks mean; the first axes."""
     first = figure.add_subplot(cells[0, 0])
     _cloud(first, main, samples["objective"], _values(main))
@@ -72,26 +64,19 @@ def _first_rows(figure: "Figure", cells: Any, samples: Results, main: Variable) 
     first.tick_params(labelbottom=False)
     side = figure.add_subplot(cells[0, 1], sharey=first)
     f = _values(samples["objective"])
-    side.hist(
-        f[np.isfinite(f)],
-        bins=24,
-        orientation="horizontal",
-        color=style.PALETTE["blue"],
-        alpha=0.75,
-    )
+    look: style.Look = {"color": style.PALETTE["blue"], "alpha": 0.75}
+    side.hist(f[np.isfinite(f)], bins=24, orientation="horizontal", **look)
     side.set_xlabel("samples (–)")
     side.tick_params(labelleft=False)
     below = figure.add_subplot(cells[1, 0], sharex=first)
     _spread(below, samples, main)
-    style.settle([first, below])
-    style.settle([side], 3)
     corner = figure.add_subplot(cells[1, 1])
     corner.set_axis_off()
     corner.legend(handles=_marks(samples), loc="lower center", handletextpad=0.4, borderpad=0.0)
     return first
 
 
-def _spread(below: "Axes", samples: Results, main: Variable) -> None:
+def _spread(below: "style.Axes", samples: Results, main: Variable) -> None:
     """How f scatters between revolutions, where that is known."""
     spread = samples["objective_spread"]
     below.set_xlabel(labels.of(main).label(labels.axis(main)))
@@ -99,8 +84,8 @@ def _spread(below: "Axes", samples: Results, main: Variable) -> None:
     if np.isnan(values).all() and not np.isnan(samples["objective"]).all():
         below.set_yticks([])
         words = "cycle-to-cycle variation\nnot available for this objective"
-        place: dict[str, Any] = {"ha": "center", "va": "center", "transform": below.transAxes}
-        below.text(0.5, 0.5, words, fontsize=style.SMALL, **place)
+        middle: style.Look = {"ha": "center", "va": "center", "xycoords": "axes fraction"}
+        below.annotate(words, (0.5, 0.5), fontsize=style.SMALL, **middle)
         return
     _cloud(below, main, spread, _values(main))
     below.set_ylabel(labels.of(spread).label("std. dev. in time"))
@@ -110,22 +95,16 @@ def _spread(below: "Axes", samples: Results, main: Variable) -> None:
 
 
 def _values(variable: Variable) -> Array:
-    return variable.to_numpy() * labels.of(variable).factor
+    return labels.of(variable)(variable)
 
 
-def _cloud(axes: "Axes", variable: Variable, result: Variable, colour: Array) -> Any:
+def _cloud(axes: "style.Axes", variable: Variable, result: Variable, colour: Array) -> Any:
     """Points, their median in bins, and crosses at the foot where the simulation failed."""
     x, y = _values(variable), _values(result)
     good = np.isfinite(y)
     size = float(np.clip(2000.0 / max(len(x), 1), 0.5, 6.0))
-    options: dict[str, Any] = {
-        "s": size,
-        "cmap": style.COLOURS,
-        "linewidths": 0,
-        "zorder": 2,
-        "rasterized": len(x) > 2000,
-    }
-    drawn = axes.scatter(x[good], y[good], c=colour[good], **options)
+    look: style.Look = {"s": size, "cmap": style.COLOURS, "linewidths": 0, "zorder": 2}
+    drawn = axes.scatter(x[good], y[good], c=colour[good], rasterized=len(x) > 2000, **look)
     if np.isfinite(colour).any():
         drawn.set_clim(np.nanmin(colour), np.nanmax(colour))
     centre, middle = binned(x[good], y[good])

@@ -2,20 +2,16 @@
 
 import textwrap
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from hpcclear.report.figures import curves, labels, linkage_sketch, style
 from hpcclear.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _DRAWING, _LINE = 75.0, 3.7  # mm of the drawing, and of a line of the key
 _COLUMNS = 58  # letters of a line
 
 
 @style.drawn
-def sketch_figure(scene: Scene, poses: Mapping[str, linkage_sketch.Pose]) -> "Figure":
+def sketch_figure(scene: Scene, poses: Mapping[str, linkage_sketch.Pose]) -> "style.Figure":
     """The mechanism where its bodies are put together, and a key with every number's place.
 
     Lengths are to scale; clearances are not, since they would be invisible. Tables of loads and motions are drawn below.

@@ -21,9 +21,13 @@ from hpcclear.base.extras import installing
 from hpcclear.results import files
 from hpcclear.results.content import Results
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+Look = dict[str, Any]
+"""Options of a curve, as matplotlib calls them."""
+
+if TYPE_CHECKING:  # for all figures: no other module of this package names matplotlib's classes
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.axis import Axis as Axis
+    from matplotlib.figure import Figure as Figure
 
 WIDTH = 85.0
 """Width of a figure, mm: one column, so that 7 pt in the file are 7 pt on the page."""
@@ -42,7 +46,7 @@ PALETTE = {
 }
 """Okabe and Ito's colours (without yellow, which is lost on white), distinguished by every eye."""
 
-CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
+CYCLE = tuple(PALETTE.values())[:7]
 DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
 """Line styles in the order of `CYCLE`: a curve is never identified by its colour alone."""
 
@@ -124,7 +128,9 @@ def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
         try:
             with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
                 named = {name: _results(one) for name, one in kwargs.items()}
-                return function(*map(_results, args), **named)
+                figure = function(*map(_results, args), **named)
+                settle(_given.get() or figure.axes)
+                return figure
         finally:
             _given.reset(token)
 
@@ -179,15 +185,40 @@ def grid(rows: int, columns: int, height: float, **options: object) -> "tuple[Fi
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def settle(axes: "Sequence[Axes] | np.ndarray", ticks: int = 5) -> None:
-    """Fix tick sizes now (matplotlib makes ticks late, by then the style is gone) and thin them."""
+def settle(axes: "Sequence[Axes] | np.ndarray") -> None:
+    """Fix tick sizes now (matplotlib makes ticks late, by then the style is gone) and thin them, by the room of each panel."""
     for axis in np.ravel(np.asarray(axes, dtype=object)):
-        axis.tick_params(labelsize=SMALL, length=2.0, pad=2.0)
-        for scale in ("x", "y"):
+        for one in (axis, *axis.child_axes):
+            one.tick_params(labelsize=SMALL, length=2.0, pad=2.0)
+            one.tick_params(which="minor", labelsize=SMALL)
+        box = axis.get_position()
+        room = {"x": 7.0 * box.width, "y": box.height * axis.figure.get_figheight() * 25.4 / 6.0}
+        for scale, ticks in room.items():
             lines = getattr(axis, f"{scale}axis")
             lines.get_offset_text().set_fontsize(SMALL)
             if type(lines.get_major_locator()).__name__ == "AutoLocator":
-                axis.locator_params(axis=scale, nbins=ticks)
+                axis.locator_params(axis=scale, nbins=int(np.clip(round(ticks), 3, 5)))
+
+
+def look(k: int) -> Look:
+    """Colour, line style and marker of curve k of several: no two of the first 49 have all three in common."""
+    at = k % len(CYCLE)
+    return {
+        "color": CYCLE[at],
+        "ls": DASHES[(at + k // len(CYCLE)) % len(DASHES)],
+        "marker": MARKERS[at],
+    }
+
+
+def legend(
+    figure: "Figure", panels: "Axes | Sequence[Axes]", place: str, ncols: int = 2, **options: Any
+) -> None:
+    """One legend for all panels, ``"upper"`` or ``"lower"``: what those given have, each word once."""
+    entries: dict[str, Any] = {}
+    for panel in np.ravel(np.asarray(panels, dtype=object)):
+        entries |= {word: one for one, word in zip(*panel.get_legend_handles_labels(), strict=True)}
+    where: Any = f"outside {place} center"
+    figure.legend([*entries.values()], [*entries], loc=where, ncols=ncols, **options)
 
 
 @contextlib.contextmanager

@@ -11,14 +11,11 @@ from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from hpcclear.statistics.surrogate.piecewise import Piecewise
 
 
 @style.drawn
-def sensitivity_figure(sensitivity: Results) -> "Figure":
+def sensitivity_figure(sensitivity: Results) -> "style.Figure":
     """Sensitivities against clearance, a panel for each response surface (the paper's Fig. 5, curves).
 
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
@@ -39,32 +36,30 @@ def sensitivity_figure(sensitivity: Results) -> "Figure":
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("slope × range"))
     _finish_grid(axes, len(surfaces), across.label(_held(sensitivity)))
-    style.settle(figure.axes, 4)
     return figure
 
 
 def _sensitivity_panel(
-    axes: "Axes", surface: Results, across: labels.Scale, unit: labels.Scale
+    axes: "style.Axes", surface: Results, across: labels.Scale, unit: labels.Scale
 ) -> None:
     widest = surface.isel(interval=int(np.argmax(surface["interval"].to_numpy())))
-    clearance = surface["clearance"].to_numpy() * across.factor
-    row = 0
+    clearance, row = across(surface["clearance"]), 0
     for parameter in surface["parameter"].to_numpy():
         one = widest.sel(parameter=parameter)
-        slope = one["sensitivity"].to_numpy() * unit.factor
+        slope, error = unit(one["sensitivity"]), 2.0 * unit(one["standard_error"])
         if not np.isfinite(slope).any():
             continue  # no input of this surface
-        error = 2.0 * one["standard_error"].to_numpy() * unit.factor
-        colour, dashes = style.CYCLE[row % 7], style.DASHES[row % 7]
-        axes.fill_between(clearance, slope - error, slope + error, color=colour, alpha=0.18, lw=0.0)
-        axes.plot(clearance, slope, ls=dashes, color=colour, label=symbol(str(parameter)))
+        look = style.look(row)
+        axes.fill_between(
+            clearance, slope - error, slope + error, color=look["color"], alpha=0.18, lw=0.0
+        )
+        axes.plot(clearance, slope, label=symbol(str(parameter)), **{**look, "marker": ""})
         if "best_sensitivity" in surface:
             best = surface.sel(parameter=parameter)
             where = best["converged"].to_numpy() != 0
-            y = best["best_sensitivity"].to_numpy()[where] * unit.factor
-            bar = 2.0 * best["uncertainty"].to_numpy()[where] * unit.factor
-            options: dict[str, Any] = {"fmt": style.MARKERS[row % 7], "ms": 2.6, "elinewidth": 0.7}
-            axes.errorbar(clearance[where], y, yerr=bar, color=colour, **options)
+            y, bar = (unit(best[name])[where] for name in ("best_sensitivity", "uncertainty"))
+            marks = {**look, "ls": "none", "ms": 2.6, "elinewidth": 0.7}
+            axes.errorbar(clearance[where], y, yerr=2.0 * bar, **marks)
         row += 1
     axes.axhline(0.0, color="black", lw=0.5)
     axes.margins(y=0.25)
@@ -75,7 +70,7 @@ def _sensitivity_panel(
 
 
 @style.drawn
-def fit_figure(sensitivity: Results) -> "Figure":
+def fit_figure(sensitivity: Results) -> "style.Figure":
     """Fit of the response surfaces against clearance, a curve for each interval (the paper's Fig. 7).
 
     Of a dataset of kind ``sensitivity``.
@@ -83,15 +78,20 @@ def fit_figure(sensitivity: Results) -> "Figure":
     surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
     figure, axes = style.grid(len(surfaces), 2, 24.0 + 36.0 * len(surfaces), sharex=True)
     across = labels.of(sensitivity["clearance"])
-    clearance = sensitivity["clearance"].to_numpy() * across.factor
+    clearance = across(sensitivity["clearance"])
     intervals = sensitivity["interval"].to_numpy()
     colours = style.matplotlib().colormaps[style.COLOURS](np.linspace(0.0, 0.9, len(intervals)))
     for line, surface in zip(axes, surfaces, strict=True):
         for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
             for k, interval in enumerate(intervals):
                 values = sensitivity[name].sel(surface=surface).isel(interval=k).to_numpy()
-                options: dict[str, object] = {"marker": style.MARKERS[k % 7], "ms": 2.2, "lw": 0.7}
-                panel.plot(clearance, values, color=colours[k], label=f"{interval:.0%}", **options)
+                look: style.Look = {
+                    "color": colours[k],
+                    "marker": style.MARKERS[k % 7],
+                    "ms": 2.2,
+                    "lw": 0.7,
+                }
+                panel.plot(clearance, values, label=f"{interval:.0%}", **look)
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")
         lowest = float(np.nanmin(sensitivity["r2"].sel(surface=surface)))
@@ -103,17 +103,13 @@ def fit_figure(sensitivity: Results) -> "Figure":
         line[1].set_ylim(0.0, min(2.0, line[1].get_ylim()[1]))
     for panel in axes[-1]:
         panel.set_xlabel(across.label(_held(sensitivity)))
-    handles, words = axes[0, 0].get_legend_handles_labels()
     title = "length of the interval, share of the whole"
-    figure.legend(
-        handles, words, loc="outside lower center", ncols=3, title=title, columnspacing=1.0
-    )
-    style.settle(axes, 4)
+    style.legend(figure, axes[0, 0], "lower", ncols=3, title=title, columnspacing=1.0)
     return figure
 
 
 @style.drawn
-def sobol_figure(sensitivity: Results) -> "Figure":
+def sobol_figure(sensitivity: Results) -> "style.Figure":
     """Global sensitivity: first-order and total Sobol indices with two standard errors.
 
     Parameters
@@ -128,36 +124,28 @@ def sobol_figure(sensitivity: Results) -> "Figure":
     """
     if "sobol_total" not in sensitivity:
         reason = "the study did not compute Sobol indices"
-        raise InputError(
-            "sensitivity.sobol_samples", 0, reason, "Set it to a power of two and run again"
-        )
+        remedy = "Set it to a power of two and run again"
+        raise InputError("sensitivity.sobol_samples", 0, reason, remedy)
     names = [str(name) for name in sensitivity["parameter"].to_numpy()]
     figure, axes = style.grid(1, 1, 22.0 + 7.0 * len(names))
     panel = axes[0, 0]
     order = np.argsort(np.nan_to_num(sensitivity["sobol_total"].to_numpy()), kind="stable")
     rows = np.arange(len(names))
-    kinds = (
-        ("first", "first order", style.PALETTE["blue"], 0.2),
-        ("total", "total", style.PALETTE["orange"], -0.2),
-    )
+    kinds = (("first", "first order", "blue", 0.2), ("total", "total", "orange", -0.2))
     for kind, label, colour, shift in kinds:
-        index = sensitivity[f"sobol_{kind}"].to_numpy()[order]
-        name = f"sobol_{kind}_error"
+        index, name = sensitivity[f"sobol_{kind}"].to_numpy()[order], f"sobol_{kind}_error"
         error = 2.0 * sensitivity[name].to_numpy()[order] if name in sensitivity else None
-        panel.barh(
-            rows + shift, index, 0.36, color=colour, label=label, xerr=error, error_kw={"lw": 0.7}
-        )
+        look: style.Look = {"color": style.PALETTE[colour], "label": label, "error_kw": {"lw": 0.7}}
+        panel.barh(rows + shift, index, 0.36, xerr=error, **look)
     panel.set_yticks(rows, [symbol(names[k]) for k in order])
-    panel.set_ylabel("design variable (name)")
-    panel.set_xlabel("share of the variance of $f$ (–)")
+    panel.set(xlabel="share of the variance of $f$ (–)", ylabel="design variable (name)")
     panel.legend(loc="lower right")
     panel.grid(axis="y", visible=False)
-    style.settle([panel])
     return figure
 
 
 @style.drawn
-def surfaces_figure(kriging: Results, levels: int = 24) -> "Figure":
+def surfaces_figure(kriging: Results, levels: int = 24) -> "style.Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
 
     Parameters
@@ -184,18 +172,17 @@ def surfaces_figure(kriging: Results, levels: int = 24) -> "Figure":
     figure, axes = style.grid(len(shown), 2, 24.0 + 40.0 * len(shown))
     fields = [_fields(model, model.names.index(name)) for model in shown.values()]
     unit = labels.scale("m", np.concatenate([np.ravel(z) for _, _, z, _ in fields]))
-    finite = [z[np.isfinite(z)] * unit.factor for _, _, z, _ in fields]
+    finite = [unit(z[np.isfinite(z)]) for _, _, z, _ in fields]
     edges = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
     by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(kriging)}
     across = labels.of(by_path[name])
     known = fits.of_models(kriging)
-    for line, (family, model), (x, y, z, clearances) in zip(
-        axes, shown.items(), fields, strict=True
-    ):
+    rows = zip(axes, shown.items(), fields, strict=True)
+    for line, (family, model), (x, y, z, clearances) in rows:
         first, second = (by_path[i] for i in model.names if i != name)
         scales = [labels.scale(str(v.attrs["units"]), e) for v, e in ((first, x), (second, y))]
         for k, panel in enumerate(line):
-            grid = (x * scales[0].factor, y * scales[1].factor, z[k].T * unit.factor)
+            grid = (scales[0](x), scales[1](y), unit(z[k].T))
             drawn = panel.contourf(*grid, levels=edges, cmap=style.COLOURS)
             lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
             panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
@@ -207,7 +194,6 @@ def surfaces_figure(kriging: Results, levels: int = 24) -> "Figure":
         line[0].set_title(f"{line[0].get_title(loc='left')}, $R^2$ = {known[family]:.2g}")
     bar = figure.colorbar(drawn, ax=axes.ravel().tolist(), location="bottom", aspect=45, pad=0.01)
     bar.set_label(unit.label("objective $f$"))
-    style.settle([*axes.flat, bar.ax], 4)
     bar.ax.xaxis.set_major_locator(style.matplotlib().ticker.MaxNLocator(6))
     return figure
 
@@ -226,7 +212,7 @@ def _fields(model: "Piecewise", main: int) -> tuple[Any, Any, Any, Any]:
 
 
 @style.drawn
-def parity_figure(kriging: Results) -> "Figure":
+def parity_figure(kriging: Results) -> "style.Figure":
     """Surrogate against dynamics, every model (the paper's Figs. 6 and 8).
 
     Each point is predicted by the model without that point, so that no point is judged by itself; R2 on the test
@@ -246,13 +232,10 @@ def parity_figure(kriging: Results) -> "Figure":
     known = fits.of_models(kriging)
     for panel, (name, model) in zip(axes.flat, found.items(), strict=False):
         for k, leaf in enumerate(model.leaves):
-            true, guess = leaf.values * unit.factor, leaf.leave_one_out() * unit.factor
-            marker = style.MARKERS[k % 7]
-            panel.plot(true, guess, marker, color=style.CYCLE[k % 7], ms=2.0, mew=0.0, alpha=0.7)
+            marks = {**style.look(k), "ls": "none", "ms": 2.0, "mew": 0.0, "alpha": 0.7}
+            panel.plot(unit(leaf.values), unit(leaf.leave_one_out()), **marks)
         fits.mark(panel, known[name], 0.12)
-        note = "".join(
-            f", {label}" for label in sorted({leaf.label for leaf in model.leaves} - {""})
-        )
+        note = "".join(f", {one}" for one in sorted({leaf.label for leaf in model.leaves} - {""}))
         panel.set_title(f"{', '.join(map(symbol, model.names))}\n$R^2$ = {known[name]:.3f}{note}")
     ranges = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(ranges)[0], max(high for _, high in ranges))
@@ -262,7 +245,6 @@ def parity_figure(kriging: Results) -> "Figure":
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("$f$ by the surrogate"))
     _finish_grid(axes, len(found), unit.label("$f$ by the dynamics"))
-    style.settle(figure.axes, 4)
     return figure
 
 

@@ -1,19 +1,14 @@
 """Figure of where the time went (kind ``timing``)."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 @style.drawn
-def timing_figure(timing: Results) -> "Figure":
+def timing_figure(timing: Results) -> "style.Figure":
     """How every rank spent its time, and how much of it each stage took.
 
     Of a dataset of kind ``timing``.
@@ -28,29 +23,19 @@ def timing_figure(timing: Results) -> "Figure":
         left = np.zeros(len(names))
         for name, label, colour in parts:
             spent = timing[name].to_numpy().sum(over)
-            panel.barh(
-                np.arange(len(names)),
-                spent,
-                0.7,
-                left=left,
-                color=style.PALETTE[colour],
-                label=label,
-            )
+            look: style.Look = {"left": left, "color": style.PALETTE[colour], "label": label}
+            panel.barh(np.arange(len(names)), spent, 0.7, **look)
             left += spent
         if len(names) <= 64:
             panel.set_yticks(np.arange(len(names)), names)
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)
-        panel.set_ylabel(f"{along} (–)")
-        panel.set_xlabel("time (s)" if along == "rank" else "time of all ranks (s)")
-    handles, words = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside lower center", ncols=4, columnspacing=1.0)
-    style.settle(axes)
+        across = "time (s)" if along == "rank" else "time of all ranks (s)"
+        panel.set(xlabel=across, ylabel=f"{along} (–)")
+    style.legend(figure, axes[0, 0], "lower", ncols=4, columnspacing=1.0)
     return figure
 
 
 PARTS = (
-    FigureOf(
-        "timing", "timing", timing_figure, "Time of the ranks, by rank and by stage.", apart=True
-    ),
-)
+    FigureOf("timing", "timing", timing_figure, "Time of the ranks, by rank and by stage.", apart=True),
+)  # fmt: skip

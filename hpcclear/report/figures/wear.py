@@ -1,7 +1,5 @@
 """Figures of service lives with wear (kind ``wear``)."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hpcclear.base.errors import InputError
@@ -9,12 +7,9 @@ from hpcclear.report.figures import labels, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 @style.drawn
-def fan_figure(wear: Results) -> "Figure":
+def fan_figure(wear: Results) -> "style.Figure":
     """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them.
 
     Of a dataset of kind ``wear``.
@@ -22,50 +17,29 @@ def fan_figure(wear: Results) -> "Figure":
     joints = [str(name) for name in wear["joint"].to_numpy()]
     figure, axes = style.grid(len(joints) + 1, 1, 30.0 + 45.0 * (len(joints) + 1))
     cycles = wear["cycle"].to_numpy()
-    drawn = [
-        (
-            wear["clearance"].sel(joint=name),
-            wear["clearance_quantile"].sel(joint=name),
-            f"clearance, {name}",
-            "clearance",
-        )
-        for name in joints
-    ]
-    drawn.append((wear["objective"], wear["objective_quantile"], "objective $f$", "objective"))
-    for panel, (each, levels, words, name) in zip(axes[:, 0], drawn, strict=True):
-        scale = labels.scale(str(each.attrs.get("units", "1")), each.to_numpy())
-        panel.plot(
-            cycles,
-            scale.factor * each.to_numpy()[:40].T,
-            color=style.PALETTE["grey"],
-            lw=0.4,
-            alpha=0.5,
-        )
-        value = scale.factor * np.where(np.isfinite(levels), levels, np.nan)
+    rows = [(wear, "objective", "objective $f$")]
+    rows[:0] = [(wear.sel(joint=name), "clearance", f"clearance, {name}") for name in joints]
+    blue = style.PALETTE["blue"]
+    for panel, (own, name, words) in zip(axes[:, 0], rows, strict=True):
+        each, levels = own[name], own[f"{name}_quantile"]
+        scale = labels.of(each)
+        panel.plot(cycles, scale(each)[:40].T, color=style.PALETTE["grey"], lw=0.4, alpha=0.5)
+        value = scale(np.where(np.isfinite(levels), levels, np.nan))
         for low, high, alpha in ((0, 4, 0.2), (1, 3, 0.35)):
-            panel.fill_between(
-                cycles, value[low], value[high], color=style.PALETTE["blue"], alpha=alpha, lw=0
-            )
-        panel.plot(
-            cycles,
-            value[2],
-            color=style.PALETTE["blue"],
-            label="median, 50 and 90 % of service lives",
-        )
+            panel.fill_between(cycles, value[low], value[high], color=blue, alpha=alpha, lw=0)
+        panel.plot(cycles, value[2], color=blue, label="median, 50 and 90 % of service lives")
         limit = wear.attrs.get(f"limit_{name}")
         if limit is not None:
-            panel.axhline(
-                scale.factor * float(limit), color=style.PALETTE["orange"], ls="--", label="limit"
-            )
+            look: style.Look = {"color": style.PALETTE["orange"], "ls": "--", "label": "limit"}
+            panel.axhline(scale.factor * float(limit), **look)
         panel.set_ylabel(scale.label(words))
         panel.legend(loc="upper left")
     axes[-1, 0].set_xlabel(_revolutions(wear))
-    style.settle(axes)
     return figure
 
 
 @style.drawn
-def survival_figure(wear: Results) -> "Figure":
+def survival_figure(wear: Results) -> "style.Figure":
     """Share of lives that are not over against revolutions, with 95 % confidence intervals.
 
     Of a dataset of kind ``wear``.
@@ -76,21 +50,16 @@ def survival_figure(wear: Results) -> "Figure":
         No limit was given that could end a life.
     """
     if not any(name.startswith("limit_") for name in wear.attrs):
-        raise InputError(
-            "wear.limit", None, "no limit ends a service life", "Give one, such as clearance"
-        )
+        reason, remedy = "no limit ends a service life", "Give one, such as clearance"
+        raise InputError("wear.limit", None, reason, remedy)
     figure, axes = style.grid(1, 1, 70.0)
     panel, cycles = axes[0, 0], wear["cycle"].to_numpy()
     lower, upper = wear["survival_lower"].to_numpy(), wear["survival_upper"].to_numpy()
-    panel.fill_between(
-        cycles, lower, upper, color=style.PALETTE["blue"], alpha=0.25, lw=0, label="95 % CI"
-    )
-    panel.plot(cycles, wear["survival"].to_numpy(), color=style.PALETTE["blue"], label="survival")
-    panel.set_ylim(-0.02, 1.02)
-    panel.set_xlabel(_revolutions(wear))
-    panel.set_ylabel("survival (–)")
+    blue = style.PALETTE["blue"]
+    panel.fill_between(cycles, lower, upper, color=blue, alpha=0.25, lw=0, label="95 % CI")
+    panel.plot(cycles, wear["survival"].to_numpy(), color=blue, label="survival")
+    panel.set(xlabel=_revolutions(wear), ylabel="survival (–)", ylim=(-0.02, 1.02))
     panel.legend(loc="lower left")
-    style.settle(axes)
     return figure
 
 
@@ -108,7 +77,7 @@ AGES = 4
 
 
 @style.drawn
-def profile_figure(wear: Results) -> "Figure":
+def profile_figure(wear: Results) -> "style.Figure":
     """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives.
 
     Of a dataset of kind ``wear``.
@@ -126,8 +95,7 @@ def profile_figure(wear: Results) -> "Figure":
         (str(name), surface, depths)
         for name in wear["joint"].to_numpy()
         for surface in ("bearing", "journal")
-        if (depths := wear[f"{surface}_profile"].sel(joint=name, quantile=0.5)).to_numpy().max()
-        > 0.0
+        if np.max(depths := wear[f"{surface}_profile"].sel(joint=name, quantile=0.5)) > 0.0
     ]
     ages = np.unique(np.linspace(0, wear.sizes["cycle"] - 1, AGES + 1).round().astype(int))[1:]
     rows = max(-(-len(panels) // 2), 1)
@@ -138,18 +106,18 @@ def profile_figure(wear: Results) -> "Figure":
     for panel, (name, surface, depths) in zip(axes.ravel(), panels, strict=False):
         scale = labels.scale("m", depths.to_numpy())
         for shade, age in zip(np.linspace(0.3, 1.0, len(ages)), ages, strict=True):
-            value = scale.factor * depths.isel(cycle=age).to_numpy()
-            panel.plot(
-                angle, np.append(value, value[0]), color=style.PALETTE["blue"], alpha=shade,
-                label=f"{float(wear['cycle'][age]):.3g}",
-            )  # fmt: skip
+            value = scale(depths.isel(cycle=age))
+            look = {
+                "color": style.PALETTE["blue"],
+                "alpha": shade,
+                "label": f"{float(wear['cycle'][age]):.3g}",
+            }
+            panel.plot(angle, np.append(value, value[0]), **look)
         panel.set_title(f"{name}\n{scale.label(surface)}")
         panel.set_rmin(0.0)
-        panel.tick_params(labelsize=style.SMALL)
         panel.set_rlabel_position(60.0)
     if panels:
-        handles, words = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, words, title="revolutions", loc="outside lower center", ncols=AGES)
+        style.legend(figure, axes[0, 0], "lower", title="revolutions", ncols=AGES)
     return figure
 
 
