@@ -6,6 +6,7 @@ import os
 import platform
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,19 @@ class InputError(ValueError):
             shown = shown[: LONGEST_SHOWN // 2] + " ... " + shown[-LONGEST_SHOWN // 2 :]
         # texts that were made of sequences of NumPy's numbers
         return plain(_BOXED.sub(r"\1\2", f"{self.key} = {shown}: {self.reason}. {self.remedy}"))
+
+
+@contextmanager
+def at(key: str, value: object = ...) -> Iterator[None]:
+    """Raise errors that have a reason and a remedy as InputError of an entry, with the `value` that stands there, if given."""
+    try:
+        yield
+    except ValueError as error:
+        if not hasattr(error, "remedy"):
+            raise
+        place = ".".join(filter(None, (key, getattr(error, "key", ""))))
+        found = getattr(error, "value", ...) if value is ... else value
+        raise InputError(place, found, error.reason, error.remedy) from None  # type: ignore[attr-defined]
 
 
 def _alike(word: str, one: str) -> float:

@@ -1,6 +1,6 @@
 """A pin in a bearing, with clearance: what the tables of slider-cranks and linkages have in common."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 
@@ -50,8 +50,7 @@ class Bearing(Table):
 
     _in_radii = model_validator(mode="before")(with_clearance)
 
-    @model_validator(mode="after")
-    def _journal_fits(self) -> Self:
+    def _check(self) -> None:
         """A journal is left, and film and waves fit into the clearance."""
         if self.clearance >= self.bearing_radius:
             raise invalid(
@@ -62,7 +61,6 @@ class Bearing(Table):
             )
         check_film(self.film, self.clearance, self.bearing_radius)
         check_waves(self.out_of_round, self.clearance, self.film)
-        return self
 
 
 def length_path(joint: Any) -> str | None:

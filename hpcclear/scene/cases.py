@@ -1,7 +1,5 @@
 """Cases: what is random in an optimisation, what is made small, and what designs must keep to."""
 
-from pydantic import model_validator
-
 from hpcclear.base.objectives import ENDS
 from hpcclear.scene.fields import Table, invalid
 from hpcclear.scene.goals import DEVIATION, MEAN, Constraint, Goal
@@ -20,14 +18,9 @@ class Case(Table):
     constraints: tuple[Constraint, ...] | None = None
     """Constraints on the designs of the case."""
 
-    @model_validator(mode="after")
-    def _named(self) -> "Case":
+    def _check(self) -> None:
         if not NAME.fullmatch(self.name):  # it stands in names of files, figures and pages
             raise invalid("is not a name", "Use a letter, then letters, digits or _", key="name")
-        return self
-
-    @model_validator(mode="after")
-    def _some_random(self) -> "Case":
         if not self.random:
             raise invalid(
                 "a case without random inputs has no standard deviation to minimise",
@@ -36,11 +29,6 @@ class Case(Table):
             )
         if len(set(self.random)) < len(self.random):
             raise invalid("a random input is named twice", "Remove one", key="random")
-        return self
-
-    @model_validator(mode="after")
-    def _a_front(self) -> "Case":
-        """That there is something to make small, each thing once, and no more than a front can show."""
         rows = self.goals
         if not rows:
             raise invalid(
@@ -62,7 +50,6 @@ class Case(Table):
                     f"objectives.{k}",
                     goal.formula or goal.statistic,
                 )
-        return self
 
     @property
     def goals(self) -> tuple[Goal, ...]:

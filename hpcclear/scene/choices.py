@@ -9,9 +9,8 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import model_validator
-from pydantic_core import PydanticCustomError
 
-from hpcclear.base.errors import nearest
+from hpcclear.base.errors import at, nearest
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.iso286 import fit_of
 from hpcclear.scene.paths import quantities
@@ -52,17 +51,10 @@ class Row(Table):
                 input_entry(path)
                 continue
             if path not in quantities():
-                raise invalid(
-                    "is not a physical number of a scene",
-                    nearest(path, tuple(quantities())),
-                    path,
-                    value,
-                )
-            try:
+                remedy = nearest(path, tuple(quantities()))
+                raise invalid("is not a physical number of a scene", remedy, path, value)
+            with at(path, value):
                 entries[path] = quantities()[path].convert(value)
-            except PydanticCustomError as error:
-                context = error.context or {}
-                raise invalid(context["reason"], context["remedy"], path, value) from None
         if not entries:
             raise invalid("has no entry", 'Write "joints.crank_rod.clearance" = "20 um", say')
         return {**kept, "entries": entries}

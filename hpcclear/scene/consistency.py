@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Self
+from typing import Any
 
 from pydantic import field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
 from hpcclear.scene.bearings import length_path
 from hpcclear.scene.bending import check_scene
-from hpcclear.scene.fields import invalid, nearest
+from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
 from hpcclear.scene.guides import Guide
 from hpcclear.scene.named import SHORT_NAMES
@@ -69,8 +69,17 @@ class ConsistentTables(SceneTables):
         paths = [path for path in SHORT_NAMES["C"] if f".{ideal[0]}." not in path]
         return _with_paths_of_clearance(data, paths)
 
-    @model_validator(mode="after")
-    def _tables_fit_mechanism(self) -> Self:
+    def _check(self) -> None:
+        self._check_mechanism()
+        self._check_effects()
+        check_scene(self, self.bending())
+        self._check_profiles()
+        self._check_objective()
+        self._check_target()
+        self._check_pressures()
+        self._check_levels()
+
+    def _check_mechanism(self) -> None:
         for table in ("drive", "joints"):
             if self.template is not None and getattr(self, table) is None:
                 raise invalid("is missing", "Add it", key=table, value=None)
@@ -84,13 +93,12 @@ class ConsistentTables(SceneTables):
                 )
         if self.template is not None:
             self._check_template()
-        return self
 
     def _check_template(self) -> None:
         """What is checked of every linkage, by the entries of its template; a slider with clearance tilts, and rubs at its
         corners."""
         with self._named_as_written():
-            self.linkage.check()
+            self.linkage._check()
         if self.joints.guide is None:
             return
         if self.slider_crank.slider.inertia is None:
@@ -101,22 +109,19 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
         (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
         with self._named_as_written("joints.guide"):
-            guide.check()
+            guide._check()
 
     @contextmanager
     def _named_as_written(self, below: str = "") -> Iterator[None]:
         """Errors of the linkage's tables, with the keys of the entries that stand for them in the scene."""
         try:
             yield
-        except PydanticCustomError as error:
-            said: Any = error.context
-            path = ".".join(filter(None, ("mechanism", below, said["key"])))
-            raise invalid(
-                said["reason"], said["remedy"], self.path_in_scene(path), said["value"]
-            ) from None
+        except InputError as error:
+            path = ".".join(filter(None, ("mechanism", below, error.key)))
+            said = error.reason, error.remedy
+            raise invalid(*said, self.path_in_scene(path), error.value) from None
 
-    @model_validator(mode="after")
-    def _effects_fit_joints(self) -> Self:
+    def _check_effects(self) -> None:
         clearance = self.clearance_joints()
         contact = self.effects.contact
         if contact is not None and contact.has_length:
@@ -144,15 +149,8 @@ class ConsistentTables(SceneTables):
                 key="effects.friction.law",
                 value=self.effects.friction.law,
             )
-        return self
 
-    @model_validator(mode="after")
-    def _bending_fits(self) -> Self:
-        check_scene(self, self.bending())
-        return self
-
-    @model_validator(mode="after")
-    def _profiles_are_of_dry_joints(self) -> Self:
+    def _check_profiles(self) -> None:
         oiled = [name for name in self.worn_joints() if name in self.films()]
         if self.wear is not None and self.wear.waves and oiled:
             raise invalid(
@@ -161,19 +159,12 @@ class ConsistentTables(SceneTables):
                 key="wear.profile",
                 value=self.wear.profile,
             )
-        return self
 
-    @model_validator(mode="after")
-    def _objective_s_joints_are_there(self) -> Self:
+    def _check_objective(self) -> None:
         chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
         clearance = dict.fromkeys((*self.clearance_joints(), *self.contact_labels()))
         for joint in chosen:
-            if joint not in clearance:
-                raise invalid(
-                    f"{joint} is not a joint with clearance of this scene",
-                    nearest(joint, tuple(clearance)),
-                    key=key,
-                )
+            check_known(joint, clearance, "is not a joint with clearance of this scene", key)
         if len(set(self._contacts_in(chosen))) < len(self._contacts_in(chosen)):
             raise invalid("a joint is named twice", "Name each once", key=key)
         if self.study is not None and self.numerics.objective is not None:
@@ -188,12 +179,10 @@ class ConsistentTables(SceneTables):
                 "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
                 key=key,
             )
-        return self
 
-    @model_validator(mode="after")
-    def _target_is_of_the_mean_gap(self) -> Self:
+    def _check_target(self) -> None:
         if self.numerics.target_error is None or not self.clearance_joints():
-            return self
+            return
         why = "the confidence interval of a steady mean exists for the mean gap of all joints only"
         if self.numerics.objective_joints:
             remedy = "Leave out the joints, or numerics.target_error"
@@ -205,24 +194,20 @@ class ConsistentTables(SceneTables):
                 "Remove numerics.target_error, and raise numerics.averaged_revolutions",
                 "numerics.target_error", self.numerics.target_error,
             )  # fmt: skip
-        return self
 
-    @model_validator(mode="after")
-    def _pressures_are_known(self) -> Self:
+    def _check_pressures(self) -> None:
         table: Any = self.effects.contact
         geometry = None if table is None else table.declared.geometry
         if geometry is not None and geometry.pressure is not None:
-            return self
+            return
         for one in self._objectives():
             if not one.asks.isdisjoint(WIDEST):
                 raise invalid(
                     f"{one.name} needs a geometry of contact with a pressure",
                     'Add geometry = "line" or "liner" to effects.contact', self.objective_key, one.name,
                 )  # fmt: skip
-        return self
 
-    @model_validator(mode="after")
-    def _levels_can_be_recorded(self) -> Self:
+    def _check_levels(self) -> None:
         bands = self.bands()
         key = "numerics.levels" if self.numerics.levels else self.objective_key
         if bands and not self.clearance_joints():
@@ -234,7 +219,6 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
         if len(bands) > MAX_BANDS:
             raise invalid(f"there are more than {MAX_BANDS} bands of levels", "Remove some", key)
-        return self
 
 
 def _kind_of(rows: Mapping[str, Any], row: Any) -> str:

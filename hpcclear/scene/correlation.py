@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene.fields import Quantity, Table, invalid
@@ -32,8 +31,7 @@ class Correlation(Table):
     """Meaning of the matrix. "normal": correlations of the underlying normal variables (of the inputs themselves, if these are
     normal). "rank": Spearman rank correlations of the inputs."""
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "Correlation":
+    def _check(self) -> None:
         count = len(self.inputs)
         if count < 2 or len(set(self.inputs)) < count:
             raise invalid(
@@ -59,7 +57,6 @@ class Correlation(Table):
                 f"Multiply all entries off the diagonal by {0.99 / (1.0 - least):.2g}, say",
                 "matrix",
             )
-        return self
 
     def normal(self, names: Sequence[str]) -> Array:
         """Correlations of the normals behind some of its inputs, shape (n, n)."""

@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
-from pydantic_core import PydanticCustomError
 
+from hpcclear.base.errors import at
 from hpcclear.scene.fields import Quantity, Table, invalid
 
 _COST = Quantity("", least=0)
@@ -48,21 +47,15 @@ class Cost(Table):
         if fits:
             return {"options": _by_grades(given, fits)}
         made = dict(given)
-        for key, quantity in (("at", Quantity(unit, above=0)), ("scale", Quantity(unit, above=0))):
+        for key in ("at", "scale"):
             if key in made:
-                try:
-                    made[key] = quantity.convert(made[key])
-                except PydanticCustomError as error:
-                    context = error.context or {}
-                    raise invalid(
-                        context["reason"], context["remedy"], f"cost.{key}", made[key]
-                    ) from None
+                with at(f"cost.{key}", made[key]):
+                    made[key] = Quantity(unit, above=0).convert(made[key])
         return made
 
-    @model_validator(mode="after")
-    def _complete(self) -> "Cost":
+    def _check(self) -> None:
         if self.options is not None:
-            return self
+            return
         needed = {"reciprocal": ("at", "cost"), "exponential": ("at", "cost", "scale")}
         if self.law is None:
             raise invalid(
@@ -75,7 +68,6 @@ class Cost(Table):
                 raise invalid(f"the law {self.law!r} needs it", "Add it", key, None)
         if self.law == "reciprocal" and self.scale is not None:
             raise invalid('belongs to "exponential"', "Remove it", "scale")
-        return self
 
     def of(self, values: Any, options: Sequence[float] | None) -> Any:
         """Costs of values, a number or (n,)."""
@@ -93,11 +85,8 @@ class Cost(Table):
 def _converted(given: Sequence[object]) -> list[float]:
     found = []
     for k, one in enumerate(given):
-        try:
+        with at(f"cost.{k}", one):
             found.append(Quantity("").convert(one))
-        except PydanticCustomError as error:
-            context = error.context or {}
-            raise invalid(context["reason"], context["remedy"], f"cost.{k}", one) from None
     return found
 
 

@@ -6,10 +6,9 @@ from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic_core import PydanticCustomError
 
 from hpcclear.base import quantiles
-from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.plugins import DISTRIBUTIONS
 from hpcclear.plugins.sources import SCIPY
 from hpcclear.scene.fields import Quantity, invalid
@@ -118,13 +117,9 @@ def converted(name: str, parameters: Mapping[str, object], unit: str) -> dict[st
     found = {}
     for key, value in parameters.items():
         bare = name.startswith(f"{SCIPY}:") and key not in ("loc", "scale")
-        try:
-            found[str(key)] = Quantity("" if bare or not isinstance(value, str) else unit).number(
-                value
-            )
-        except PydanticCustomError as error:
-            context = error.context or {}
-            raise invalid(context["reason"], context["remedy"], str(key), value) from None
+        with at(str(key), value):
+            own = Quantity("" if bare or not isinstance(value, str) else unit)
+            found[str(key)] = own.number(value)
     return found
 
 

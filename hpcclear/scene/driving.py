@@ -1,8 +1,8 @@
 """What moves a mechanism: drives of bodies."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hpcclear.scene.fields import (
     Count,
@@ -121,8 +121,7 @@ class TorqueDrive(Table):
         )
     }
 
-    @model_validator(mode="after")
-    def _started(self) -> Self:
+    def _check(self) -> None:
         """It has one torque, and a speed that tolerances go by."""
         if self.initial_speed == 0.0 and self.expected_speed is None and not by_interval(self):
             raise invalid(
@@ -137,7 +136,6 @@ class TorqueDrive(Table):
                 "torque_by_speed says already how the torque falls", "Remove it",
                 key="no_load_speed", value=self.no_load_speed,
             )  # fmt: skip
-        return self
 
 
 class PlanarTorque(Driving, TorqueDrive):
@@ -146,11 +144,9 @@ class PlanarTorque(Driving, TorqueDrive):
     interval: Interval | None = None
     """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
 
-    @model_validator(mode="after")
-    def _by_turns_or_time(self) -> Self:
+    def _check(self) -> None:
         if by_interval(self) and self.turns != 1:
             raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
-        return self
 
 
 class PlanarFree(Driving):
@@ -176,8 +172,7 @@ class PlanarRunUp(Driving):
     turns: Turns = 1
     """Turns per revolution: 2 for the 720 degrees of a four-stroke engine. Tables repeat after this number of turns."""
 
-    @model_validator(mode="after")
-    def _forward(self) -> "PlanarRunUp":
+    def _check(self) -> None:
         speeds = [speed for _, speed in self.speed_by_time]
         if min(speeds) < 0.0 or min(speeds[1:]) == 0.0:
             raise invalid(
@@ -185,7 +180,6 @@ class PlanarRunUp(Driving):
                 "Give speeds above 0 from the second row on",
                 key="speed_by_time",
             )
-        return self
 
 
 PlanarDrive = Annotated[

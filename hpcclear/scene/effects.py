@@ -36,11 +36,10 @@ class Contact(LawTable):
     def _sphere_is_the_default(cls, name: str | None) -> str | None:
         return None if name == SPHERE else name
 
-    @model_validator(mode="after")
-    def _curve_has_its_geometry(self) -> "Contact":
+    def _check(self) -> None:
+        super()._check()
         if self.curve is not None and self.geometry is None:
             raise invalid('belongs to geometry = "table"', "Write geometry, or remove it", "curve")
-        return self
 
     @property
     def has_length(self) -> bool:

@@ -3,9 +3,9 @@ counts, curves."""
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BaseModel,
@@ -14,10 +14,11 @@ from pydantic import (
     GetJsonSchemaHandler,
     model_validator,
 )
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
+from hpcclear.base.errors import InputError, at
 from hpcclear.base.errors import nearest as nearest
-from hpcclear.base.units import UnitError, shows_point, to_si
+from hpcclear.base.units import shows_point, to_si
 from hpcclear.scene.wanted import hint
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
@@ -25,14 +26,16 @@ LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overfl
 LONGEST_CURVE = 100_000
 
 
-def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> PydanticCustomError:
+def invalid(reason: str, remedy: str, key: str = "", value: object = ...) -> InputError:
     """An error for validators: `key` is relative to the table that is validated; `...` means "look
     it up"."""
-    return PydanticCustomError(
-        "scene",
-        "{reason}. {remedy}",
-        {"reason": reason, "remedy": remedy, "key": key, "value": value},
-    )
+    return InputError(key, value, reason, remedy)
+
+
+def check_known(name: str, known: Collection[str], reason: str, key: str = "") -> None:
+    """An error for validators unless a name is one of those that are known; it proposes the nearest."""
+    if name not in known:
+        raise invalid(f"{name!r} {reason}", nearest(name, tuple(known)), key)
 
 
 def check_one_of(key: str, value: object, other: object, remedy: str) -> None:
@@ -72,12 +75,20 @@ class Table(BaseModel):
                 raise invalid(reason, remedy, key=key)
         return data
 
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        self._check()
+        return self
+
+    def _check(self) -> None:
+        """An error for validators where entries contradict each other; tables override it."""
+
 
 class Converted:
     """What an entry is made into: an annotation whose `convert` is pydantic's validator."""
 
     def convert(self, value: object) -> Any:
-        """The value as the scene holds it; raises PydanticCustomError."""
+        """The value as the scene holds it; an error for validators where it is none."""
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(
@@ -100,7 +111,7 @@ class Quantity(Converted):
     nonzero: bool = False
 
     def convert(self, value: object, key: str = "", decided: bool = False) -> float:
-        """The value in SI; raises PydanticCustomError, with the key of the value; `decided` as of `to_si`."""
+        """The value in SI; an error for validators, with the key of the value; `decided` as of `to_si`."""
         number = self.number(value, key, decided)
         if not self.holds(number):
             why = f": {self.why}" if self.why else ""
@@ -136,10 +147,8 @@ class Quantity(Converted):
     def number(self, value: object, key: str = "", decided: bool = False) -> float:
         """The value in SI, finite, bounds not looked at; errors as `convert`."""
         if isinstance(value, str):
-            try:
+            with at(key):
                 value = to_si(value, self.unit, decided)
-            except UnitError as error:
-                raise invalid(error.reason, error.remedy, key) from None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise invalid("a number is expected here", self._remedy(), key)
         try:
@@ -210,7 +219,7 @@ class Count(Converted):
     most: int = LARGEST_COUNT
 
     def convert(self, value: object) -> int:
-        """The value; raises PydanticCustomError."""
+        """The value; an error for validators where it is none."""
         remedy = f"Write a whole number from {self.least} to {self.most}"
         if isinstance(value, float) and value.is_integer():
             value = int(value)
@@ -269,7 +278,7 @@ class CurveOf(Converted):
     cycles: bool = False
 
     def convert(self, value: object) -> Curve:
-        """A float or a tuple of pairs in (rad, unit); raises PydanticCustomError."""
+        """A float or a tuple of pairs in (rad, unit); an error for validators where it is none."""
         if isinstance(value, Mapping) and "file" in value:
             raise invalid(
                 "files are read where a scene is loaded, and this came another way",
@@ -303,7 +312,7 @@ _LONGER = "For more turns give its drive `turns`, 2 for the 720 degrees of a fou
 
 
 def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: str = "") -> None:
-    """An error for validators unless a table repeats within so many turns; raises PydanticCustomError."""
+    """An error for validators unless a table repeats within so many turns; an error for validators where it is none."""
     span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi * turns
     length = "one turn" if turns == 1 else f"{turns} turns"
     if span > turn * (1 + 1e-12):
@@ -328,7 +337,7 @@ class MotionTable(Converted):
     """A motion that repeats, ``[[time, angle], ...]`` in s and rad, from time 0 on."""
 
     def convert(self, value: object) -> tuple[tuple[float, float], ...]:
-        """Pairs in (s, rad); raises PydanticCustomError."""
+        """Pairs in (s, rad); an error for validators where it is none."""
         remedy = "Write pairs [[time, angle], ...] from 0 s to where the motion repeats"
         if not isinstance(value, (list, tuple)) or not LEAST_ROWS <= len(value) <= LONGEST_CURVE:
             raise invalid(

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -66,8 +65,7 @@ class FileCurve(Table):
         ),
     }
 
-    @model_validator(mode="after")
-    def _of_one_kind(self) -> "FileCurve":
+    def _check(self) -> None:
         given = [kind for kind in _VALUES if getattr(self, kind) is not None]
         if len(given) > 1:
             raise invalid(f"stands beside {given[0]}", "Keep one of them", given[1])
@@ -89,7 +87,6 @@ class FileCurve(Table):
                 "bore",
                 None,
             )
-        return self
 
     @property
     def piston(self) -> float | None:

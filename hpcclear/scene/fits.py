@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
-from pydantic_core import PydanticCustomError
 
 from hpcclear.base import tolerances
+from hpcclear.base.errors import at
 from hpcclear.base.units import note
 from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.iso286 import Limits, fit_of
@@ -46,17 +46,12 @@ class Tolerance(Table):
         ends = data["range"]
         if not isinstance(ends, (list, tuple)) or len(ends) != 2:
             raise invalid("two diameters are expected here", "Write [smallest, largest]", "range")
-        try:
-            low, high = (_DIAMETER.convert(one) for one in ends)
-        except PydanticCustomError as error:
-            context = error.context or {}
-            raise invalid(context["reason"], context["remedy"], "range") from None
+        low, high = (_DIAMETER.convert(one, "range") for one in ends)
         if not low < high:
             raise invalid("the diameters do not rise", "Write [smallest, largest]", "range")
         return {**data, "range": (low, high)}
 
-    @model_validator(mode="after")
-    def _capable(self) -> "Tolerance":
+    def _check(self) -> None:
         if self.distribution == "uniform" and (self.cp, self.cpk, self.towards) != (1, None, None):
             raise invalid("belongs to a normal distribution", "Remove it", "cp", self.cp)
         if self.cpk is not None and self.cpk > self.cp:
@@ -67,7 +62,6 @@ class Tolerance(Table):
                 "the mean lies off the middle, and nothing says where",
                 'Add towards = "upper" or "lower"', "towards", None,
             )  # fmt: skip
-        return self
 
     def part(self, limits: Limits | None) -> tolerances.Part:
         """Its distribution; `limits` are those of the fit."""
@@ -117,20 +111,17 @@ def with_clearance(joint: object) -> Any:
         if key in joint and beside:
             raise invalid(f"stands beside {beside[0]}", "Keep one of them", key, joint[key])
     made = {key: value for key, value in joint.items() if key not in ("fit", "diametral_clearance")}
-    try:
-        if "fit" in joint:
+    if "fit" in joint:
+        with at("fit", joint["fit"]):
             fit = fit_of(joint["fit"])
-            made |= {"clearance": fit.clearance, "bearing_radius": fit.bearing_radius}
-            low, high = (1e6 * one for one in fit.clearances)
-            note(
-                joint["fit"],
-                f"a radial clearance of {low:.4g} to {high:.4g} um, here {1e6 * fit.clearance:.4g} um, "
-                f"and a bearing radius of {1e3 * fit.bearing_radius:.8g} mm",
-            )
-        if "diametral_clearance" in joint:
-            made["clearance"] = Quantity("m", above=0).convert(joint["diametral_clearance"]) / 2
-    except PydanticCustomError as error:
-        context = error.context or {}
-        key = "fit" if "fit" in joint else "diametral_clearance"
-        raise invalid(context["reason"], context["remedy"], key, joint[key]) from None
+        made |= {"clearance": fit.clearance, "bearing_radius": fit.bearing_radius}
+        low, high = (1e6 * one for one in fit.clearances)
+        note(
+            joint["fit"],
+            f"a radial clearance of {low:.4g} to {high:.4g} um, here {1e6 * fit.clearance:.4g} um, "
+            f"and a bearing radius of {1e3 * fit.bearing_radius:.8g} mm",
+        )
+    if "diametral_clearance" in joint:
+        diametral = _DIAMETER.convert(joint["diametral_clearance"], "diametral_clearance")
+        made["clearance"] = diametral / 2
     return made

@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic_core import PydanticCustomError
-
+from hpcclear.base.errors import at
 from hpcclear.base.units import note
 from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.fits import INSTEAD, with_clearance
@@ -25,12 +24,8 @@ def with_fits_of_joints(content: Mapping[str, object]) -> Mapping[str, Any]:
 
 def with_shares(content: Mapping[str, object]) -> Mapping[str, Any]:
     """The content of a file with `half_width = "3 %"` of its random inputs as that share of the number that they scatter about;
-    where the study varies that, it stays a share, and the input is `relative`.
-
-    Raises
-    ------
-    PydanticCustomError
-        If the number is not there.
+    where the study varies that, it stays a share, and the input is `relative`. An error for validators if the number is not
+    there.
     """
     rows = _at(content, "study.random")
     for name, row in rows.items() if isinstance(rows, Mapping) else ():
@@ -58,12 +53,9 @@ def with_shares(content: Mapping[str, object]) -> Mapping[str, Any]:
                 raise invalid(
                     f"there is no number at {path}", "Give that entry first", where, share
                 )
-            try:
+            with at(where, share):
                 about = Quantity(unit).number(middle)
                 value = abs(about) * Quantity("").number(share)
-            except PydanticCustomError as error:
-                context = error.context or {}
-                raise invalid(context["reason"], context["remedy"], where, share) from None
             note_share(str(share), unit, f"{about:g}")
             content = replace(content, f"study.random.{name}.{key}", value)
     return content

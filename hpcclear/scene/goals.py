@@ -4,17 +4,15 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import PrivateAttr, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import PrivateAttr
 
-from hpcclear.base.arithmetic import FormulaError, names_in, value_of
+from hpcclear.base.arithmetic import names_in, value_of
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, at
 from hpcclear.base.objectives import Objective, Usual
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.fields import Quantity, Table, invalid
-from hpcclear.scene.laws import check_own_objective
-from hpcclear.scene.plugged import PluginName
+from hpcclear.scene.plugged import PluginName, as_invalid
 
 Level = Annotated[float, Quantity("", above=0, below=1)]
 
@@ -23,13 +21,16 @@ class ObjectiveName(PluginName):
     """An entry that names an objective."""
 
     def convert(self, value: object) -> str:
-        """The name of one that is there and without fault; raises PydanticCustomError."""
+        """The name of one that is there and without fault; an error for validators where it is none."""
         name = super().convert(value)
         found = self.registry.get(name)
         if not isinstance(found, Objective):
             raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
-        if not self.registry.is_ours(name):
-            check_own_objective(found)
+        if not self.registry.is_ours(name):  # slow to load: for objectives of users alone
+            from hpcclear.laws.objectives import check_objective
+
+            with at(""):
+                check_objective(found)
         return name
 
 
@@ -49,17 +50,14 @@ class Goal(Table):
     limit: float | None = None
     """For "exceedance": threshold of f, SI."""
 
-    @model_validator(mode="after")
-    def _complete(self) -> "Goal":
+    def _check(self) -> None:
         if (self.statistic is None) == (self.formula is None):
             raise invalid(
                 "either a statistic or a formula is expected here", 'Write statistic = "mean", say'
             )
         if self.formula is not None:
-            try:
+            with at("formula", self.formula[:80]):
                 names_in(self.formula)
-            except FormulaError as error:
-                raise invalid(error.reason, error.remedy, "formula", self.formula[:80]) from None
         if self.statistic == "exceedance" and self.limit is None:
             raise invalid(
                 "the threshold is missing", "Add limit, the threshold of f", "limit", None
@@ -69,7 +67,6 @@ class Goal(Table):
         for key, owner in (("level", "quantile"), ("limit", "exceedance")):
             if getattr(self, key) is not None and self.statistic != owner:
                 raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
-        return self
 
     _priced: tuple[Any, ...] = PrivateAttr(())
     _place: int = PrivateAttr(0)
@@ -157,10 +154,7 @@ MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
 def in_si(case: object, objective: object, key: str) -> Any:
     """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
 
-    Raises
-    ------
-    PydanticCustomError
-        A limit is no number of that unit; its key begins with `key`.
+    An error for validators where a limit is no number of that unit; its key begins with `key`.
     """
     if not isinstance(case, Mapping):
         return case
@@ -182,18 +176,11 @@ def _goal(row: object, unit: str, key: str) -> Any:
         return row
     made = dict(row)
     if isinstance(row.get("of"), str):
-        try:
+        with as_invalid(f"{key}.of"):
             unit = OBJECTIVES.get(row["of"]).unit
-        except InputError as error:
-            raise invalid(error.reason, error.remedy, f"{key}.of", row["of"]) from None
     own = unit if row.get("statistic") in ("mean", "deviation", "quantile") else ""
     for name, its in (("limit", unit), ("most", own)):
         if name in made:
-            try:
+            with at(f"{key}.{name}", made[name]):
                 made[name] = Quantity(its).convert(made[name])
-            except PydanticCustomError as error:
-                context = error.context or {}
-                raise invalid(
-                    context["reason"], context["remedy"], f"{key}.{name}", made[name]
-                ) from None
     return made

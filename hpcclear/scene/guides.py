@@ -1,8 +1,6 @@
 """A guide with clearance: a rectangular slider in a channel that is a little wider, in the tables of a scene."""
 
-from typing import ClassVar, Literal, Self
-
-from pydantic import model_validator
+from typing import ClassVar, Literal
 
 from hpcclear.base.outcome import CORNERS
 from hpcclear.scene.fields import Length, PositiveLength, Table, invalid
@@ -47,8 +45,7 @@ class OfContacts(Table):
     start_offset: Length | None = None
     """Distance of the middle from the line at the start, positive to the left, m; default 0."""
 
-    @model_validator(mode="after")
-    def _has_all(self) -> Self:
+    def _check(self) -> None:
         """It is one without clearance, or has all that clearance needs."""
         entries = (*self.needed, "width", "materials", "start_offset", "start_tilt")
         own = [name for name in entries if name in type(self).model_fields]
@@ -64,7 +61,6 @@ class OfContacts(Table):
                     "is missing, and a joint with clearance needs it",
                     "Add it, or remove clearance for a joint without", key=name, value=None,
                 )  # fmt: skip
-        return self
 
 
 class Guide(OfContacts):
@@ -89,13 +85,8 @@ class Guide(OfContacts):
 
     elsewhere: ClassVar = NOT_OF_GUIDES
 
-    @model_validator(mode="after")
-    def _slider_fits(self) -> Self:
-        self.check()
-        return self
-
-    def check(self) -> None:
-        """An error for validators unless a slider with clearance has corners that fit, and the friction of all contacts."""
+    def _check(self) -> None:
+        super()._check()
         if self.clearance is None:
             return
         if getattr(self, "friction", None) is not None:

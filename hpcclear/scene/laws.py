@@ -1,17 +1,15 @@
 """Tables of the scene that name a law: what entries they have, the law says."""
 
-import contextlib
 import dataclasses
 import itertools
 from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from pydantic import ConfigDict, GetJsonSchemaHandler, PrivateAttr, model_validator
 from pydantic_core import CoreSchema
 
-from hpcclear.base.arithmetic import FormulaError
-from hpcclear.base.objectives import Objective
+from hpcclear.base.errors import at
 from hpcclear.laws import laws, names
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
@@ -21,25 +19,6 @@ from hpcclear.scene.wanted import hint
 
 SPHERE = "sphere"
 """The geometry of contact that laws of this package have by themselves."""
-
-
-def check_own_objective(objective: Objective) -> None:
-    """An error for validators where an objective is at fault."""
-    from hpcclear.laws.objectives import (
-        check_objective,  # slow to load: for objectives of users alone
-    )
-
-    with as_mended(""):
-        check_objective(objective)
-
-
-@contextlib.contextmanager
-def as_mended(key: str) -> Iterator[None]:
-    """What is wrong with a law as an error of an entry."""
-    try:
-        yield
-    except FormulaError as error:
-        raise invalid(error.reason, error.remedy, key) from None
 
 
 @cache
@@ -62,7 +41,7 @@ class LawName(Converted):
     kind: str
 
     def convert(self, value: object) -> str:
-        """The name, known to be there; raises PydanticCustomError."""
+        """The name, known to be there; an error for validators where it is none."""
         if value not in (known := names(self.kind)):
             raise invalid("is not one of the known values", nearest(str(value), known))
         return str(value)
@@ -190,7 +169,7 @@ class LawTable(Table):
             )
         from hpcclear.laws.checks import check_parameters  # slow to load: for laws of users alone
 
-        with as_mended("law"):
+        with at("law"):
             check_parameters(law)
         return law
 
@@ -214,9 +193,9 @@ class LawTable(Table):
             isinstance(one, str) for one in units.values()
         ):
             raise invalid("a table of units is expected here", 'Write, say, { b = "s/m" }', "units")
-        with as_mended(entry):
+        with at(entry):
             law = law_of(cls.kind, text, units)
-        with as_mended("units"):
+        with at("units"):
             check_parameters(law)
         return law
 
@@ -270,15 +249,13 @@ class LawTable(Table):
         if theirs:
             from hpcclear.laws.checks import check
 
-            with as_mended("law"):
+            with at("law"):
                 check(law, found)
         return found
 
-    @model_validator(mode="after")
-    def _keep_law(self) -> Self:
+    def _check(self) -> None:
         given = {name: getattr(self, name) for name in self._own()}
         self._law = type(self).find(self.law, given)
-        return self
 
     @property
     def declared(self) -> Any:
@@ -316,7 +293,8 @@ def _curve(data: Mapping[str, object]) -> Any:
     """Rows of the entry ``curve``, both columns rising from 0, or None; an error for validators."""
     if data.get("curve") is None:
         return None
-    rows = _converted(Piecewise("m", "N"), data["curve"], "curve", data["curve"])
+    with at("curve", data["curve"]):
+        rows = Piecewise("m", "N").convert(data["curve"])
     rising = all(second[1] > first[1] for first, second in itertools.pairwise(rows))
     if (
         rows[0][0] < 0.0
@@ -363,15 +341,7 @@ def _value(parameter: Any, value: Any) -> Any:
                 "a list of the right length is expected here", "Write it as [first, second]",
                 parameter.name, value,
             )  # fmt: skip
-        return tuple(_converted(quantity, one, parameter.name, value) for one in value)
-    return _converted(quantity, value, parameter.name, value)
-
-
-def _converted(quantity: Converted, value: Any, key: str, shown: Any) -> Any:
-    from pydantic_core import PydanticCustomError
-
-    try:
+        with at(parameter.name, value):
+            return tuple(map(quantity.convert, value))
+    with at(parameter.name, value):
         return quantity.convert(value)
-    except PydanticCustomError as error:
-        context = error.context or {}
-        raise invalid(context["reason"], context["remedy"], key, shown) from None

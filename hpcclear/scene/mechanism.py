@@ -55,8 +55,7 @@ class Mechanism(Table):
     offset: Length | None = None
     """Distance of the slider's line from the crank's axis along +y, m. Without it the line passes through the axis."""
 
-    @model_validator(mode="after")
-    def _assembles(self) -> "Mechanism":
+    def _check(self) -> None:
         offset = abs(self.offset or 0.0)
         if self.rod.length <= self.crank.length + offset:
             beside = f" and the offset ({offset:g} m)" if offset else ""
@@ -67,7 +66,6 @@ class Mechanism(Table):
                 key="rod.length",
                 value=self.rod.length,
             )
-        return self
 
 
 Drive = Annotated[ConstantSpeed | TorqueDrive, Field(discriminator="kind")]

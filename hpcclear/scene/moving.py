@@ -6,12 +6,9 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from pydantic_core import PydanticCustomError
-
 from hpcclear.base import quantiles
-from hpcclear.base.errors import InputError
 from hpcclear.scene.choices import input_entry
-from hpcclear.scene.fields import invalid, nearest
+from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.named import Range
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.variables import Variable
@@ -132,9 +129,7 @@ class Moving:
     def _check_driven(self, variable: Variable, path: str) -> None:
         name, entry = input_entry(path)
         key, known = f"variables.{variable.name}", {row.name: row for row in self.random}
-        if name not in known:
-            reason = f"{name!r} is not a random input of this study"
-            raise invalid(reason, nearest(name, tuple(known)), key)
+        check_known(name, known, "is not a random input of this study", key)
         if "." not in entry and getattr(known[name], entry) is None:
             raise invalid(
                 f"the random input {name} has no {entry}",
@@ -159,11 +154,10 @@ class Moving:
         for design in self._extremes(row):
             try:
                 self.law(row, design)
-            except (PydanticCustomError, InputError, ValueError, OverflowError) as error:
-                context = getattr(error, "context", None) or {}
+            except (ValueError, OverflowError) as error:
                 shown = ", ".join(f"{name} = {value:g}" for name, value in design.items())
                 raise invalid(
-                    f"makes no distribution with {shown}: {context.get('reason', error)}",
+                    f"makes no distribution with {shown}: {getattr(error, 'reason', error)}",
                     "Narrow what drives it",
                     key=f"random.{row.name}",
                 ) from None

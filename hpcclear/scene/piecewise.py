@@ -26,7 +26,7 @@ class Piecewise(Converted):
     """Of the first numbers."""
 
     def convert(self, value: object) -> Any:
-        """A number, or a tuple of pairs in SI; raises PydanticCustomError."""
+        """A number, or a tuple of pairs in SI; an error for validators where it is none."""
         if self.constant and not isinstance(value, (list, tuple)):
             return Quantity(self.unit).convert(value)
         if isinstance(value, Mapping) and "file" in value:

@@ -42,7 +42,7 @@ class PlaceRows(NamedRows):
     """``{name = [x, y]}`` as named rows."""
 
     def rows(self, value: object) -> Any:
-        """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; raises PydanticCustomError."""
+        """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; an error for validators where it is none."""
         if not isinstance(value, (Mapping, tuple)):
             raise invalid("named points are expected here", "Write { name = [x, y] }")
         if isinstance(value, Mapping):

@@ -64,8 +64,7 @@ class PlanarBody(Table):
             return self.inertia
         return self.inertia_ratio * slender_inertia(self.mass, self.length)
 
-    @model_validator(mode="after")
-    def _bar_or_points(self) -> "PlanarBody":
+    def _check(self) -> None:
         if self.length is None:
             for key, meaning, instead in (
                 ("mass_center", "is measured along a bar", "center = [x, y]"),
@@ -75,7 +74,7 @@ class PlanarBody(Table):
                     reason = f"{meaning}, and this body has no length"
                     remedy = f"Give its length, or write {instead}"
                     raise invalid(reason, remedy, key=key, value=value)
-            return self
+            return
         if self.inertia_ratio is not None and self.inertia:
             raise invalid(
                 "is given beside the inertia itself",
@@ -97,7 +96,6 @@ class PlanarBody(Table):
                     "Give it another name",
                     key=f"points.{point.name}",
                 )
-        return self
 
 
 class Ground(Table):
@@ -183,28 +181,14 @@ class Planar(Table):
     followed: str | None = None
     """``body.point`` whose acceleration and path responses contain."""
 
-    @model_validator(mode="after")
-    def _followed_is_a_point(self) -> "Planar":
+    def _check(self) -> None:
         if self.followed is not None:
             places = [
                 f"{body.name}.{point}" for body in self.bodies for point in names_of_points(body)
             ]
             if self.followed not in places:
-                raise invalid(
-                    "is no point of a body",
-                    nearest(self.followed, places),
-                    key="followed",
-                    value=self.followed,
-                )
-        return self
+                raise invalid("is no point of a body", nearest(self.followed, places), "followed")
 
-    @model_validator(mode="after")
-    def _tables_fit(self) -> "Planar":
-        self.check()
-        return self
-
-    def check(self) -> None:
-        """An error for validators unless bars that bend are held by pins, and curves repeat with the revolution."""
         check_bars(self)
         turns = turns_of(self) if self.drives else 1
         for table in ("drives", "loads"):

@@ -50,7 +50,7 @@ class PluginName(Converted):
     registry: Registry
 
     def convert(self, value: object) -> str:
-        """The name, known to be there; raises PydanticCustomError."""
+        """The name, known to be there; an error for validators where it is none."""
         if not isinstance(value, str):
             raise invalid("a name is expected here", "Write it in quotes")
         with as_invalid():

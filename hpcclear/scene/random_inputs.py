@@ -103,8 +103,7 @@ class RandomInput(NamedInput):
             row["values"] = tuple(sorted(offset.several(row["values"], "values", 2, LONGEST_CURVE)))
         return row
 
-    @model_validator(mode="after")
-    def _parameters_fit(self) -> "RandomInput":
+    def _check(self) -> None:
         form = form_of(self.distribution, self.parameters or {})
         needed, further = form.needs, form.may_have
         if self.range is not None and self.distribution in ("uniform", "beta"):
@@ -120,7 +119,6 @@ class RandomInput(NamedInput):
                     f"does not belong to this {self.distribution!r} distribution", "Remove it", key
                 )
         self._check_cut()
-        return self
 
     def _check_cut(self) -> None:
         if self.distribution == "lognormal" and (self.mean or 0.0) <= 0.0:

@@ -8,9 +8,9 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
+from hpcclear.base.errors import InputError
 from hpcclear.plugins import SEARCHES, SURROGATES
 from hpcclear.scene.fields import Count, Quantity, Table, invalid
 from hpcclear.scene.plugged import PluginName
@@ -67,14 +67,10 @@ class Sensitivity(Table):
             self.terms is None and math.comb(inputs + order, order) >= samples
         )
 
-    def check(self) -> None:
-        """Contradictions between the entries; PydanticCustomError with a key below the study."""
+    def _check(self) -> None:
         if self.sobol_samples & (self.sobol_samples - 1):
-            raise invalid(
-                "must be a power of two: other lengths unbalance the sequence",
-                "Write 4096, for example",
-                key="sensitivity.sobol_samples",
-            )
+            reason = "must be a power of two: other lengths unbalance the sequence"
+            raise invalid(reason, "Write 4096, for example", "sobol_samples")
 
 
 class Surrogate(Table):
@@ -147,16 +143,10 @@ class Swarm(Table):
     monte_carlo_samples: Annotated[int, Count(2, 10**7)] = 1000
     """Number of samples per design, for "monte-carlo"."""
 
-    @model_validator(mode="after")
-    def _enough(self) -> "Swarm":
+    def _check(self) -> None:
         if (self.algorithm or "").startswith("pymoo:") and self.particles < FEWEST:
-            raise invalid(
-                f"{self.algorithm} recombines designs and needs at least {FEWEST} of them",
-                f"Request {FEWEST} or more",
-                "particles",
-                self.particles,
-            )
-        return self
+            reason = f"{self.algorithm} recombines designs and needs at least {FEWEST} of them"
+            raise invalid(reason, f"Request {FEWEST} or more", "particles", self.particles)
 
 
 class MomentAccuracy(Table):
@@ -178,20 +168,16 @@ MOMENTS = ("mean", "deviation")
 def of_both(entry: object) -> object:
     """A number as the accuracy of mean and standard deviation; of a table with one of them, the other is the same.
 
-    Raises
-    ------
-    PydanticCustomError
-        It is no number between 0 and 1.
+    An error for validators where it is no number between 0 and 1.
     """
     if entry is None:
         return None
     if not isinstance(entry, Mapping):
         try:
             return dict.fromkeys(MOMENTS, Quantity("", above=0, below=1).convert(entry))
-        except PydanticCustomError as error:
-            context = error.context or {}
+        except InputError as error:
             remedy = 'Write 0.005 or "0.5 %", say, or { mean = 0.002, deviation = 0.005 }'
-            raise invalid(context["reason"], remedy, "accuracy", entry) from None
+            raise invalid(error.reason, remedy, "accuracy", entry) from None
     given = [entry[name] for name in MOMENTS if name in entry]
     return dict.fromkeys(MOMENTS, given[0]) | dict(entry) if len(given) == 1 else entry
 
@@ -250,8 +236,7 @@ class Verification(Table):
         "accuracy": ("belongs to [study]", "Write study.accuracy with this value")
     }
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "Verification":
+    def _check(self) -> None:
         if self.method == "qmc" and self.samples is not None:
             raise invalid(
                 "the number of points of a Sobol sequence follows from the accuracy",
@@ -259,7 +244,6 @@ class Verification(Table):
                 key="samples",
                 value=self.samples,
             )
-        return self
 
     @property
     def draws(self) -> int | None:

@@ -7,18 +7,17 @@ from typing import Any
 from pydantic import model_validator
 
 from hpcclear.base.arithmetic import names_in
+from hpcclear.base.errors import at
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import goals
 from hpcclear.scene.cases import Case
-from hpcclear.scene.fields import invalid, nearest
+from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.named import paths_of, texts_in
 from hpcclear.scene.random_inputs import RandomInput
-from hpcclear.scene.stages import (
-    Sensitivity,
-    of_both,
-)
+from hpcclear.scene.stages import Sensitivity, of_both
 from hpcclear.scene.study_tables import StudyTables
 
+_NO_INPUT, _NO_VARIABLE = "is not a random input of this study", "is not a study variable"
 LEAST_PER_INPUT = 3
 """Samples of a surface that chooses its terms for each of its linear ones, at least."""
 
@@ -57,8 +56,7 @@ class Study(StudyTables):
             data["sensitivity"] = {"parameter": _only_clearance(variables), **stage}
         return data
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "Study":
+    def _check(self) -> None:
         if not self.variables:
             raise invalid(
                 "the list of variables is empty",
@@ -71,10 +69,8 @@ class Study(StudyTables):
             self._check_width(row)
         self._check_correlation()
         self._check_cases()
-        self.sensitivity.check()
         self._check_names()
         self._check_sizes()
-        return self
 
     def _check_paths(self) -> None:
         owner: dict[str, str] = {}
@@ -145,12 +141,7 @@ class Study(StudyTables):
     def _check_correlation(self) -> None:
         known = tuple(row.name for row in self.random)
         for name in self.correlation.inputs if self.correlation is not None else ():
-            if name not in known:
-                raise invalid(
-                    f"{name!r} is not a random input of this study",
-                    nearest(name, known),
-                    key="correlation.inputs",
-                )
+            check_known(name, known, _NO_INPUT, "correlation.inputs")
             if self.random_input(name).worn:
                 raise invalid(
                     f"{name!r} comes from the wear simulation, which has no other input",
@@ -161,12 +152,8 @@ class Study(StudyTables):
     def _check_cases(self) -> None:
         for case in self.cases:
             for name in case.random:
-                if name not in (known := tuple(row.name for row in self.random)):
-                    raise invalid(
-                        f"{name!r} is not a random input of this study",
-                        nearest(name, known),
-                        key=f"cases.{case.name}",
-                    )
+                inputs = [row.name for row in self.random]
+                check_known(name, inputs, _NO_INPUT, f"cases.{case.name}")
                 if name not in self.optimisation:
                     raise invalid(
                         f"the surrogate of the optimisation does not contain {name!r}",
@@ -193,28 +180,19 @@ class Study(StudyTables):
             )
         for table, rows in (("objectives", case.goals), ("constraints", case.kept)):
             for k, goal in enumerate(rows):
+                key = f"cases.{case.name}.{table}.{k}"
                 for name in () if goal.formula is None else names_in(goal.formula):
-                    if name not in own:
-                        raise invalid(
-                            f"{name!r} is no design variable of this case",
-                            nearest(name, own),
-                            key=f"cases.{case.name}.{table}.{k}.formula",
-                            value=goal.formula,
-                        )
-                    if self.variable(name).rows:
-                        raise invalid(
-                            f"{name!r} is a row of a table and no number",
-                            'Give its rows a cost, and write statistic = "cost"',
-                            key=f"cases.{case.name}.{table}.{k}.formula",
-                            value=goal.formula,
-                        )
+                    with at(f"{key}.formula", goal.formula):
+                        check_known(name, own, "is no design variable of this case")
+                        if self.variable(name).rows:
+                            raise invalid(
+                                f"{name!r} is a row of a table and no number",
+                                'Give its rows a cost, and write statistic = "cost"',
+                            )
                 if goal.of is not None and goal.of != self.objective:
-                    why = self._not_recorded(goal.of)
-                    if why:
-                        raise invalid(
-                            why, f"Make it study.objective, and name {self.objective!r} in `of` in its place",
-                            key=f"cases.{case.name}.{table}.{k}.of", value=goal.of,
-                        )  # fmt: skip
+                    if why := self._not_recorded(goal.of):
+                        remedy = f"Make it study.objective, and name {self.objective!r} in `of` in its place"
+                        raise invalid(why, remedy, f"{key}.of", goal.of)
                     goal.placed(2 + self.further.index(goal.of))
                 if goal.statistic == "cost":
                     priced = tuple(one for one in self.variables if one.name in own and one.priced)
@@ -222,7 +200,7 @@ class Study(StudyTables):
                         raise invalid(
                             "no design variable of this case has a cost",
                             'Add cost = { law = "reciprocal", at = "20 um", cost = 3 } to one, say',
-                            key=f"cases.{case.name}.{table}.{k}.statistic",
+                            key=f"{key}.statistic",
                         )
                     goal.priced_by(priced)
 
@@ -262,10 +240,7 @@ class Study(StudyTables):
         for key, names in lists:
             names = tuple(names)
             for name in names:
-                if name not in self.names:
-                    raise invalid(
-                        f"{name!r} is not a study variable", nearest(name, self.names), key=key
-                    )
+                check_known(name, self.names, _NO_VARIABLE, key)
             if len(set(names)) < len(names):
                 raise invalid("a variable is named twice", "Remove one", key=key)
             loads = [n for n in names if n in of_loads]
@@ -291,20 +266,16 @@ class Study(StudyTables):
     def _check_groups(self) -> None:
         """The fixed parameter of response surfaces."""
         if self.sensitivity.groups:
-            if self.sensitivity.parameter is None:
+            parameter = self.sensitivity.parameter
+            if parameter is None:
                 raise invalid(
                     "no study variable, or more than one, drives a clearance, "
                     "so the fixed parameter of each surface is not known",
                     f"Name one of {', '.join(self.names)}",
                     key="sensitivity.parameter",
                 )
-            if self.sensitivity.parameter not in self.names:
-                raise invalid(
-                    f"{self.sensitivity.parameter!r} is not a study variable",
-                    nearest(self.sensitivity.parameter, self.names),
-                    key="sensitivity.parameter",
-                )
-            if any(self.sensitivity.parameter in group for group in self.sensitivity.groups):
+            check_known(parameter, self.names, _NO_VARIABLE, "sensitivity.parameter")
+            if any(parameter in group for group in self.sensitivity.groups):
                 raise invalid(
                     "the parameter is fixed, so it cannot be an input of a surface",
                     "Remove it from the group",

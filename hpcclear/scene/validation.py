@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import noting
@@ -80,8 +80,8 @@ def scene_of(kind: type[Whole], content: Mapping[str, Any]) -> Whole:
         if scene.study is not None:
             try:
                 _check_study(scene, scene.study)
-            except PydanticCustomError as error:
-                raise _told(error.context or {}, (), content) from None
+            except InputError as error:
+                raise _told(error, (), content) from None
     scene._readings = tuple(_placed(content, read)) if read else ()
     return scene
 
@@ -191,8 +191,8 @@ def _check_corner(
     try:
         kind.model_validate(corner)
     except ValidationError as error:
-        context = error.errors(include_url=False)[0].get("ctx", {})
-        reason = context.get("reason", "it is not valid")
+        said = error.errors(include_url=False)[0].get("ctx", {}).get("error")
+        reason = getattr(said, "reason", "it is not valid")
         raise invalid(
             f"reaches {words}, which makes no mechanism: {reason}", "Narrow it", key=key
         ) from None
@@ -220,8 +220,9 @@ def _check_depth(content: Mapping[str, object]) -> None:
 def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -> InputError:
     """A pydantic error as an InputError."""
     location = _untagged(error["loc"], error["type"])
-    if error["type"] == "scene":
-        return _told(error.get("ctx", {}), location, content, more)
+    said = error.get("ctx", {}).get("error")
+    if isinstance(said, InputError):
+        return _told(said, location, content, more)
     names, found = _follow(location, content)
     if error["type"].startswith("union_tag"):
         names, found = (*names, "kind"), found.get("kind")
@@ -230,16 +231,16 @@ def _translated(error: ErrorDetails, content: Mapping[str, object], more: int) -
 
 
 def _told(
-    said: Mapping[str, Any], location: tuple[int | str, ...], content: object, more: int = 0
+    said: InputError, location: tuple[int | str, ...], content: object, more: int = 0
 ) -> InputError:
-    """An error of `invalid`, by its context, at a place as an InputError."""
+    """An error of `invalid` with the whole key of its entry, and what stands there."""
     names, found = _follow(location, content)
-    if said["key"]:
-        below, found = _follow(tuple(said["key"].split(".")), found)
+    if said.key:
+        below, found = _follow(tuple(said.key.split(".")), found)
         names += below
-    if said["value"] is not ...:
-        found = said["value"]
-    return _wrong(names, found, said["reason"], said["remedy"], more)
+    if said.value is not ...:
+        found = said.value
+    return _wrong(names, found, said.reason, said.remedy, more)
 
 
 def _wrong(

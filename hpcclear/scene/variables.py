@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import PrivateAttr, model_validator
-from pydantic_core import PydanticCustomError
 
+from hpcclear.base.errors import at
 from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Row
 from hpcclear.scene.costs import Cost
@@ -48,13 +48,16 @@ class Variable(NamedInput):
 
     _unit: str = PrivateAttr("")
 
-    @model_validator(mode="after")
-    def _keep_unit(self) -> "Variable":
-        """While the kinds of the scene's loads are known."""
-        if not self.rows:
+    def _check(self) -> None:
+        if not self.rows:  # while the kinds of the scene's loads are known
             own = quantities()[self.paths[0]] if self.paths else _of_input(self.__dict__)
             self._unit = own.unit
-        return self
+        if self.cost is not None:
+            self._check_cost(self.cost)
+        if self.over is not None:
+            self._check_load_cases()
+        if self.catalogue is not None:
+            self._check_rows(self.catalogue)
 
     @staticmethod
     def _without_numbers(data: Mapping[str, object]) -> Mapping[str, Any]:
@@ -161,11 +164,8 @@ class Variable(NamedInput):
             if not row.get("follows") or any(not p.endswith(".fit") for p in row["follows"]):
                 raise invalid("does not say which joint", 'Add path = "joints.NAME.fit"', "path")
             for k, one in enumerate(row["fits"]):
-                try:
+                with at(f"fits.{k}", one):
                     choices.rows_of_fits([one], ())
-                except PydanticCustomError as error:
-                    context = error.context or {}
-                    raise invalid(context["reason"], context["remedy"], f"fits.{k}", one) from None
             choices.checked_names(row["fits"], "fits")
         if row.get("follows") and kind == "catalogue":
             raise invalid("has paths in its rows", "Remove it", "path")
@@ -175,13 +175,8 @@ class Variable(NamedInput):
             row["cost"] = Cost.in_si(row["cost"], "", row[kind] if kind == "fits" else ())
         return row
 
-    @model_validator(mode="after")
-    def _cost_fits(self) -> "Variable":
-        if self.cost is None:
-            return self
-        if (self.cost.options is None and self.rows) or (
-            self.cost.options is not None and self.options is None
-        ):
+    def _check_cost(self, cost: Cost) -> None:
+        if self.rows if cost.options is None else self.options is None:
             raise invalid(
                 "is a law of a number, but the variable has rows"
                 if self.rows
@@ -191,16 +186,12 @@ class Variable(NamedInput):
                 else 'Write cost = { law = "reciprocal", at = ..., cost = ... }',
                 "cost",
             )
-        if self.cost.options is not None:
-            _same_length(self.cost.options, self.options or ())
-        if self.cost.law == "reciprocal" and self.bounds[0] <= 0.0:
+        if cost.options is not None:
+            _same_length(cost.options, self.options or ())
+        if cost.law == "reciprocal" and self.bounds[0] <= 0.0:
             raise invalid("has no value at 0 or below", "Give bounds above 0", "cost")
-        return self
 
-    @model_validator(mode="after")
-    def _load_cases(self) -> "Variable":
-        if self.over is None:
-            return self
+    def _check_load_cases(self) -> None:
         if self.options is None or self.step is not None:
             raise invalid(
                 "load cases are values or rows of a catalogue",
@@ -216,27 +207,17 @@ class Variable(NamedInput):
                 f"{len(self.options)} load cases need as many weights, some of them above 0",
                 'Give each a weight, or write over = "worst"', "over",
             )  # fmt: skip
-        return self
 
-    @model_validator(mode="after")
-    def _rows_alike(self) -> "Variable":
-        if self.catalogue is not None:
-            choices.checked_names([row.name for row in self.catalogue], "catalogue")
-            first = set(self.catalogue[0].entries)
-            for row in self.catalogue:
-                if set(row.entries) != first:
-                    odd = sorted(set(row.entries) ^ first)[0]
-                    raise invalid(
-                        f"row {row.name!r} and row {self.catalogue[0].name!r} differ in {odd}",
-                        "Give each row the same entries", "catalogue", row.name,
-                    )  # fmt: skip
-            priced = [row.cost is not None for row in self.catalogue]
-            if any(priced) and (not all(priced) or self.cost is not None):
-                raise invalid(
-                    "some rows have a cost and others have none, or there is a cost besides",
-                    "Give each row a cost", "catalogue",
-                )  # fmt: skip
-        return self
+    def _check_rows(self, rows: tuple[Row, ...]) -> None:
+        choices.checked_names([row.name for row in rows], "catalogue")
+        for row in rows:
+            if odd := sorted(row.entries.keys() ^ rows[0].entries.keys()):
+                reason = f"row {row.name!r} and row {rows[0].name!r} differ in {odd[0]}"
+                raise invalid(reason, "Give each row the same entries", "catalogue", row.name)
+        priced = [row.cost is not None for row in rows]
+        if any(priced) and (not all(priced) or self.cost is not None):
+            reason = "some rows have a cost and others have none, or there is a cost besides"
+            raise invalid(reason, "Give each row a cost", "catalogue")
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

@@ -2,8 +2,6 @@
 
 from typing import Annotated, Literal
 
-from pydantic import model_validator
-
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table, check_one_of, invalid
 
 
@@ -18,8 +16,7 @@ class WornSurface(Table):
     hardness: Annotated[float, Quantity("Pa", above=0)] | None = None
     """Hardness of this surface, Pa."""
 
-    @model_validator(mode="after")
-    def _one_of_both(self) -> "WornSurface":
+    def _check(self) -> None:
         check_one_of(
             "coefficient", self.coefficient, self.dimensionless,
             "Write coefficient = 1e-15 (m2/N), or dimensionless = 1e-6 and hardness",
@@ -31,7 +28,6 @@ class WornSurface(Table):
                 key="hardness",
                 value=self.hardness,
             )
-        return self
 
 
 class RunningIn(Table):
@@ -55,8 +51,7 @@ class Wear(Table):
     """Pressure below which there is no wear, Pa (normal force / (diameter x length)). The wear rate increases linearly
     to its full value at 1.1 times this pressure."""
 
-    @model_validator(mode="after")
-    def _something_wears(self) -> "Wear":
+    def _check(self) -> None:
         if self.bearing is None and self.journal is None:
             raise invalid(
                 "neither bearing nor journal wears",
@@ -64,7 +59,6 @@ class Wear(Table):
                 "bearing",
                 None,
             )
-        return self
 
 
 class Limits(Table):
@@ -116,8 +110,7 @@ class Lives(Table):
         """Fourier components of the wear profile; 0 for uniform wear."""
         return self.harmonics if self.profile == "angular" else 0
 
-    @model_validator(mode="after")
-    def _copies_in_order(self) -> "Lives":
+    def _check(self) -> None:
         if self.most_copies < self.copies:
             raise invalid(
                 "copies is larger than most_copies",
@@ -125,4 +118,3 @@ class Lives(Table):
                 "most_copies",
                 self.most_copies,
             )
-        return self

@@ -1,9 +1,9 @@
 """What a load declares: its table in a scene, its numbers, and the terms that it adds to a motion."""
 
 import math
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hpcclear.base.pieces import Pieces, level, periodic
 from hpcclear.scene.fields import Table, invalid
@@ -85,8 +85,7 @@ class SizedLoad(Load):
         turns = turns if self.angle_of is None else 1
         return periodic(getattr(self, self.size_entry), 2.0 * math.pi * turns, interpolation)
 
-    @model_validator(mode="after")
-    def _by_one_thing(self) -> Self:
+    def _check(self) -> None:
         entry, size, timed = self.size_entry, getattr(self, self.size_entry), self.timed
         if timed is not None and size is not None:
             raise invalid("is given twice", f"Keep {entry} or {entry}_by_time", f"{entry}_by_time")
@@ -101,4 +100,3 @@ class SizedLoad(Load):
                 "Make its first and last value equal",
                 key=f"{entry}_by_time",
             )
-        return self

@@ -1,9 +1,9 @@
 """A force at a point: gas, wind, the resistance of a workpiece."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hpcclear.scene.fields import Curve, CurveOf, Quantity, check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
@@ -40,12 +40,10 @@ class ForceLoad(SizedLoad):
     size_entry: ClassVar[str] = "size"
     unit: ClassVar[str] = "N"
 
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
+    def _check(self) -> None:
         force = None if self.force is None else [self.force.x, self.force.y]
         size = self.size if self.size is not None else self.size_by_time
         check_one_of("force", force, size, "Write force = [x, y], or size and direction")
-        return self
 
     def components(self) -> tuple[Any, Any]:
         """Force along x and y, N; where a curve has its size, the direction. Numbers or arrays of samples."""

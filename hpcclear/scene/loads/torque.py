@@ -1,8 +1,6 @@
 """A torque on a body."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
-
-from pydantic import model_validator
+from typing import Annotated, Any, ClassVar, Literal
 
 from hpcclear.scene.fields import Curve, CurveOf, check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
@@ -24,11 +22,9 @@ class TorqueLoad(SizedLoad):
     size_entry: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N*m"
 
-    @model_validator(mode="after")
-    def _by_one(self) -> Self:
+    def _check(self) -> None:
         remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
         check_one_of("torque", self.torque, self.torque_by_time, remedy)
-        return self
 
     def numbers(self) -> dict[str, Any]:
         """Its size."""

@@ -1,8 +1,6 @@
 """A spring, a damper and end stops on the angle of a body, against the ground or another body."""
 
-from typing import Annotated, Any, Literal, Self
-
-from pydantic import model_validator
+from typing import Annotated, Any, Literal
 
 from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.loads.declared import Load
@@ -30,8 +28,7 @@ class TorsionSpringLoad(Load):
     stop_stiffness: Annotated[float, Quantity("N*m/rad", least=0)] = 0.0
     """Stiffness of the stops, N m/rad."""
 
-    @model_validator(mode="after")
-    def _stops(self) -> Self:
+    def _check(self) -> None:
         stops = self.lower is not None or self.upper is not None
         if stops != (self.stop_stiffness > 0.0):
             raise invalid(
@@ -42,7 +39,6 @@ class TorsionSpringLoad(Load):
             )
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             raise invalid("is not below the upper stop", "Swap both", key="lower", value=self.lower)
-        return self
 
     @property
     def by_angle(self) -> bool:  # type: ignore[override]
