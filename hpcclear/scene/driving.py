@@ -1,20 +1,19 @@
 """What moves a mechanism: drives of bodies."""
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from hpcclear.base.pieces import Rows
+from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
 from hpcclear.scene.fields import (
     Count,
-    Curve,
-    CurveOf,
-    MotionTable,
     Quantity,
     Table,
     check_one_of,
     invalid,
 )
-from hpcclear.scene.piecewise import Piecewise, by_time
 from hpcclear.scene.places import Angle
 
 Turns = Annotated[int, Count(least=1, most=64)]
@@ -85,20 +84,32 @@ class PlanarTable(Driving):
     """A body follows a table of angles."""
 
     kind: Literal["table"]
-    angle: Annotated[tuple[tuple[float, float], ...], MotionTable()]
+    angle: Annotated[Rows, by_time("rad", "angle", fewest=4)]
     """``[[time, angle], ...]``, s and rad, from time 0. The motion repeats from the last time on. The last angle equals
     the first one, or differs from it by one turn (plus: counter-clockwise, minus: clockwise). Values in between follow
     a periodic cubic spline."""
+
+    def _check(self) -> None:
+        if self.angle[0][0] != 0.0:
+            reason = "the times must rise from 0 from row to row"
+            raise invalid(reason, "Sort the rows by time, the first at 0", "angle")
+        gained = self.angle[-1][1] - self.angle[0][1]
+        if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
+            raise invalid(
+                f"the last angle is {gained:.6g} rad from the first, but the motion repeats there",
+                "End it where it began, or a full turn further on or back",
+                "angle",
+            )
 
 
 class TorqueDrive(Table):
     """A torque acts on the free crank; its speed is a result of the simulation."""
 
     kind: Literal["torque"]
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
+    torque: Annotated[Curve, by_angle("N*m")] | None = None
     """Torque, N m; constant, or a table ``[[angle, torque], ...]`` over the turns of a revolution, against the angle of
     the crank or of the body that defines the period."""
-    torque_by_speed: Annotated[Any, Piecewise("rad/s", "N*m")] | None = None
+    torque_by_speed: Annotated[Rows, Pairs("rad/s", "N*m", ("speed", "torque"))] | None = None
     """Instead of `torque`: ``[[speed, torque], ...]`` as of a motor with its pull-out torque, rad/s and N m; linear
     between the rows, constant outside them."""
     no_load_speed: Annotated[float, Quantity("rad/s", above=0)] | None = None
@@ -164,7 +175,7 @@ class PlanarRunUp(Driving):
     requires."""
 
     kind: Literal["run-up"]
-    speed_by_time: Annotated[Any, by_time("rad/s")]
+    speed_by_time: Annotated[Rows, by_time("rad/s", "speed")]
     """``[[time, speed], ...]``, s and rad/s, from 0 s on. Speeds are not negative, and the last one is positive. Values
     in between follow a monotone cubic with zero slope at both ends; after the last row the speed is constant."""
     flywheel_inertia: Annotated[float, Quantity("kg*m**2", least=0)] = 0.0

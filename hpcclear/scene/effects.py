@@ -1,13 +1,14 @@
 """What acts on the mechanism: contact, friction, gravity and loads, as in the scene file."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import field_validator, model_validator
 
-from hpcclear.scene.fields import Curve, CurveOf, Quantity, Speed, Table, invalid
+from hpcclear.base.pieces import Rows
+from hpcclear.scene.curves import Curve, Pairs, by_angle
+from hpcclear.scene.fields import Quantity, Speed, Table, invalid
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
-from hpcclear.scene.piecewise import Piecewise
 from hpcclear.scene.rubbing import Rubbing
 
 
@@ -21,7 +22,7 @@ class Contact(LawTable):
     geometry: str | None = None
     """Geometry of the contact: "sphere" (default), "line" (a pin along the length of its bearing), "liner", "power" or
     "table"."""
-    curve: Annotated[Any, Piecewise("m", "N")] | None = None
+    curve: Annotated[Rows, Pairs("m", "N", ("depth", "force"))] | None = None
     """For the geometry "table": ``[[depth, force], ...]``, m and N, both increasing from 0."""
     minimum_impact_speed: Speed = 1e-3
     """Lower bound of the impact velocity in the damping, m/s."""
@@ -80,7 +81,7 @@ class Effects(Table):
     """Friction in the joints with clearance; default "none"."""
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
     """Acceleration of gravity towards -y, m/s2; 0: disabled."""
-    slider_load: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    slider_load: Annotated[Curve, by_angle("N")] | None = None
     """Force on the slider, positive along +x, N; constant or ``[[crank angle, force], ...]`` over the turns of a
     revolution; default "none"."""
     guide_friction: Rubbing | None = None

@@ -1,7 +1,6 @@
 """The building blocks of scene models: strict frozen tables, quantities with a unit and bounds,
 counts, curves."""
 
-import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -235,135 +234,8 @@ class Count(Converted):
         return {"type": "integer", "minimum": self.least, "maximum": self.most}
 
 
-Curve = float | tuple[tuple[float, float], ...]
-"""A constant, or pairs (crank angle in rad, value) over at most one turn, repeated every turn. Between two rows lies a monotone
-cubic."""
-
-
-_ENTRY: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-
-
 OF_FILE = {"type": "object", "title": "FileCurve"}
 """JSON schema of a curve from a file; the schema of a scene puts that of its table in its place."""
-
-
-def pairs_in(
-    value: Sequence[Any], x: str, y: str, form: str, remedy: str
-) -> tuple[tuple[float, float], ...]:
-    """Pairs in the units `x` and `y`; a point before decimals of one number shows what those of the others are.
-
-    Raises PydanticCustomError.
-    """
-    if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
-        raise invalid(f"every row of a table is a pair {form}", remedy)
-    first, second = Quantity(x), Quantity(y)
-    point = any(shows_point(one) for pair in value for one in pair)
-    return tuple((first.convert(a, "", point), second.convert(b, "", point)) for a, b in value)
-
-
-def _table_of_pairs(least: int) -> dict[str, Any]:
-    """JSON schema of a table of at least so many pairs."""
-    pair = {"type": "array", "items": _ENTRY, "minItems": 2, "maxItems": 2}
-    return {"type": "array", "items": pair, "minItems": least, "maxItems": LONGEST_CURVE}
-
-
-@dataclass(frozen=True)
-class CurveOf(Converted):
-    """A constant, or a table ``[[angle, value], ...]`` against the crank angle, in an SI unit.
-
-    `cycles`: a revolution may take several turns; how long a table may be is then checked where that is known.
-    """
-
-    unit: str
-    cycles: bool = False
-
-    def convert(self, value: object) -> Curve:
-        """A float or a tuple of pairs in (rad, unit); an error for validators where it is none."""
-        if isinstance(value, Mapping) and "file" in value:
-            raise invalid(
-                "files are read where a scene is loaded, and this came another way",
-                "Load a scene with it, or give pairs [[angle, value], ...]",
-            )
-        if not isinstance(value, (list, tuple)):
-            return Quantity(self.unit).convert(value)
-        remedy = f"Write a number in {self.unit}, or pairs [[angle, value], ...]"
-        if not 2 <= len(value) <= LONGEST_CURVE:
-            raise invalid(f"a table needs from 2 to {LONGEST_CURVE} pairs", remedy)
-        pairs = pairs_in(value, "rad", self.unit, "[angle, value]", remedy)
-        if any(second[0] <= first[0] for first, second in itertools.pairwise(pairs)):
-            raise invalid(
-                "the crank angles must rise from row to row",
-                "Sort the rows by angle, each angle once",
-            )
-        if not self.cycles:
-            check_period(pairs)
-        return pairs
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {
-            "anyOf": [*_ENTRY["anyOf"], _table_of_pairs(2), OF_FILE],
-            "description": f"{self.unit}; constant, or [[crank angle, value], ...]",
-        }
-
-
-_LONGER = "For more turns give its drive `turns`, 2 for the 720 degrees of a four-stroke engine"
-
-
-def check_period(pairs: tuple[tuple[float, float], ...], turns: int = 1, key: str = "") -> None:
-    """An error for validators unless a table repeats within so many turns; an error for validators where it is none."""
-    span, turn = pairs[-1][0] - pairs[0][0], 2 * math.pi * turns
-    length = "one turn" if turns == 1 else f"{turns} turns"
-    if span > turn * (1 + 1e-12):
-        raise invalid(
-            f"the table is longer than {length}",
-            f"Give {length} ({2 * turns} pi rad, {360 * turns} deg); it repeats. {_LONGER}",
-            key=key,
-        )
-    if span > turn * (1 - 1e-12) and pairs[-1][1] != pairs[0][1]:
-        raise invalid(
-            f"the curve repeats every {'turn' if turns == 1 else length}, but its last value differs from its first",
-            "Make both equal, or leave the last row out",
-            key=key,
-        )
-
-
-LEAST_ROWS = 4
-
-
-@dataclass(frozen=True)
-class MotionTable(Converted):
-    """A motion that repeats, ``[[time, angle], ...]`` in s and rad, from time 0 on."""
-
-    def convert(self, value: object) -> tuple[tuple[float, float], ...]:
-        """Pairs in (s, rad); an error for validators where it is none."""
-        remedy = "Write pairs [[time, angle], ...] from 0 s to where the motion repeats"
-        if not isinstance(value, (list, tuple)) or not LEAST_ROWS <= len(value) <= LONGEST_CURVE:
-            raise invalid(
-                f"a table of from {LEAST_ROWS} to {LONGEST_CURVE} pairs is expected here", remedy
-            )
-        pairs = pairs_in(value, "s", "rad", "[time, angle]", remedy)
-        if pairs[0][0] != 0.0 or any(b[0] <= a[0] for a, b in itertools.pairwise(pairs)):
-            raise invalid(
-                "the times must rise from 0 from row to row",
-                "Sort the rows by time, the first at 0",
-            )
-        gained = pairs[-1][1] - pairs[0][1]
-        if not any(abs(abs(gained) - whole) < 1e-9 for whole in (0.0, 2 * math.pi)):
-            raise invalid(
-                f"the last angle is {gained:.6g} rad from the first, but the motion repeats there",
-                "End it where it began, or a full turn further on or back",
-            )
-        return pairs
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {
-            "anyOf": [_table_of_pairs(LEAST_ROWS), OF_FILE],
-            "description": "[[time in s, angle in rad], ...], until the motion repeats",
-        }
 
 
 @dataclass(frozen=True)

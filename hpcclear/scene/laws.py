@@ -12,8 +12,8 @@ from pydantic_core import CoreSchema
 from hpcclear.base.errors import at
 from hpcclear.laws import laws, names
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
+from hpcclear.scene.curves import Pairs
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
-from hpcclear.scene.piecewise import Piecewise
 from hpcclear.scene.plugged import as_invalid
 from hpcclear.scene.wanted import hint
 
@@ -294,7 +294,7 @@ def _curve(data: Mapping[str, object]) -> Any:
     if data.get("curve") is None:
         return None
     with at("curve", data["curve"]):
-        rows = Piecewise("m", "N").convert(data["curve"])
+        rows = Pairs("m", "N", ("depth", "force")).convert(data["curve"])
     rising = all(second[1] > first[1] for first, second in itertools.pairwise(rows))
     if (
         rows[0][0] < 0.0

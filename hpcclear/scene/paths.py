@@ -11,8 +11,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.curves import Pairs
 from hpcclear.scene.effects import Effects
-from hpcclear.scene.fields import CurveOf, NamedRows, Quantity
+from hpcclear.scene.fields import NamedRows, Quantity
 from hpcclear.scene.laws import ENTRIES, law_entries
 from hpcclear.scene.mechanism import Drive, Joints, Mechanism
 from hpcclear.scene.planar import Planar
@@ -36,7 +37,7 @@ def _quantity(field: FieldInfo) -> Quantity | None:
     for part in (*field.metadata, *_parts(field.annotation)):
         if isinstance(part, Quantity):
             return part
-        if isinstance(part, CurveOf):
+        if isinstance(part, Pairs) and part.constant and part.x == "rad":
             return Quantity(part.unit)
     return None
 

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.scene.bearings import Bearing
 from hpcclear.scene.bending import Bending, check_bars
+from hpcclear.scene.curves import check_period
 from hpcclear.scene.driving import PlanarDrive
 from hpcclear.scene.fields import (
     Length,
@@ -16,7 +17,6 @@ from hpcclear.scene.fields import (
     NamedRows,
     Quantity,
     Table,
-    check_period,
     invalid,
     nearest,
 )
@@ -27,8 +27,6 @@ from hpcclear.scene.mechanism import slender_inertia
 from hpcclear.scene.places import NOWHERE, Angle, NamedPlace, NamedPlaces, Place
 from hpcclear.scene.rubbing import Rubbing, RubbingPin
 from hpcclear.scene.slots import PlanarSlot
-
-Rows = NamedRows()
 
 
 class PlanarBody(Table):
@@ -169,14 +167,14 @@ class Planar(Table):
     """A planar linkage."""
 
     kind: Literal["planar"] = "planar"
-    bodies: Annotated[tuple[PlanarBody, ...], Rows]
+    bodies: Annotated[tuple[PlanarBody, ...], NamedRows()]
     """The moving bodies. ``like = "NAME"`` copies the entries of another body."""
     ground: Ground = Ground()
-    joints: Annotated[tuple[PlanarJoint, ...], Rows]
+    joints: Annotated[tuple[PlanarJoint, ...], NamedRows()]
     """The joints. ``like = "NAME"`` copies the entries of another joint."""
-    drives: Annotated[tuple[PlanarDrive, ...], Rows] = ()
+    drives: Annotated[tuple[PlanarDrive, ...], NamedRows()] = ()
     """Drives of the mechanism; one is sufficient."""
-    loads: Annotated[tuple[AnyLoad, ...], Rows] = ()
+    loads: Annotated[tuple[AnyLoad, ...], NamedRows()] = ()
     """Forces, torques and springs. Gravity is an entry of `effects`."""
     followed: str | None = None
     """``body.point`` whose acceleration and path responses contain."""

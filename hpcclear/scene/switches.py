@@ -11,8 +11,8 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import mean_of
+from hpcclear.scene.curves import Curve
 from hpcclear.scene.driving import TorqueDrive, speed_entry
-from hpcclear.scene.fields import Curve
 from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, turns_of

@@ -7,7 +7,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.pieces import Pieces, Rows, level, periodic
 from hpcclear.dynamics import layout as at
-from hpcclear.scene.fields import Curve
+from hpcclear.scene.curves import Curve
 
 
 @lru_cache(maxsize=16)

@@ -45,8 +45,8 @@ def tabulated(scene: Scene) -> list[Tabulated]:
         if drive.kind == "table":
             found.append(Tabulated(f"{key}.angle", drive.angle, "rad", 0, "time"))
         elif drive.kind == "run-up":
-            rows = drive.speed_by_time
-            found.append(Tabulated(f"{key}.speed_by_time", rows, "rad/s", 0, "time", level(rows)))
+            acting, entry = level(drive.speed_by_time), f"{key}.speed_by_time"
+            found.append(Tabulated(entry, drive.speed_by_time, "rad/s", 0, "time", acting))
         elif isinstance(rows := getattr(drive, "torque", None), tuple):
             curve = periodic(rows, 2.0 * np.pi * turns, how)
             found.append(Tabulated(f"{key}.torque", rows, "N*m", turns, "crank angle", curve))

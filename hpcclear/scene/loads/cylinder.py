@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from hpcclear.base.pieces import hinges
+from hpcclear.scene.curves import Curve, Pairs
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.loads.declared import Load
-from hpcclear.scene.piecewise import Piecewise
 
 
 def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
@@ -29,7 +29,7 @@ class CylinderLoad(Load):
     """``body.point``, or ``ground.point``."""
     second: str
     """``body.point``, or ``ground.point``."""
-    force: Annotated[Any, Piecewise("m", "N", constant=True)]
+    force: Annotated[Curve, Pairs("m", "N", ("distance", "force"), constant=True)]
     """Force that pushes both points apart (negative: together), N; constant or ``[[distance, force], ...]``."""
     damping: Annotated[float, Quantity("N*s/m", least=0)] = 0.0
     """Damping along the line between both points, N s/m."""

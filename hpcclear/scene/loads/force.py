@@ -5,9 +5,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hpcclear.scene.fields import Curve, CurveOf, Quantity, check_one_of
+from hpcclear.base.pieces import Rows
+from hpcclear.scene.curves import Curve, by_angle, by_time
+from hpcclear.scene.fields import Quantity, check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
-from hpcclear.scene.piecewise import by_time
 from hpcclear.scene.places import Angle, PairTable
 
 
@@ -27,10 +28,10 @@ class ForceLoad(SizedLoad):
     place: str
     """``body.point`` on which the force acts."""
     force: Components | None = None
-    size: Annotated[Curve, CurveOf("N", cycles=True)] | None = None
+    size: Annotated[Curve, by_angle("N")] | None = None
     """Force along `direction`, N; constant, or a table against the angle of the body that defines the period. The angle
     is measured counter-clockwise from the x axis and includes `start_angle`, for both directions of rotation."""
-    size_by_time: Annotated[Any, by_time("N")] | None = None
+    size_by_time: Annotated[Rows, by_time("N")] | None = None
     """Instead of `size`: ``[[time, size], ...]``, s and N, from 0 s on; smooth between the rows, constant after the last."""
     direction: Angle = 0.0
     """Angle of the force from the ground's x axis, rad."""

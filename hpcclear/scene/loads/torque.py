@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from hpcclear.scene.fields import Curve, CurveOf, check_one_of
+from hpcclear.base.pieces import Rows
+from hpcclear.scene.curves import Curve, by_angle, by_time
+from hpcclear.scene.fields import check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
-from hpcclear.scene.piecewise import by_time
 
 
 class TorqueLoad(SizedLoad):
@@ -13,9 +14,9 @@ class TorqueLoad(SizedLoad):
     kind: Literal["torque"]
     body: str
     """Body on which the torque acts; the reaction acts on the ground."""
-    torque: Annotated[Curve, CurveOf("N*m", cycles=True)] | None = None
+    torque: Annotated[Curve, by_angle("N*m")] | None = None
     """Torque, N m; constant, or a table against the angle of the body that defines the period."""
-    torque_by_time: Annotated[Any, by_time("N*m")] | None = None
+    torque_by_time: Annotated[Rows, by_time("N*m")] | None = None
     """Instead of `torque`: ``[[time, torque], ...]``, s and N m, from 0 s on; smooth between the rows, constant after the
     last."""
 
