@@ -87,7 +87,7 @@ def inside(task: str, count: int) -> int:
     from hpcclear.ranks.leading import run_points
     from hpcclear.ranks.schedule import COLUMNS, Task
     from hpcclear.ranks.team import Ranks
-    from hpcclear.scene.record import record_of
+    from hpcclear.scene.scene import record_of
 
     line = LINE
 

@@ -37,7 +37,7 @@ from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.results.rows import Columns, number
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 
 LIBRARY = Path(__file__).parent.parent / "tests" / "hard_cases"
 TOLERANCES = (1e-3, 1e-6, 1e-8)
@@ -51,7 +51,7 @@ NOTHING = Points((), np.empty((1, 0)), ())
 class Run:
     """What one simulation came to."""
 
-    outcome: np.void  # a record of `hpcclear.scene.record.record_of`
+    outcome: np.void  # a record of `hpcclear.scene.scene.record_of`
     residual: float
     implicit: float  # share of implicit steps
     seconds: float

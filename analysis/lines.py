@@ -22,7 +22,7 @@ FEATURES = {
         "laws/constant.py scene/plugged.py base/arithmetic.py statistics/search/foreign.py "
         "statistics/search/asking.py",
     "wear and service lives":
-        "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/wear.py cli/wear.py cli/commands/wear.py "
+        "dynamics/wear/* ensemble/wear.py ensemble/lives.py scene/surfaces.py cli/wear.py cli/commands/wear.py "
         "report/figures/wear.py study/lives.py statistics/random/survival.py dynamics/stepping/profile.py",
     "steady means to a target error, chaos, maps":
         "dynamics/evaluation/steady/* dynamics/steady/* ensemble/maps.py ensemble/bifurcation.py "
@@ -36,25 +36,25 @@ FEATURES = {
         "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
-        "scene/sheets.py scene/delimited.py scene/headings.py "
-        "scene/workbook.py scene/clock.py scene/file_curves.py scene/measured.py scene/table.py "
+        "scene/sheets.py scene/delimited.py scene/delimited.py "
+        "scene/workbook.py scene/clock.py scene/file_curves.py scene/file_curves.py scene/table.py "
         "report/tables.py report/export.py cli/commands/export.py",
     "comparison with measurements":
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
         "report/scatter.py",
     "fits of ISO 286, catalogues, costs":
-        "scene/iso286.py scene/fits.py scene/fitted.py scene/costs.py scene/choices.py scene/materials.py "
+        "scene/fits.py scene/fits.py scene/fitted.py scene/choices.py scene/choices.py scene/joints.py "
         "report/html/designs.py",
     "oil films":
-        "laws/film/* laws/reynolds.py dynamics/contacts/lubrication.py scene/film.py "
+        "laws/film/* laws/reynolds.py dynamics/contacts/lubrication.py scene/surfaces.py "
         "report/bearings.py dynamics/lubrication/*",
     "bars that bend":
-        "dynamics/linkage/bending.py scene/bending.py dynamics/planar/swings.py dynamics/bending.py",
+        "dynamics/linkage/bending.py scene/planar.py dynamics/planar/swings.py dynamics/bending.py",
     "guides with clearance, friction of other joints":
-        "dynamics/contacts/guide.py scene/guides.py scene/rubbing.py dynamics/linkage/rubbing.py "
-        "dynamics/linkage/guides.py report/figures/guides.py scene/moving.py",
+        "dynamics/contacts/guide.py scene/joints.py scene/joints.py dynamics/linkage/rubbing.py "
+        "dynamics/linkage/guides.py report/figures/guides.py scene/study_tables.py",
     "shapes of contact, roundness":
-        "laws/geometry/* dynamics/contacts/roundness.py scene/roundness.py",
+        "laws/geometry/* dynamics/contacts/roundness.py scene/surfaces.py",
     "impact and noise, loads on bearings":
         "dynamics/evaluation/recorded/impacts.py dynamics/evaluation/recorded/sounding.py "
         "dynamics/evaluation/recorded/spectral.py statistics/spectra.py report/noise.py report/html/loads.py "
@@ -95,8 +95,8 @@ FEATURES = {
     "the page and its gallery":
         "report/html/* report/answer.py report/targets.py report/spread.py report/failures.py",
     "archives, citation, schema, other units":
-        "results/crate.py results/provenance.py scene/citation.py cli/commands/reproduce.py scene/schema.py "
-        "base/units.py base/unit_names.py scene/plausibility.py",
+        "results/crate.py results/provenance.py scene/describing.py cli/commands/reproduce.py scene/schema.py "
+        "base/units.py base/unit_names.py scene/describing.py",
 }  # fmt: skip
 
 

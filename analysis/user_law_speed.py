@@ -28,7 +28,7 @@ from hpcclear.dynamics.evaluation.evaluator import (
 )
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 
 SOURCE = """
 import math

@@ -8,9 +8,9 @@ import pytest
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import load_scene
+from hpcclear.scene.cases import Goal
 from hpcclear.scene.domain import box
-from hpcclear.scene.goals import Goal
-from hpcclear.scene.iso286 import fit_of
+from hpcclear.scene.fits import fit_of
 from hpcclear.scene.points import Points, expanded, nearest_of, snapped
 from hpcclear.scene.sampling import latin_hypercube, monte_carlo
 

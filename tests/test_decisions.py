@@ -16,7 +16,7 @@ from hpcclear.base.verdict import Verdict
 from hpcclear.report import constraints
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
-from hpcclear.scene.goals import Constraint
+from hpcclear.scene.cases import Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.study import goals, verdicts
 from hpcclear.study.optimisation import Choice

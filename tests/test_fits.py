@@ -9,8 +9,7 @@ from scipy.special import ndtr, ndtri
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import load_scene
-from hpcclear.scene.fits import law_of
-from hpcclear.scene.iso286 import PARTS, SIZES, fit_of
+from hpcclear.scene.fits import PARTS, SIZES, fit_of, law_of
 
 STEPS = SIZES
 SHAFTS = {

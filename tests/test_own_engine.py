@@ -22,7 +22,7 @@ from hpcclear.ensemble.statistics import run_statistics
 from hpcclear.ranks.boundary import alone
 from hpcclear.report import bearings
 from hpcclear.scene import load_scene
-from hpcclear.scene.plausibility import implausible
+from hpcclear.scene.describing import implausible
 from hpcclear.study import responses, run_study
 from hpcclear.study.optimisation import Choice
 

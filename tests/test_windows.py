@@ -15,7 +15,7 @@ from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.parts import ConstantSpeed
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
-from hpcclear.scene.plausibility import implausible
+from hpcclear.scene.describing import implausible
 from hpcclear.scene.validation import validated
 
 KEPT = 0.1

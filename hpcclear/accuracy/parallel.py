@@ -17,7 +17,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 from hpcclear.scene.streams import generator
 
 LOSSES = ("start-up", "compilation", "imbalance", "writing")

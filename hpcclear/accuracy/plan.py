@@ -29,7 +29,7 @@ from hpcclear.ranks.schedule import COLUMNS
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 from hpcclear.study import extent, forecast, lives
 
 TARGETS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)

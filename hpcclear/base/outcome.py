@@ -247,7 +247,7 @@ JUDGED = (*STEADY, *MAPPED, "regime")
 def record_type(joints: int = len(JOINTS), bands: int = 0, asked: Collection[str] = ()) -> np.dtype:
     """Type of the record of a sample, as it travels over ranks and into datasets.
 
-    It has the fields that are always known, and those whose `Field.when` is among `asked`. `hpcclear.scene.record.record_of`
+    It has the fields that are always known, and those whose `Field.when` is among `asked`. `hpcclear.scene.scene.record_of`
     names the type of a scene.
     """
     sizes = {"joint": joints, "wave": WAVE_ROWS, "band": bands}

@@ -117,7 +117,7 @@ class Written(NamedTuple):
 
 def remarked(scene: "Scene") -> "Scene":
     """The scene; Python files that it runs, readings of units and likely slips of units are printed."""
-    from hpcclear.scene.plausibility import implausible
+    from hpcclear.scene.describing import implausible
     from hpcclear.scene.plugged import files_run
 
     for text in (*files_run(scene.plugins), *scene.readings):

@@ -12,7 +12,7 @@ from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels, motion
 from hpcclear.results.content import Results
-from hpcclear.scene.citation import TITLE
+from hpcclear.scene.describing import TITLE
 
 
 def describe_response(response: Results, output: Path, seconds: float | None = None) -> None:

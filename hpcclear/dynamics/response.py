@@ -44,7 +44,7 @@ from hpcclear.results.content import Results
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
-from hpcclear.scene.record import has_pressure, record_of
+from hpcclear.scene.scene import has_pressure, record_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -137,7 +137,7 @@ def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated."""
     from hpcclear.scene import load_scene
     from hpcclear.scene.pages import MonteCarloPoints
-    from hpcclear.scene.record import record_of
+    from hpcclear.scene.scene import record_of
 
     worker = payload["make"](payload["samples"], ranks)
     scene = load_scene(payload["design"], trust=True)

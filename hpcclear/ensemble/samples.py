@@ -27,8 +27,8 @@ from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, expanded
-from hpcclear.scene.record import record_of
 from hpcclear.scene.sampling import sampled
+from hpcclear.scene.scene import record_of
 from hpcclear.scene.table import read_points
 
 MEMORY = 2.3e-6
@@ -246,7 +246,7 @@ def sample_points(
     maker : function of a payload and the ranks, optional
         Makes a rank's worker; by default `make_evaluator`.
     record : dtype, optional
-        Type of the records; by default that of the scene (`hpcclear.scene.record.record_of`).
+        Type of the records; by default that of the scene (`hpcclear.scene.scene.record_of`).
 
     Returns
     -------

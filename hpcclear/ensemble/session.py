@@ -38,7 +38,7 @@ from hpcclear.results.keys import check_key, key_attribute, key_of
 from hpcclear.results.places import fresh_sibling, parts_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,8 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.names import KINDS
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Numbers, Points
-from hpcclear.scene.record import record_of
 from hpcclear.scene.sampling import monte_carlo
+from hpcclear.scene.scene import record_of
 
 PERTURBATION = 1e-9
 """Relative difference of the clearances of two copies."""

@@ -11,7 +11,7 @@ from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import ORDERS, Spectrum, harmonics
 from hpcclear.results.signals import is_counted
 from hpcclear.scene import Scene
-from hpcclear.scene.headings import Column
+from hpcclear.scene.delimited import Column
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.sheets import Sheet, read_series
 

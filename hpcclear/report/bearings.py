@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
 from hpcclear.results.content import Results
-from hpcclear.scene.bearings import length_path
+from hpcclear.scene.joints import length_path
 from hpcclear.scene.loading import scene_of_text
 
 MISSED = 0.01

@@ -17,7 +17,7 @@ from hpcclear.report import bearings
 from hpcclear.report.figures import motion
 from hpcclear.results.content import Results
 from hpcclear.results.signals import Signal, signals_in
-from hpcclear.scene.headings import Column
+from hpcclear.scene.delimited import Column
 from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series
 
 if TYPE_CHECKING:

@@ -98,7 +98,7 @@ class Checkpoint:
     joints : sequence of str
         Labels of the joints of the records.
     record : dtype
-        Their type (`hpcclear.scene.record.record_of`).
+        Their type (`hpcclear.scene.scene.record_of`).
     clock : callable
         Seconds since any instant.
 

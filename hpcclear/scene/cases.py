@@ -1,9 +1,190 @@
-"""Cases: what is random in an optimisation, what is made small, and what designs must keep to."""
+"""Cases of a study: what is random in an optimisation, which statistics are minimised, and what designs must keep to."""
 
-from hpcclear.base.objectives import ENDS
-from hpcclear.scene.fields import Table, invalid
-from hpcclear.scene.goals import DEVIATION, MEAN, Constraint, Goal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import PrivateAttr
+
+from hpcclear.base.arithmetic import names_in, value_of
+from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError, at
+from hpcclear.base.objectives import ENDS, Objective, Usual
+from hpcclear.plugins import OBJECTIVES
+from hpcclear.scene.fields import Quantity, Table, invalid
 from hpcclear.scene.named import NAME
+from hpcclear.scene.plugged import PluginName, as_invalid
+
+Level = Annotated[float, Quantity("", above=0, below=1)]
+
+
+class ObjectiveName(PluginName):
+    """An entry that names an objective."""
+
+    def convert(self, value: object) -> str:
+        """The name of one that is there and without fault; an error for validators where it is none."""
+        name = super().convert(value)
+        found = self.registry.get(name)
+        if not isinstance(found, Objective):
+            raise invalid("is no objective", "Make it a hpcclear.Objective, see docs/extending.md")
+        if not self.registry.is_ours(name):  # slow to load: for objectives of users alone
+            from hpcclear.laws.objectives import check_objective
+
+            with at(""):
+                check_objective(found)
+        return name
+
+
+class Goal(Table):
+    """A statistic of f over the random inputs of a case, or a formula of its design variables."""
+
+    statistic: Literal["mean", "deviation", "quantile", "exceedance", "cost"] | None = None
+    """Statistic of f: "mean", "deviation" (standard deviation), "quantile" (value that a fraction `level` of all
+    machines stays below) or "exceedance" (fraction of machines above `limit`). "cost": sum of the costs of the study
+    variables."""
+    of: str | None = None
+    """Response that the statistic refers to, such as "peak-contact-force"; default: the objective of the study."""
+    formula: str | None = None
+    """Instead of a statistic: a formula of numbers and nominal design variables (SI) with + - * / **, such as "m2 + m3"."""
+    level: Level | None = None
+    """For "quantile": fraction of machines below the value; default 0.95."""
+    limit: float | None = None
+    """For "exceedance": threshold of f, SI."""
+
+    def _check(self) -> None:
+        if (self.statistic is None) == (self.formula is None):
+            raise invalid(
+                "either a statistic or a formula is expected here", 'Write statistic = "mean", say'
+            )
+        if self.formula is not None:
+            with at("formula", self.formula[:80]):
+                names_in(self.formula)
+        if self.statistic == "exceedance" and self.limit is None:
+            raise invalid(
+                "the threshold is missing", "Add limit, the threshold of f", "limit", None
+            )
+        if self.of is not None and (self.statistic is None or self.statistic == "cost"):
+            raise invalid("belongs to a statistic of a response", "Remove it", "of")
+        for key, owner in (("level", "quantile"), ("limit", "exceedance")):
+            if getattr(self, key) is not None and self.statistic != owner:
+                raise invalid(f"belongs to {owner!r} alone", "Remove it", key)
+
+    _priced: tuple[Any, ...] = PrivateAttr(())
+    _place: int = PrivateAttr(0)
+
+    def placed(self, place: int) -> None:
+        """Take the place of its response among what is simulated of designs, from the study; 0 is f."""
+        self._place = place
+
+    @property
+    def place(self) -> int:
+        """Where its response stands among what is simulated of designs (`hpcclear.study.truth`)."""
+        return self._place
+
+    def priced_by(self, variables: tuple[Any, ...]) -> None:
+        """Take the study variables that say what a design costs."""
+        self._priced = variables
+
+    @property
+    def exact(self) -> bool:
+        """Whether the design alone says what it is."""
+        return self.formula is not None or self.statistic == "cost"
+
+    def of_design(self, design: Mapping[str, Any]) -> Array:
+        """Its value for a design, or for designs (n,), SI by name; of what is `exact`."""
+        if self.formula is not None:
+            return value_of(self.formula, design)
+        return np.asarray(sum(one.costs(design[one.name]) for one in self._priced), dtype=float)
+
+    @property
+    def order(self) -> float:
+        """Of a quantile: the share that stays below."""
+        return 0.95 if self.level is None else self.level
+
+    def same_as(self, other: "Goal") -> bool:
+        """Whether it is the same for every design, as far as its spelling shows."""
+        if self.formula is not None and other.formula is not None:
+            return "".join(self.formula.split()) == "".join(other.formula.split())
+        same = (self.statistic, self.limit, self.of) == (other.statistic, other.limit, other.of)
+        return same and self.formula == other.formula and self.order == other.order
+
+    def words(self, unit: str) -> str:
+        """What it is, for people: "95th percentile of f", "probability of f above 0.3 mm" by the `unit` of f."""
+        if self.formula is not None:
+            return self.formula
+        what, unit = self._response(unit)
+        if self.statistic == "quantile":
+            return f"{100 * self.order:g}th percentile of {what}"
+        if self.statistic == "exceedance":
+            return f"probability of {what} above {self.limit:g} {unit}"
+        if self.statistic == "deviation":
+            return f"standard deviation of {what}"
+        return "cost" if self.statistic == "cost" else f"{self.statistic} of {what}"
+
+    @property
+    def usual(self) -> Usual:
+        """Which of the statistics it is that are reported of every design."""
+        if self.of is not None or (self.statistic == "quantile" and self.order != 0.95):
+            return Usual.OTHER
+        known = {"mean": Usual.MEAN, "deviation": Usual.DEVIATION, "quantile": Usual.PERCENTILE}
+        return known.get(self.statistic or "", Usual.OTHER)
+
+    def _response(self, unit: str) -> tuple[str, str]:
+        """What it is of, "f" by the `unit` of f, and the unit."""
+        if self.of is None:
+            return "f", unit
+        found = OBJECTIVES.get(self.of)
+        return found.words.partition(",")[0], found.unit
+
+    def unit(self, unit: str) -> str:
+        """Its unit, "" for none known, by the `unit` of f."""
+        own = self._response(unit)[1]
+        return own if self.statistic in ("mean", "deviation", "quantile") else ""
+
+
+class Constraint(Goal):
+    """A constraint on the designs of a case."""
+
+    most: float
+    """Largest allowed value, SI; for "exceedance" a probability."""
+
+
+MEAN, DEVIATION = Goal(statistic="mean"), Goal(statistic="deviation")
+
+
+def in_si(case: object, objective: object, key: str) -> Any:
+    """A case's row with objectives for their words, and `limit` and `most` in SI by the unit of the study's objective.
+
+    An error for validators where a limit is no number of that unit; its key begins with `key`.
+    """
+    if not isinstance(case, Mapping):
+        return case
+    try:
+        unit = OBJECTIVES.get(objective).unit  # type: ignore[arg-type]
+    except (InputError, AttributeError, TypeError):  # which the entry itself says
+        unit = ""
+    made = dict(case)
+    for table in ("objectives", "constraints"):
+        if isinstance(rows := made.get(table), (list, tuple)):
+            made[table] = [_goal(row, unit, f"{key}.{table}.{k}") for k, row in enumerate(rows)]
+    return made
+
+
+def _goal(row: object, unit: str, key: str) -> Any:
+    if isinstance(row, str):
+        return {"statistic": row}
+    if not isinstance(row, Mapping):
+        return row
+    made = dict(row)
+    if isinstance(row.get("of"), str):
+        with as_invalid(f"{key}.of"):
+            unit = OBJECTIVES.get(row["of"]).unit
+    own = unit if row.get("statistic") in ("mean", "deviation", "quantile") else ""
+    for name, its in (("limit", unit), ("most", own)):
+        if name in made:
+            with at(f"{key}.{name}", made[name]):
+                made[name] = Quantity(its).convert(made[name])
+    return made
 
 
 class Case(Table):

@@ -9,13 +9,12 @@ from pydantic import field_validator, model_validator
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import MAX_BANDS, WIDEST
-from hpcclear.scene.bearings import length_path
-from hpcclear.scene.bending import check_scene
 from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.fitted import with_fits_of_joints, with_shares
-from hpcclear.scene.guides import Guide
+from hpcclear.scene.joints import Guide, length_path
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import replace
+from hpcclear.scene.planar import check_scene
 from hpcclear.scene.tables import SceneTables
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.scene.mechanism import slender_inertia
+from hpcclear.scene.planar import slender_inertia
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
 from hpcclear.scene.variables import Variable

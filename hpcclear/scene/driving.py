@@ -8,13 +8,13 @@ from pydantic import Field
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, Pairs, by_angle, by_time
 from hpcclear.scene.fields import (
+    Angle,
     Count,
     Quantity,
     Table,
     check_one_of,
     invalid,
 )
-from hpcclear.scene.places import Angle
 
 Turns = Annotated[int, Count(least=1, most=64)]
 Interval = Annotated[float, Quantity("s", above=0)]

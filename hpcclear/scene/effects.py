@@ -8,8 +8,8 @@ from pydantic import field_validator, model_validator
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, Pairs, by_angle
 from hpcclear.scene.fields import Quantity, Speed, Table, invalid
+from hpcclear.scene.joints import Rubbing
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
-from hpcclear.scene.rubbing import Rubbing
 
 
 class Contact(LawTable):

@@ -1,7 +1,7 @@
-"""The building blocks of scene models: strict frozen tables, quantities with a unit and bounds,
-counts, curves."""
+"""The building blocks of scene models: strict frozen tables, quantities with a unit and bounds, counts, places, named rows."""
 
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
@@ -18,7 +18,47 @@ from pydantic_core import CoreSchema, core_schema
 from hpcclear.base.errors import InputError, at
 from hpcclear.base.errors import nearest as nearest
 from hpcclear.base.units import shows_point, to_si
-from hpcclear.scene.wanted import hint
+
+HERE = {
+    ("torsionspring", "torsionalspring", "rotaryspring", "rotationalspring"):
+        'A torsion spring is a load of kind "torsion-spring", with a body, stiffness and angle.',
+    ("offset", "eccentricslider"):
+        'Write offset in [mechanism] of a slider-crank; in a linkage the guide has line = "ground.NAME".',
+    ("diametral", "diametric", "bearingdiameter", "journaldiameter", "borediameter", "pindiameter"):
+        "Write diametral_clearance for the difference of both diameters, or half of it as clearance; halve the bore, too.",
+    ("journalradius", "pinradius", "shaftradius"):
+        "The radius of the journal is bearing_radius minus clearance: give these two.",
+    ("tolerance", "capability"):
+        'Tolerances of bore and pin are a random input, distribution = "fit"; those of the integrator numerics.rtol, atol.',
+    ("gaspressure", "gasforce", "cylinder", "piston", "pressure", "indicated"):
+        'A gas force is effects.slider_load, or the size of a force: { file = "p.csv", bore = "42 mm", ambient = "1 bar" }.',
+    ("clockwise", "reverse", "rotationdirection", "senseofrotation"):
+        "Angles and speeds count counter-clockwise: a drive turns clockwise with a negative speed.",
+    ("backlash", "play", "slop", "looseness", "gap"):
+        'The play of a joint is its radial clearance: kind = "clearance", clearance = "0.1 mm".',
+    ("stroke",): "The stroke of a slider-crank is twice crank.length.",
+    ("rpm", "revolutionsperminute"): 'Write the speed with its unit: speed = "600 rpm".',
+    ("damper", "dashpot"): 'A damper is a load of kind "spring" with stiffness = 0 and a damping.',
+    ("motor",): 'A motor is a drive of kind "torque", whose torque falls to 0 at no_load_speed.',
+    ("flywheel",): 'A flywheel is flywheel_inertia of a drive of kind "torque".',
+    ("camprofile", "cam"): 'The motion that a cam gives is a drive of kind "table".',
+    ("gear",): "There are no gears: two drives of given speeds turn two bodies.",
+    ("lubric", "oil"): "Oil is the table film of a joint with clearance.",
+    ("weight",): "Write mass, in kg.",
+    ("elasticmodulus", "emodulus", "modulus"):
+        "Write bearing and journal = { youngs_modulus = ..., poisson_ratio = ... } of a joint.",
+}  # fmt: skip
+"""By what a word contains, without signs and in small letters."""
+
+
+def hint(word: object) -> str:
+    """A sentence that says how it is done here, and a space behind it; "" for a word that is not known."""
+    plain = re.sub(r"[^a-z]", "", str(word).lower())
+    for words, sentence in HERE.items():
+        if any(one in plain if len(one) > 4 else one == plain for one in words):
+            return f"{sentence} "
+    return ""
+
 
 LARGEST_COUNT = 2**53  # whole numbers beyond it are not exact as floats, and none of them is meant
 LARGEST, SMALLEST = 1e30, 1e-30  # products of a few such numbers neither overflow nor vanish
@@ -277,3 +317,55 @@ PositiveLength = Annotated[float, Quantity("m", above=0)]
 Mass = Annotated[float, Quantity("kg", above=0)]
 Inertia = Annotated[float, Quantity("kg*m**2", above=0)]
 Speed = Annotated[float, Quantity("m/s", above=0)]
+
+Angle = Annotated[float, Quantity("rad")]
+
+
+class PairTable(Table):
+    """Two components along x and y; ``[x, y]`` in the file is the same."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_pair(cls, data: object) -> object:
+        if not isinstance(data, (list, tuple)):
+            return data
+        if len(data) != 2:
+            raise invalid("a pair [x, y] is expected here", "Write [x, y]")
+        return {"x": data[0], "y": data[1]}
+
+
+class Place(PairTable):
+    """A place or an offset; ``[x, y]`` is the same."""
+
+    x: Length
+    """x coordinate, m."""
+    y: Length
+    """y coordinate, m."""
+
+
+class NamedPlace(Place):
+    """A point of a body, in its own axes; ``[x, y]`` is the same."""
+
+    name: str
+
+
+class PlaceRows(NamedRows):
+    """``{name = [x, y]}`` as named rows."""
+
+    def rows(self, value: object) -> Any:
+        """``{name: [x, y]}`` as ``[{"name": name, "x": x, "y": y}]``; an error for validators where it is none."""
+        if not isinstance(value, (Mapping, tuple)):
+            raise invalid("named points are expected here", "Write { name = [x, y] }")
+        if isinstance(value, Mapping):
+            for name, place in value.items():
+                if isinstance(place, (list, tuple)) and len(place) != 2:
+                    raise invalid("a point is a pair [x, y]", "Write [x, y] in m", key=str(name))
+            value = {
+                name: {"x": place[0], "y": place[1]} if isinstance(place, (list, tuple)) else place
+                for name, place in value.items()
+            }
+        return super().rows(value)
+
+
+NamedPlaces = Annotated[tuple[NamedPlace, ...], PlaceRows()]
+NOWHERE = Place(x=0.0, y=0.0)

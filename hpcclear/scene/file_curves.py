@@ -1,19 +1,24 @@
-"""Curves from files: a measured pressure, force, torque or motion against the crank angle, as the pairs that a table has."""
+"""What a scene takes from tables beside its file: curves against the crank angle or the time, samples of random inputs."""
 
+import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, at
+from hpcclear.base.plain import plain
 from hpcclear.base.units import UnitError, factor, fits
+from hpcclear.scene.delimited import Column, parsed_heading
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
-from hpcclear.scene.headings import Column, parsed_heading
-from hpcclear.scene.sheets import Sheet, plain_unit, read
+from hpcclear.scene.loads import SIZED
+from hpcclear.scene.paths import replace
+from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
+from hpcclear.scene.validation import validated
 
 TURN = 2 * math.pi
 SEAM = 0.02
@@ -186,10 +191,8 @@ def _column(
 
 
 def _size(unit: str, target: str, key: str) -> Fraction:
-    try:
+    with at(key, unit):
         return factor(plain_unit(unit, target), target)
-    except UnitError as error:
-        raise InputError(key, unit, error.reason, error.remedy) from None
 
 
 def _named(given: str, target: str) -> tuple[str, str]:
@@ -277,3 +280,111 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
         )
         angles = fine
     return angles, values
+
+
+CURVES = {
+    "effects.slider_load": "N",
+    "drive.torque": "N*m",
+    "mechanism.drives.*.torque": "N*m",
+    **{f"mechanism.loads.*.{one.size_entry}": one.unit for one in SIZED},
+}
+"""Entries that may be a curve against the crank angle, and their units."""
+BY_TIME = {
+    "mechanism.drives.*.angle": "rad",
+    "mechanism.drives.*.speed_by_time": "rad/s",
+    **{f"mechanism.loads.*.{one.size_entry}_by_time": one.unit for one in SIZED},
+}
+"""Entries that are tables against the time."""
+
+
+def with_values(
+    content: Mapping[str, object], folder: Path
+) -> tuple[Mapping[str, object], list[str]]:
+    """The content of a scene with what files hold in the place of their names, and a sentence for each.
+
+    Parameters
+    ----------
+    content : mapping
+        Parsed, not validated.
+    folder : path
+        What names of files are relative to.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, has no such column or a cell in it is no number.
+    """
+    read_as = []
+    for key, row in files_named(content).items():
+        file = row["file"]
+        if not isinstance(file, str) or not file:
+            raise InputError(
+                f"{key}.file", file, "the name of a table is expected here", "Write it in quotes"
+            )
+        made: object
+        if key.startswith("study.random."):
+            made, shown = _with_values(row, key, folder)
+        else:
+            made, shown = _curve(content, row, key, folder)
+        content = replace(content, key, made)
+        digest = hashlib.sha256(place_of(folder / file)[0].read_bytes()).hexdigest()
+        text = f"{key}: {file!r} is read as {shown}, SHA-256 {digest[:16]}"
+        read_as.append(plain(" ".join(text.split())))
+    return content, read_as
+
+
+def files_named(content: Mapping[str, object], prefix: str = "") -> dict[str, Mapping[str, Any]]:
+    """Return the tables of a parsed scene that name a file, by their dotted keys."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for key, entry in content.items():
+        if isinstance(entry, Mapping) and not prefix.startswith("plugins."):
+            path = f"{prefix}{key}"
+            found |= {path: entry} if "file" in entry else files_named(entry, f"{path}.")
+    return found
+
+
+def _with_values(row: Mapping[str, Any], key: str, folder: Path) -> tuple[dict[str, Any], str]:
+    file, column = row["file"], row.get("column")
+    if "values" in row:
+        raise InputError(f"{key}.file", file, "values are given too", "Keep one of them")
+    if column is not None and not isinstance(column, str):
+        raise InputError(
+            f"{key}.column", column, "the name of a column is expected here", "Write it in quotes"
+        )
+    path = folder / file
+    sheet = read(path, f"{key}.file")
+    of_numbers = sheet.of_numbers or sheet.columns
+    if column is None and len(of_numbers) > 1:
+        listed = ", ".join(sheet.names[:20])
+        remedy = f"Name one as column = {sheet.columns[0].name!r}: it has {listed}"
+        raise InputError(f"{key}.column", None, f"{path} has {len(of_numbers)} columns", remedy)
+    chosen = of_numbers[0] if column is None else sheet.column(column, f"{key}.column")
+    kept = {name: entry for name, entry in row.items() if name not in ("file", "column")}
+    values = sheet.entries(chosen)
+    return {**kept, "values": values}, f"{sheet.found}, {len(values)} values of {chosen.heading}"
+
+
+def _curve(
+    content: Mapping[str, object], row: Mapping[str, object], key: str, folder: Path
+) -> tuple[list[list[float]], str]:
+    parts = key.split(".")
+    general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
+    if general not in CURVES and general not in BY_TIME:
+        raise InputError(
+            f"{key}.file", row["file"], "no file is read here",
+            f"Files stand in study.random.NAME, {', '.join((*CURVES, *BY_TIME)).replace('*', 'NAME')}",
+        )  # fmt: skip
+    with at(key):
+        curve = validated(FileCurve, row)
+    if general in BY_TIME:
+        return against_time(curve, folder, BY_TIME[general], key)
+    return pairs_of(curve, folder, CURVES[general], key, _turns(content))
+
+
+def _turns(content: Mapping[str, object]) -> int:
+    """Turns of a revolution, as the drives of a parsed scene say; whatever else stands there."""
+    mechanism = content.get("mechanism")
+    drives = mechanism.get("drives") if isinstance(mechanism, Mapping) else None
+    rows = [content.get("drive"), *(drives.values() if isinstance(drives, Mapping) else ())]
+    turns = [row.get("turns", 1) for row in rows if isinstance(row, Mapping)]
+    return max((one for one in turns if type(one) is int), default=1)

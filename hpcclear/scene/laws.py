@@ -13,9 +13,8 @@ from hpcclear.base.errors import at
 from hpcclear.laws import laws, names
 from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.curves import Pairs
-from hpcclear.scene.fields import Converted, Quantity, Table, check_table, invalid, nearest
+from hpcclear.scene.fields import Converted, Quantity, Table, check_table, hint, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
-from hpcclear.scene.wanted import hint
 
 SPHERE = "sphere"
 """The geometry of contact that laws of this package have by themselves."""

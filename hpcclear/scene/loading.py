@@ -11,8 +11,8 @@ from typing import Any
 import tomli_w
 
 from hpcclear.base.errors import InputError
+from hpcclear.scene.file_curves import files_named, with_values
 from hpcclear.scene.fitted import entry_replaced
-from hpcclear.scene.measured import files_named, with_values
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene

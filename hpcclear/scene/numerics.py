@@ -7,8 +7,8 @@ from pydantic import Field, field_validator
 from hpcclear.base.outcome import MAX_BANDS
 from hpcclear.base.remarks import remark
 from hpcclear.plugins import OBJECTIVES
+from hpcclear.scene.cases import ObjectiveName
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
-from hpcclear.scene.goals import ObjectiveName
 
 Frequency = Annotated[float, Quantity("Hz", least=1.0, most=1e5)]
 

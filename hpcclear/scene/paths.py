@@ -15,8 +15,8 @@ from hpcclear.scene.curves import Pairs
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Quantity
 from hpcclear.scene.laws import ENTRIES, law_entries
-from hpcclear.scene.mechanism import Drive, Joints, Mechanism
 from hpcclear.scene.planar import Planar
+from hpcclear.scene.slider_crank import Drive, Joints, Mechanism
 
 PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects": Effects}
 """The tables whose numbers describe the mechanism and what acts on it."""

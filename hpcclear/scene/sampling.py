@@ -15,10 +15,10 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.domain import box, entries, slender_inertias, to_physical
-from hpcclear.scene.mechanism import Mechanism
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points, expanded
 from hpcclear.scene.random_inputs import RandomInput
+from hpcclear.scene.slider_crank import Mechanism
 from hpcclear.scene.streams import generator, sobol, uniform
 from hpcclear.scene.study import Study
 

@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import tomli_w
 from pydantic import PrivateAttr
 
 from hpcclear.base import markup
 from hpcclear.base.errors import unboxed
-from hpcclear.scene import citation, describing
+from hpcclear.base.outcome import record_type
+from hpcclear.scene import describing
 from hpcclear.scene.consistency import ConsistentTables
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.validation import check_path, scene_of
@@ -38,7 +40,7 @@ class Scene(ConsistentTables):
     @property
     def references(self) -> str:
         """Title of the published work the mechanism is taken from, "" for one of its user's own."""
-        return citation.cited_by(self)
+        return describing.cited_by(self)
 
     def effects_on(self) -> tuple[str, ...]:
         """What is on, in words, one entry an effect."""
@@ -98,3 +100,33 @@ def _unpickled(content: Mapping[str, object], text: str, readings: tuple[str, ..
     scene = scene_of(Scene, content)
     scene._text, scene._readings = text, readings
     return scene
+
+
+def record_of(scene: Scene, mapped: bool = False) -> np.dtype:
+    """Type of the record of a sample of a scene: its contacts and bands, and fields of what it requests.
+
+    Parameters
+    ----------
+    mapped : bool
+        Whether the motion of each sample is judged, as in a map; by default only with a target error.
+    """
+    judged = mapped or (scene.numerics.target_error is not None and scene.clearance_joints())
+    asked = {
+        "response": scene.responses_asked(),
+        "impact": scene.impacts_asked(),
+        "level": scene.bands(),
+        "pressure": has_pressure(scene),
+        "rate": scene.objective.rate is not None,
+        "wear": scene.worn_joints(),
+        "energy": scene.numerics.energy,
+        "steady": judged,
+        "map": mapped,
+    }
+    names = [name for name, there in asked.items() if there]
+    return record_type(len(scene.joint_labels), len(scene.bands()), names)
+
+
+def has_pressure(scene: Scene) -> bool:
+    """Whether the geometry of a scene's contacts has a pressure."""
+    law: Any = None if scene.effects.contact is None else scene.effects.contact.declared
+    return law is not None and law.geometry is not None and law.geometry.pressure is not None

@@ -11,7 +11,7 @@ from hpcclear.base.objectives import ENDS
 from hpcclear.scene.distributions import OURS
 from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Table
 from hpcclear.scene.file_curves import FileCurve
-from hpcclear.scene.guides import Guide
+from hpcclear.scene.joints import Guide
 from hpcclear.scene.scene import Scene
 
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}

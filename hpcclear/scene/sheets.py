@@ -29,8 +29,7 @@ from hpcclear.base.units import (
     written,
 )
 from hpcclear.scene import clock, delimited
-from hpcclear.scene.delimited import decimal_of
-from hpcclear.scene.headings import NOTHING, Column, columns_of
+from hpcclear.scene.delimited import NOTHING, Column, columns_of, decimal_of
 from hpcclear.scene.workbook import cells_of
 
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)

@@ -9,8 +9,7 @@ from pydantic import model_validator
 from hpcclear.base.arithmetic import names_in
 from hpcclear.base.errors import at
 from hpcclear.plugins import OBJECTIVES
-from hpcclear.scene import goals
-from hpcclear.scene.cases import Case
+from hpcclear.scene.cases import Case, in_si
 from hpcclear.scene.fields import check_known, invalid
 from hpcclear.scene.named import paths_of, texts_in
 from hpcclear.scene.random_inputs import RandomInput
@@ -41,7 +40,7 @@ class Study(StudyTables):
             data["cases"] = {
                 name: {"random": case}
                 if isinstance(case, (list, tuple))
-                else goals.in_si(case, asked, f"cases.{name}")
+                else in_si(case, asked, f"cases.{name}")
                 for name, case in cases.items()
             }
         if isinstance(random, Mapping) and isinstance(variables, Mapping):

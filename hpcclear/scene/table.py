@@ -8,8 +8,8 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
+from hpcclear.scene.delimited import Column
 from hpcclear.scene.fields import nearest
-from hpcclear.scene.headings import Column
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import quantities
 from hpcclear.scene.points import Points

@@ -11,21 +11,18 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
-from hpcclear.scene.bending import Bending
 from hpcclear.scene.choices import input_entry
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Table, nearest
-from hpcclear.scene.film import Film
-from hpcclear.scene.guides import Guide
-from hpcclear.scene.mechanism import Drive, Joints, Mechanism
+from hpcclear.scene.joints import Guide, PlanarSlot
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
-from hpcclear.scene.planar import Planar, PlanarClearance, PlanarSlide
+from hpcclear.scene.planar import Bending, Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
-from hpcclear.scene.slots import PlanarSlot
+from hpcclear.scene.slider_crank import Drive, Joints, Mechanism
 from hpcclear.scene.study import Study
-from hpcclear.scene.wear import Lives
+from hpcclear.scene.surfaces import Film, Lives
 
 GUIDE_FRICTION = "effects.guide_friction"
 """Entry of the friction in a slider-crank's guide."""

@@ -11,14 +11,13 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.units import noting
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
-from hpcclear.scene.fields import Table, invalid, nearest
+from hpcclear.scene.fields import Table, hint, invalid, nearest
 from hpcclear.scene.loads import KINDS as LOADS
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replace
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables, plain
 from hpcclear.scene.variables import Variable
-from hpcclear.scene.wanted import hint
 
 Valid = TypeVar("Valid", bound=Table)
 Whole = TypeVar("Whole", bound=SceneTables)

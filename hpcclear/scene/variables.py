@@ -9,8 +9,7 @@ from pydantic import PrivateAttr, model_validator
 
 from hpcclear.base.errors import at
 from hpcclear.scene import choices
-from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Row
-from hpcclear.scene.costs import Cost
+from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Cost, Row
 from hpcclear.scene.fields import Quantity, invalid
 from hpcclear.scene.named import NamedInput, Range, texts_in, with_paths
 from hpcclear.scene.paths import described, quantities

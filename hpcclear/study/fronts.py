@@ -6,8 +6,8 @@ import numpy as np
 
 from hpcclear.base.objectives import ORDINALS
 from hpcclear.results import dataset
+from hpcclear.scene.cases import Goal
 from hpcclear.scene.domain import to_physical
-from hpcclear.scene.goals import Goal
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import most_of, names_of
 from hpcclear.study.optimisation import Choice

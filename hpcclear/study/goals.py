@@ -8,9 +8,8 @@ from scipy.special import ndtr
 
 from hpcclear.base.arrays import Array
 from hpcclear.scene import Scene
-from hpcclear.scene.cases import Case
+from hpcclear.scene.cases import Case, Constraint, Goal
 from hpcclear.scene.domain import to_physical
-from hpcclear.scene.goals import Constraint, Goal
 from hpcclear.scene.stages import MomentAccuracy
 from hpcclear.scene.study import Study
 from hpcclear.statistics.random import replicates, tail

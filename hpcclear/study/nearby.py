@@ -11,8 +11,7 @@ from collections.abc import Callable, Generator, Sequence
 import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
-from hpcclear.scene.cases import Case
-from hpcclear.scene.goals import Constraint
+from hpcclear.scene.cases import Case, Constraint
 from hpcclear.scene.points import snapped
 from hpcclear.statistics.random import importance, indices
 from hpcclear.statistics.random.importance import Density

@@ -11,9 +11,8 @@ from hpcclear.base import quantiles
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.scene import Scene
-from hpcclear.scene.cases import Case
+from hpcclear.scene.cases import Case, Goal
 from hpcclear.scene.domain import Box, box, to_physical
-from hpcclear.scene.goals import Goal
 from hpcclear.scene.points import snapped
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import offsets, unit_lhs

@@ -16,7 +16,7 @@ from scipy.special import ndtr
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
-from hpcclear.scene.goals import Constraint
+from hpcclear.scene.cases import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import offsets
 from hpcclear.scene.stages import Verification

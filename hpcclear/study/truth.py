@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Flag
-from hpcclear.scene.goals import Constraint
+from hpcclear.scene.cases import Constraint
 from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.stages import REPLICATES, MomentAccuracy, Verification

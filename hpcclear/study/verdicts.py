@@ -16,8 +16,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.verdict import Verdict
-from hpcclear.scene.cases import Case
-from hpcclear.scene.goals import Constraint
+from hpcclear.scene.cases import Case, Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.scene.study import Study
 from hpcclear.study import goals

@@ -20,7 +20,7 @@ from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 from hpcclear.study import responses, run_study
 from hpcclear.study.run import StudyRun
 

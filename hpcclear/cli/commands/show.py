@@ -45,7 +45,7 @@ PROGRAM = f"""@software{{hpcclear,
 
 
 def _citation() -> None:
-    from hpcclear.scene.citation import BIBTEX
+    from hpcclear.scene.describing import BIBTEX
 
     show(f"{PROGRAM}\n\n{BIBTEX}")
 

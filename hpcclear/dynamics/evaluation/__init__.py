@@ -10,7 +10,7 @@ from hpcclear.dynamics.evaluation.recorded.sounding import SoundingEvaluator
 from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 
 
 def evaluator_of(

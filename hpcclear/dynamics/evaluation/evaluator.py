@@ -24,7 +24,7 @@ from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.ranks.schedule import Worker
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Numbers, Points
-from hpcclear.scene.record import has_pressure, record_of
+from hpcclear.scene.scene import has_pressure, record_of
 
 VECTORS = 4
 """Vectors that the lanes of an ensemble fill at most: enough for the processor to work on one while another waits for a root or

@@ -23,7 +23,7 @@ from hpcclear.scene.driving import (
     PlanarSpeed,
     PlanarTable,
 )
-from hpcclear.scene.materials import Materials
+from hpcclear.scene.joints import Materials, RubbingPin
 from hpcclear.scene.planar import (
     Planar,
     PlanarBody,
@@ -34,7 +34,6 @@ from hpcclear.scene.planar import (
     turns_of,
 )
 from hpcclear.scene.points import Points
-from hpcclear.scene.rubbing import RubbingPin
 
 Made = TypeVar("Made")
 

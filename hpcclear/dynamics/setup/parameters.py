@@ -23,9 +23,9 @@ from hpcclear.laws import laws, numbers
 from hpcclear.laws.constant import with_constants
 from hpcclear.laws.hertz_contact import dundurs, reduced_compliance, sphere_stiffness
 from hpcclear.scene import Scene
-from hpcclear.scene.bearings import length_path
+from hpcclear.scene.joints import length_path
 from hpcclear.scene.points import Numbers, Points
-from hpcclear.scene.record import has_pressure
+from hpcclear.scene.scene import has_pressure
 
 HERTZ_RANGE = 0.25
 """Penetration over clearance (times R_J/R_B) beyond which a result is flagged, unless the law says otherwise.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.base.units import UnitError, factor, to_si
-from hpcclear.scene.headings import Column
+from hpcclear.scene.delimited import Column
 from hpcclear.scene.importers.file import GROUND, File, Names
 from hpcclear.scene.importers.points import Drawing, Point
 from hpcclear.scene.sheets import Sheet, read

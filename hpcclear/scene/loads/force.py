@@ -7,9 +7,8 @@ from pydantic import Field
 
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, by_angle, by_time
-from hpcclear.scene.fields import Quantity, check_one_of
+from hpcclear.scene.fields import Angle, PairTable, Quantity, check_one_of
 from hpcclear.scene.loads.declared import SizedLoad
-from hpcclear.scene.places import Angle, PairTable
 
 
 class Components(PairTable):

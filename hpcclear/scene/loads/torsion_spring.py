@@ -2,9 +2,8 @@
 
 from typing import Annotated, Any, Literal
 
-from hpcclear.scene.fields import Quantity, invalid
+from hpcclear.scene.fields import Angle, Quantity, invalid
 from hpcclear.scene.loads.declared import Load
-from hpcclear.scene.places import Angle
 
 
 class TorsionSpringLoad(Load):

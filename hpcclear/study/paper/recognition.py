@@ -1,7 +1,7 @@
 """Whether a scene is the paper's, and what the paper calls its variables.
 
 Nothing in a scene file says so. A scene is the paper's when it holds what the paper studies: the
-mechanism of its Tables 1 and 2 (`hpcclear.scene.citation`) with both clearances, at 5000 rpm, and
+mechanism of its Tables 1 and 2 (`hpcclear.scene.describing`) with both clearances, at 5000 rpm, and
 a study of f, the mean gap, over its design variables and the clearance. Names, sizes and further
 variables are free.
 """
@@ -11,7 +11,7 @@ import math
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import JOINTS
 from hpcclear.scene import Scene
-from hpcclear.scene.citation import TITLE
+from hpcclear.scene.describing import TITLE
 from hpcclear.scene.named import SHORT_NAMES
 
 SYMBOLS = ("m1", "u1", "I1", "m2", "u2", "I2", "m3", "C")

@@ -19,7 +19,7 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 from hpcclear.statistics import spectra
 
 FEWEST_INSTANTS = 64

@@ -27,7 +27,7 @@ from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import has_pressure, record_of
+from hpcclear.scene.scene import has_pressure, record_of
 
 ITSELF = Points((), np.empty((1, 0)), ())
 """A scene as its only design."""

@@ -27,7 +27,7 @@ from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
-from hpcclear.scene.record import record_of
+from hpcclear.scene.scene import record_of
 
 TURN_SECONDS = 0.02
 """How long one set of lanes works before the next one does."""
@@ -224,7 +224,7 @@ def summed_up(
     ----------
     par : ndarray, shape (1, PARAMETERS)
     kind : dtype
-        Type of the record (`hpcclear.scene.record.record_of`).
+        Type of the record (`hpcclear.scene.scene.record_of`).
     responses : sequence of str
         Further responses, as of `responses_reported`.
     judged : Objective

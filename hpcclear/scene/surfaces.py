@@ -1,8 +1,129 @@
-"""Wear of a joint with clearance, and the lives that `hpcclear wear` follows, as in the scene file."""
+"""What lies on and between the surfaces of a joint with clearance, as in the scene file: wear, waves, an oil film."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table, check_one_of, invalid
+from hpcclear.laws import laws
+from hpcclear.scene.fields import (
+    Count,
+    Length,
+    PositiveLength,
+    Quantity,
+    Table,
+    check_one_of,
+    invalid,
+)
+from hpcclear.scene.laws import LawName
+
+
+class Film(Table):
+    """Oil film between journal and bearing. It carries the load until the surfaces touch."""
+
+    viscosity: Annotated[float, Quantity("Pa*s", least=0, most=1e4)]
+    """Dynamic viscosity at the operating temperature of the bearing, Pa s."""
+    length: PositiveLength
+    """Length of the bearing along its axis, m."""
+    model: Annotated[str, LawName("film")]
+    """Solution of Reynolds' equation: for bearings much shorter than their diameter ("short", Ocvirk), much longer
+    ("long", Sommerfeld), or for the actual length ("finite", solved once per bearing)."""
+    roughness: PositiveLength = 1e-6
+    """Combined roughness of both surfaces, m: the film thickness at which they touch."""
+
+    @property
+    def law(self) -> Any:
+        """The model, as `hpcclear.laws.declared.FilmLaw`."""
+        return laws("film")[self.model]
+
+
+def check_film(film: Film | None, clearance: float, radius: float) -> None:
+    """An error for validators unless a film is left between rough surfaces in the middle of a clearance, m, and its model fits.
+
+    `radius`: of the bearing, m.
+    """
+    if film is None:
+        return
+    ratio, (least, most) = 0.5 * film.length / radius, film.law.lengths
+    if film.law.further is not None and not least <= ratio <= most:
+        raise invalid(
+            f"is for lengths from {least:g} to {most:g} diameters, and this bearing is {ratio:.3g} long",
+            'Take "short"' if ratio < 1.0 else 'Take "long"',
+            key="film.model",
+            value=film.model,
+        )
+    if 4.0 * film.roughness > clearance:
+        raise invalid(
+            f"must be at most a quarter of the clearance ({clearance:g} m), or no film is left",
+            "Write the roughness of both surfaces together",
+            key="film.roughness",
+            value=film.roughness,
+        )
+
+
+MOST_WAVES = 8
+"""Around a surface."""
+
+Wave = Length
+
+
+class Waves(Table):
+    """Depth of a surface below the round one, m: a Fourier series in the angle around it. The angle is measured from
+    the x axis of the body; in a slider-crank this axis points from the first joint of a link to its second.
+    """
+
+    cosine_1: Wave = 0.0
+    sine_1: Wave = 0.0
+    cosine_2: Wave = 0.0
+    sine_2: Wave = 0.0
+    cosine_3: Wave = 0.0
+    sine_3: Wave = 0.0
+    cosine_4: Wave = 0.0
+    sine_4: Wave = 0.0
+    cosine_5: Wave = 0.0
+    sine_5: Wave = 0.0
+    cosine_6: Wave = 0.0
+    sine_6: Wave = 0.0
+    cosine_7: Wave = 0.0
+    sine_7: Wave = 0.0
+    cosine_8: Wave = 0.0
+    sine_8: Wave = 0.0
+
+    def given(self) -> int:
+        """The number of the last wave that is not zero."""
+        found = [
+            n for n in range(1, MOST_WAVES + 1)
+            if getattr(self, f"cosine_{n}") or getattr(self, f"sine_{n}")
+        ]  # fmt: skip
+        return max(found, default=0)
+
+    def deepest(self) -> float:
+        """What the depth can come to at most, m."""
+        return sum(abs(getattr(self, name)) for name in type(self).model_fields)
+
+
+class OutOfRound(Table):
+    """Waviness of the surfaces of a joint with clearance. A surface without an entry is round."""
+
+    bearing: Waves | None = None
+    journal: Waves | None = None
+
+
+def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -> None:
+    """An error for validators unless some clearance is left everywhere around, m, and the joint is dry."""
+    if waves is None:
+        return
+    if film is not None:
+        raise invalid(
+            "an oil film needs round surfaces", "Remove out_of_round, or film",
+            key="out_of_round", value=None,
+        )  # fmt: skip
+    for name in ("bearing", "journal"):
+        own = getattr(waves, name)
+        if own is not None and own.deepest() >= clearance:
+            raise invalid(
+                f"waves are up to {own.deepest():g} m high, but the clearance is {clearance:g} m: the journal may not fit",
+                "Make them smaller than the clearance",
+                key=f"out_of_round.{name}",
+                value=own.deepest(),
+            )
 
 
 class WornSurface(Table):
