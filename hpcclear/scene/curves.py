@@ -58,7 +58,7 @@ class Pairs(Converted):
         point = any(shows_point(one) for row in value for one in row)
         rows = tuple((first.convert(x, "", point), second.convert(y, "", point)) for x, y in value)
         if any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
-            reason = f"numbers of {self.words[0]} must rise from row to row"
+            reason = f"the {self.words[0]}s must rise from row to row"
             raise invalid(reason, f"Sort the rows, each {self.words[0]} once")
         if self.least is not None and rows[0][0] < self.least:
             raise invalid(f"the first number is below {self.least:g}", remedy)

@@ -299,7 +299,8 @@ def _with_model(table: str, name: str, rows: Mapping[str, Any]) -> Any:
         return row
     model = rows.get(row["like"]) if isinstance(row["like"], str) else None
     if not isinstance(model, Mapping) or "like" in model:
-        others = [other for other in rows if other != name and "like" not in rows[other]]
+        tables = {other: one for other, one in rows.items() if isinstance(one, Mapping)}
+        others = [other for other, one in tables.items() if other != name and "like" not in one]
         raise invalid(
             "there is no such row, or it refers to another one itself",
             nearest(str(row["like"]), others),
