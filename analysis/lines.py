@@ -36,14 +36,14 @@ FEATURES = {
         "statistics/random/importance.py statistics/random/tail.py study/rare.py study/edge.py study/verdicts.py "
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
-        "scene/sheets.py scene/delimited.py scene/delimited.py "
-        "scene/workbook.py scene/clock.py scene/file_curves.py scene/file_curves.py scene/table.py "
+        "scene/sheets.py scene/delimited.py "
+        "scene/workbook.py scene/clock.py scene/file_curves.py scene/table.py "
         "report/tables.py report/export.py cli/commands/export.py",
     "comparison with measurements":
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
         "report/scatter.py",
     "fits of ISO 286, catalogues, costs":
-        "scene/fits.py scene/fits.py scene/fitted.py scene/choices.py scene/choices.py scene/joints.py "
+        "scene/fits.py scene/fitted.py scene/choices.py scene/joints.py "
         "report/html/designs.py",
     "oil films":
         "laws/film/* laws/reynolds.py dynamics/contacts/lubrication.py scene/surfaces.py "
@@ -51,7 +51,7 @@ FEATURES = {
     "bars that bend":
         "dynamics/linkage/bending.py scene/planar.py dynamics/planar/swings.py dynamics/bending.py",
     "guides with clearance, friction of other joints":
-        "dynamics/contacts/guide.py scene/joints.py scene/joints.py dynamics/linkage/rubbing.py "
+        "dynamics/contacts/guide.py scene/joints.py dynamics/linkage/rubbing.py "
         "dynamics/linkage/guides.py report/figures/guides.py scene/study_tables.py",
     "shapes of contact, roundness":
         "laws/geometry/* dynamics/contacts/roundness.py scene/surfaces.py",

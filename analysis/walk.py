@@ -18,7 +18,7 @@ from types import CodeType, FrameType
 ROOT = Path(__file__).parent.parent / "hpcclear"
 STATIONS = (
     "base/units.py:to_si",
-    "scene/joints.py:Bearing._journal_fits",
+    "scene/joints.py:Bearing._check",
     "scene/sampling.py:latin_hypercube",
     "scene/sampling.py:check_points",
     "dynamics/setup/parameters.py:fill",

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import SCENE
-from pydantic_core import PydanticCustomError
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.unit_names import OTHERS, REFUSED, UNITS
@@ -15,9 +14,9 @@ from hpcclear.base.units import UnitError, to_si
 from hpcclear.ensemble.maps import axis
 from hpcclear.identify.inputs import Unknown
 from hpcclear.scene import load_scene
-from hpcclear.scene.fields import CurveOf, MotionTable, Quantity
+from hpcclear.scene.curves import Pairs, by_angle, by_time
+from hpcclear.scene.fields import Quantity
 from hpcclear.scene.paths import PHYSICAL, _entries_of_kinds, of_kinds, quantities
-from hpcclear.scene.piecewise import Piecewise, by_time
 from hpcclear.scene.planar import Planar
 from hpcclear.scene.table import read_points
 from hpcclear.scene.variables import Variable
@@ -100,8 +99,8 @@ def test_every_place_names_both_readings(number, tmp_path):
 
 
 TABLES = {
-    "time": (by_time("N"), "s"), "angle": (CurveOf("N"), "rad"), "motion": (MotionTable(), "s"),
-    "distance": (Piecewise("m", "N"), "m"),
+    "time": (by_time("N"), "s"), "angle": (by_angle("N"), "rad"), "motion": (by_time("rad", "angle", fewest=4), "s"),
+    "distance": (Pairs("m", "N"), "m"),
 }  # fmt: skip
 
 
@@ -123,7 +122,7 @@ def test_one_number_with_decimals_decides_what_the_point_of_a_table_is(kind):
             expected = np.array(columns, dtype=float).T
             np.testing.assert_allclose(table.convert(rows), expected, rtol=1e-15)
         else:
-            with pytest.raises(PydanticCustomError, match=r"may be -?[1-3]\.[0-9]{3} "):
+            with pytest.raises(InputError, match=r"may be -?[1-3]\.[0-9]{3} "):
                 table.convert(rows)
     low, high = Quantity("m").range(["0.5 mm", "1.250 mm"], "")
     assert (low, high) == (0.5e-3, 1.25e-3)
