@@ -3,12 +3,13 @@
     python analysis/force_levels.py
 
 `jobs/compressor.toml` at a clearance of 0.05 mm in both joints; 720 stored instants a revolution against 5760 and 11520, with
-and without a window, and Welch's method of scipy.signal. Writes between the marks of ``docs/how-to/noise.md``.
+and without a window, and Welch's method of scipy.signal. Writes `analysis/results/force_levels.csv`.
 """
 
 from pathlib import Path
 
 import numpy as np
+from recorded import record
 from scipy import signal
 
 from hpcclear import load_scene, simulate
@@ -16,7 +17,6 @@ from hpcclear.report.noise import band_name
 from hpcclear.statistics import spectra
 
 ROOT = Path(__file__).parent.parent
-PAGE = ROOT / "docs" / "how-to" / "noise.md"
 DENSE = 11520
 SHOWN = np.array([100.0, 158.489, 316.228, 1000.0, 2511.886, 5011.872])
 
@@ -49,7 +49,7 @@ def columns(forces, period):
 
 
 def main():
-    """Simulate, and write the table."""
+    """Simulate, and record the table."""
     joints = {f"joints.{one}.clearance": 5e-5 for one in ("crank_rod", "rod_slider")}
     scene = load_scene(ROOT / "jobs" / "compressor.toml")
     found = simulate(scene.with_(joints | {"output.instants_per_revolution": DENSE}))
@@ -57,15 +57,11 @@ def main():
     axes = [found[f"frame_force_{axis}"].to_numpy()[first:-1] for axis in "xy"]
     forces = np.stack(axes, axis=-1).reshape(-1, DENSE, 2)
     made = columns(forces, 2.0 * np.pi / scene.number("drive.speed"))
-    rows = [("band", *made), ("---",) * (1 + len(made))]
+    rows = [("band", *made)]
     rows += [
         (band_name(f), *(f"{one[k]:.1f}" for one in made.values())) for k, f in enumerate(SHOWN)
     ]
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    page = PAGE.read_text(encoding="utf-8")
-    begin, end = "<!-- levels: begin -->", "<!-- levels: end -->"
-    before, _, rest = page.partition(begin)
-    PAGE.write_text(f"{before}{begin}\n{table}\n{end}{rest.partition(end)[2]}", encoding="utf-8")
+    record("force_levels", rows)
 
 
 if __name__ == "__main__":

@@ -3,13 +3,15 @@
     python analysis/gallery.py [RESULTS]
 
 Runs the studies that are not in RESULTS yet (a directory a scene; ``results/gallery`` by default), draws the sketches into
-``docs/images/gallery`` and writes the answers into ``docs/how-to/gallery.md``, below the commands.
+``docs/images/gallery`` and writes the answers to ``analysis/results/gallery_*.csv``.
 """
 
 import re
 import subprocess
 import sys
 from pathlib import Path
+
+from recorded import record
 
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report import save, sketch_figure
@@ -54,45 +56,34 @@ def lines_of(place: Path) -> dict[str, str]:
     return {line.label: line.text for line in answer(found, "") if line.label in SHOWN}
 
 
-def table_of(columns: dict[str, dict[str, str]]) -> str:
+def table_of(columns: dict[str, dict[str, str]]) -> list[tuple[str, ...]]:
     """Answers beside each other, by their headings."""
-    width = len(columns) + 1
-    rows = [("", *columns), ("---",) * width]
+    rows = [("line", *columns)]
     rows += [
         (label, *(one.get(label, "") for one in columns.values()))
         for label in SHOWN
         if any(label in one for one in columns.values())
     ]
-    return "\n".join(f"| {' | '.join(row)} |".replace("  ", " ") for row in rows)
+    return rows
 
 
 def main(results: Path) -> None:
-    """Run what is missing, draw, write."""
-    page = PAGE.read_text()
-    for name in re.findall(r"run jobs/linkages/(\w+)\.toml", page):
+    """Run what is missing, draw, record."""
+    for name in re.findall(r"run jobs/linkages/(\w+)\.toml", PAGE.read_text()):
         run(name, results / name)
         scene = load_scene(ROOT / "jobs" / "linkages" / f"{name}.toml")
         picture = PAGE.parent.parent / "images" / "gallery" / f"{name}.png"
         picture.parent.mkdir(exist_ok=True)
         save(sketch_figure(scene, poses_at_start(scene)), picture)
-        columns = {"": lines_of(results / name)}
+        columns = {"answer": lines_of(results / name)}
         if name in LINES:
             place = results / f"{name}_line"
             lengths = (
                 f"mechanism.joints.{joint}.length={length}" for joint, length in LINES[name].items()
             )
             run(name, place, "effects.contact.geometry=line", *lengths)
-            columns = {"contact of a sphere": columns[""], "line contact": lines_of(place)}
-        page = replaced(page, name, table_of(columns))
-    PAGE.write_text(page)
-
-
-def replaced(page: str, name: str, table: str) -> str:
-    """The page with another table of a study, and what is written below it."""
-    command, _, rest = page.partition(f"results/gallery/{name}\n```\n")
-    after = re.split(r"^(?!\||\n)", rest, maxsplit=1, flags=re.MULTILINE)
-    below = f"\n{after[1]}" if len(after) > 1 else ""
-    return f"{command}results/gallery/{name}\n```\n\n{table}\n{below}"
+            columns = {"contact of a sphere": columns["answer"], "line contact": lines_of(place)}
+        record(f"gallery_{name}", table_of(columns))
 
 
 if __name__ == "__main__":

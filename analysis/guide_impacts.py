@@ -3,8 +3,8 @@
     python analysis/guide_impacts.py
 
 Ten separate impacts of `jobs/loose_slider.toml` with the inertia of a solid block, a restitution of 0.7 and a tilt of 10 mrad,
-at four stiffnesses, against the rigid slider of the tests. Writes between the marks of ``docs/how-to/guide-clearance.md`` and
-``docs/images/guide_impacts.png``; ten seconds of processor time.
+at four stiffnesses, against the rigid slider of the tests. Writes `analysis/results/guide_impacts.csv` and
+`docs/images/guide_impacts.png`; ten seconds of processor time.
 """
 
 import math
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from recorded import record
 from scipy.optimize import brentq
 
 from hpcclear import load_scene, simulate
@@ -22,10 +23,7 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 import rigid_slider as rigid  # noqa: E402
 
-PAGE, FIGURE = (
-    ROOT / "docs" / "how-to" / "guide-clearance.md",
-    ROOT / "docs" / "images" / "guide_impacts.png",
-)
+FIGURE = ROOT / "docs" / "images" / "guide_impacts.png"
 FACTORS = (1.0, 10.0, 100.0, 1000.0)
 INERTIA = rigid.SLIDER * (4 * rigid.HALF_LENGTH**2 + 4 * rigid.HALF_HEIGHT**2) / 12
 TILT, NOMINAL, COUNT = 1e-2, 0.7, 10
@@ -62,19 +60,12 @@ def errors():
 def main():
     """Write the table and the figure."""
     late, expected = errors()
-    lines = [
-        "| impact | corner | crank angle of rigid bodies (rad) | "
-        + " | ".join(f"error at {factor:g} times the stiffness (rad)" for factor in FACTORS) + " |",
-        "| --- | --- | --- |" + " --- |" * len(FACTORS),
-    ]  # fmt: skip
+    heading = [f"error at {factor:g} times the stiffness (rad)" for factor in FACTORS]
+    rows = [["impact", "corner", "crank angle of rigid bodies (rad)", *heading]]
     for k, one in enumerate(expected):
-        shown = " | ".join(f"{error:.1e}" if error > 1e-9 else "below 1e-9" for error in late[:, k])
-        lines.append(f"| {k + 1} | {one.corner} | {one.crank:.6f} | {shown} |")
-    page = PAGE.read_text(encoding="utf-8")
-    begin, end = "<!-- impacts: begin -->", "<!-- impacts: end -->"
-    before, _, rest = page.partition(begin)
-    table = "\n".join(lines)
-    PAGE.write_text(f"{before}{begin}\n{table}\n{end}{rest.partition(end)[2]}", encoding="utf-8")
+        shown = [f"{error:.1e}" if error > 1e-9 else "below 1e-9" for error in late[:, k]]
+        rows.append([f"{k + 1}", one.corner, f"{one.crank:.6f}", *shown])
+    record("guide_impacts", rows)
     figure, axes = plt.subplots(figsize=(6, 4))
     for k in range(1, COUNT):
         axes.loglog(

@@ -1,6 +1,6 @@
 """Made machines identified from made signals: do 95 % intervals hold, and is what the model lacks noticed?
 
-    nice -n 15 python analysis/identify_machines.py OUT [--machines 200] [--seed 2] [--rows ROWS.json [--page PAGE.md]]
+    nice -n 15 python analysis/identify_machines.py OUT [--machines 200] [--seed 2] [--rows ROWS.json]
     python analysis/identify_machines.py --table ROWS.json
     python analysis/identify_machines.py OUT --advise
     python analysis/identify_machines.py OUT --raw
@@ -10,7 +10,8 @@ are made at another integration tolerance than the ensemble's; in a third of the
 lacks. Each mechanism, number of unknowns and noise has the same share of these. A machine follows from the seed and its number.
 
 One ensemble serves all machines of a mechanism and number of unknowns. Ensembles, signals and machines are kept in OUT as they
-finish: the same command continues. `--advise` compares signals for two unknowns. `--raw` fits the raw signal by least squares.
+finish: the same command continues. Tables are written to `analysis/results`. `--advise`
+compares signals for two unknowns. `--raw` fits the raw signal by least squares.
 """
 
 import argparse
@@ -21,6 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from recorded import record
 
 from hpcclear import load_scene, simulate
 from hpcclear.dynamics.response import simulate_together
@@ -244,61 +246,38 @@ def error(rows: list[dict[str, Any]]) -> list[str]:
     return [f"{len(right)}", f"{off:.1%}", f"{width:.0%}"]
 
 
-def table_of(rows: list[dict[str, Any]]) -> str:
-    """The tables of the page on `identify`, as Markdown."""
+def tables(rows: list[dict[str, Any]]) -> None:
+    """Record the tables of the page on `identify`."""
     found = [
-        "| unknowns | mechanism | machines, right model | intervals hold | machines refused "
-        "| machines, model lacks an effect | refused | hold | neither refused nor hold |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
+        ["unknowns", "mechanism", "machines, right model", "intervals hold", "machines refused",
+         "machines, model lacks an effect", "refused", "hold", "neither refused nor hold"]
+    ]  # fmt: skip
     for count in (1, 2):
         for name in MECHANISMS:
             own = [row for row in rows if row["group"][:2] == [name, count]]
-            found.append(" | ".join([f"| {count}", name, *counted(own)]) + " |")
-    found.append(" | ".join(["| all", "", *counted(rows)]) + " |")
-    found += [
-        "",
-        "Errors and half-widths in the next table are relative to the true clearance. Each row has other machines, so rows "
-        "differ not only in the noise:",
-        "",
-        "| signal | unknowns | noise | machines | median error | median half-width |",
-    ]
-    found.append("| --- | --- | --- | --- | --- | --- |")
+            found.append([f"{count}", name, *counted(own)])
+    record("identify_intervals", [*found, ["all", "", *counted(rows)]])
+    found = [["signal", "unknowns", "noise", "machines", "median error", "median half-width"]]
     for signal, count in ((SIGNALS[0], 1), (SIGNALS[0], 2), (SIGNALS[1], 1)):
         for noise in NOISE:
             own = [row for row in rows if row["group"][1:] == [count, signal, noise]]
-            cells = [signal.replace("crank_moment", "torque").replace("_x", "").replace("_", " ")]
-            found.append(
-                " | ".join([f"| {cells[0]}", f"{count}", f"{noise:.0%}", *error(own)]) + " |"
-            )
-    return "\n".join([*found, "", *sentences(rows)])
-
-
-def sentences(rows: list[dict[str, Any]]) -> list[str]:
-    """What the tables show."""
-    _, hold, wrongly, other, _, _, lost = counted(rows)
+            words = signal.replace("crank_moment", "torque").replace("_x", "").replace("_", " ")
+            found.append([words, f"{count}", f"{noise:.0%}", *error(own)])
     torque = [row for row in rows if row["group"][2:] == [SIGNALS[0], 0.1]]
-    return [
-        f"{hold} intervals hold. Of the {other} machines with an effect that the model lacks, {lost} were not refused and "
-        "have an",
-        f"interval that does not hold. Of the machines with a right model, {wrongly} were refused. With torque and 10 % "
-        "noise the",
-        f"median error is {error(torque)[1]} over one and two unknowns.",
-    ]
+    record("identify_errors", [*found, ["torque", "1 and 2", "10%", *error(torque)]])
 
 
 def advised(folder: Path, members: int) -> None:
-    """Print the half-widths to expect of two unknowns from 20 revolutions with 10 % noise, by signal, as Markdown."""
-    print("| mechanism | signal | first clearance | second clearance | correlation of errors |")
-    print("| --- | --- | --- | --- | --- |")
+    """Record the half-widths to expect of two unknowns from 20 revolutions with 10 % noise, by signal."""
+    rows = [("mechanism", "signal", "first clearance", "second clearance", "correlation of errors")]
     for name in MECHANISMS:
         ensemble = ensemble_of(folder, name, 2, members)
         frequency = frequency_of(prepared_scene(model_of(name, 2)[0]))
         found = advice(ensemble, SIGNALS, Sensor(), frequency, 0.1, 1)
         for k, signal in enumerate(found.names):
             first, second = (f"± {1e6 * width:.0f} µm" for width in found.half_width[k, 1])
-            related = f"{found.correlation[k, 1]:.2f}"
-            print(f"| {name} | {SHORT[signal]} | {first} | {second} | {related} |")
+            rows.append((name, SHORT[signal], first, second, f"{found.correlation[k, 1]:.2f}"))
+    record("identify_advice", rows)
 
 
 def raw(folder: Path, members: int) -> None:
@@ -357,15 +336,12 @@ def main() -> None:
     parser.add_argument("--members", type=int, default=256)
     parser.add_argument("--seed", type=int, default=2)
     parser.add_argument("--rows", type=Path, help="file of all rows")
-    parser.add_argument("--table", type=Path, help="print the tables of such a file")
-    parser.add_argument(
-        "--page", type=Path, help="page whose tables, those of ROWS before, are renewed"
-    )
+    parser.add_argument("--table", type=Path, help="record the tables of such a file")
     parser.add_argument("--advise", action="store_true", help="half-widths to expect, by signal")
     parser.add_argument("--raw", action="store_true")
     words = parser.parse_args()
     if words.table:
-        print(table_of(json.loads(words.table.read_text())))
+        tables(json.loads(words.table.read_text()))
         return
     words.folder.mkdir(exist_ok=True, parents=True)
     if words.raw or words.advise:
@@ -381,13 +357,9 @@ def main() -> None:
         for k in range(words.machines)
     )
     rows = [json.loads(one.read_text()) for one in files]
-    if words.page:
-        before = table_of(json.loads(words.rows.read_text()))
-        text = words.page.read_text(encoding="utf-8")
-        words.page.write_text(text.replace(before, table_of(rows)), encoding="utf-8")
     if words.rows:
         words.rows.write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
-    print(table_of(rows))
+    tables(rows)
     for row in rows:
         if (not row["lacks"] and not all(held(row))) or (row["explained"] and not all(held(row))):
             print("missed:", row)

@@ -3,7 +3,7 @@
     python analysis/machines.py
 
 Simulates the scenes of ``jobs/machines`` and the compressor, draws them into ``docs/images/machines`` and writes the tables
-between the marks of ``docs/how-to/machines.md``. Half a minute of processor time.
+to `analysis/results/machine_*.csv`. Half a minute of processor time.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from recorded import record
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.outcome import Flag
@@ -19,7 +20,6 @@ from hpcclear.report import save, sketch_figure
 from hpcclear.report.figures.labels import quantity
 
 ROOT = Path(__file__).parent.parent
-PAGE = ROOT / "docs" / "how-to" / "machines.md"
 PICTURES = ROOT / "docs" / "images" / "machines"
 
 
@@ -215,33 +215,26 @@ def shown(value, unit):
     return quantity(value, unit, 4)
 
 
-def tables(name):
-    """The tables of a machine, and the words on its contacts."""
+def measure(name):
+    """Record the tables of a machine."""
     scene = scene_of(name)
     found = simulate(scene)
-    rows = [("", "by hand", "simulated"), ("---",) * 3]
+    rows = [("quantity", "by hand", "simulated")]
     for one in MACHINES[name].by_hand(scene, found):
         rows.append((one.words, shown(one.by_hand, one.unit), shown(one.simulated, one.unit)))
-    head, *rest = MACHINES[name].answer(scene)
-    answer = [head, ("---",) * len(head), *rest]
     assert not int(found["flags"]) & Flag.BEYOND_HERTZ
-    return "\n\n".join(
-        "\n".join(f"| {' | '.join(row)} |" for row in part) for part in (rows, answer)
-    )
+    record(f"machine_{name}", rows)
+    record(f"machine_{name}_answer", MACHINES[name].answer(scene))
 
 
 def main():
-    """Draw, simulate, write."""
-    page = PAGE.read_text(encoding="utf-8")
+    """Draw, simulate, record."""
     PICTURES.mkdir(exist_ok=True)
     for name in MACHINES:
         scene = scene_of(name)
         turned = 0.0 if scene.template is None else 1.0
         save(sketch_figure(scene, poses_at_start(scene, turned)), PICTURES / f"{name}.png")
-        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        before, _, rest = page.partition(begin)
-        page = f"{before}{begin}\n{tables(name)}\n{end}{rest.partition(end)[2]}"
-    PAGE.write_text(page, encoding="utf-8")
+        measure(name)
 
 
 if __name__ == "__main__":

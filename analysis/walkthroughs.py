@@ -1,4 +1,4 @@
-"""Times of the walkthroughs: run every block of docs/how-to/walkthroughs.md, and write the table at the page's end.
+"""Times of the walkthroughs: run every block of docs/how-to/walkthroughs.md, and write `analysis/results/walkthroughs.csv`.
 
     python analysis/walkthroughs.py
 
@@ -17,9 +17,9 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
 from doc_pages import Block, Reader, blocks  # noqa: E402
+from recorded import record  # noqa: E402
 
 PAGE = ROOT / "docs" / "how-to" / "walkthroughs.md"
-BEGIN, END = "<!-- times: begin -->\n", "<!-- times: end -->"
 
 
 def spent() -> float:
@@ -40,9 +40,9 @@ def duration(seconds: float) -> str:
 
 
 def main() -> None:
-    """Run the page, print a row a block as it is done, and write the table."""
+    """Run the page, print a row a block as it is done, and record the table."""
     lines = PAGE.read_text(encoding="utf-8").split("\n")
-    rows = ["| walkthrough | commands | processor time |", "| --- | --- | --- |"]
+    rows = [("walkthrough", "commands", "processor time")]
     totals: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         reader = Reader(Path(folder) / "clone")
@@ -62,13 +62,10 @@ def main() -> None:
             title = [x for x in lines[: block.line] if x.startswith("## ")][-1][3:].split(":")[0]
             seconds = spent() - before
             totals[title] = totals.get(title, 0.0) + seconds
-            rows.append(f"| {title} | {commands(block)} | {duration(seconds)} |")
-            print(rows[-1], flush=True)
-    rows += [f"| {title} | all | {duration(seconds)} |" for title, seconds in totals.items()]
-    text = PAGE.read_text(encoding="utf-8")
-    head, rest = text.split(BEGIN)
-    made = head + BEGIN + "\n" + "\n".join(rows) + "\n\n" + END + rest.split(END)[1]
-    PAGE.write_text(made, encoding="utf-8")
+            rows.append((title, commands(block), duration(seconds)))
+            print(*rows[-1], sep=" | ", flush=True)
+    rows += [(title, "all", duration(seconds)) for title, seconds in totals.items()]
+    record("walkthroughs", rows)
 
 
 if __name__ == "__main__":

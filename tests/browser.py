@@ -103,6 +103,10 @@ class Browser:
         )
         self._ask("POST", "/url", {"url": page.resolve().as_uri()})
 
+    def visit(self, address: str) -> None:
+        """Load a page of a server."""
+        self._ask("POST", "/url", {"url": address})
+
     def run(self, script: str) -> Any:
         """The value that a script returns."""
         return self._ask("POST", "/execute/sync", {"script": script, "args": []})

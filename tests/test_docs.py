@@ -4,8 +4,11 @@ import os
 import re
 import subprocess
 import sys
-from functools import cache
+import threading
+from collections.abc import Iterator
+from functools import cache, partial
 from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import click
@@ -13,6 +16,7 @@ import hooks
 import matplotlib.pyplot as plt
 import pytest
 import reference
+from browser import Browser
 from doc_pages import PAGES, ROOT, Block, Reader, blocks, tokens
 from markdown_it import MarkdownIt
 from patience import crowded
@@ -221,16 +225,16 @@ def test_the_reference_is_complete(site):
     for name, command in cli.every().items():
         for parameter in command.params:
             assert all(word in commands for word in parameter.opts if word[0] == "-"), name
-    files = Site(site / "reference/files/index.html").text
+    files = "".join(Site(page).text for page in site.glob("reference/files*/index.html"))
     assert all(name in files for kind in KINDS.values() for name in (*kind.coords, *kind.data))
-    scene = Site(site / "reference/scene/index.html").text
+    scene = "".join(Site(page).text for page in site.glob("reference/scene*/index.html"))
     for path in load_scene(ROOT / "jobs/robust_slider_crank.toml").numeric_paths():
         assert path.rpartition(".")[2] in scene, path
     python = Site(site / "reference/python/index.html").text
     assert all(f"{name}" in python for name in ("load_scene", "simulate", "evaluate", "InputError"))
 
 
-@pytest.mark.parametrize("name", list(reference.MADE))
+@pytest.mark.parametrize("name", reference.MADE)
 def test_the_reference_is_what_the_package_says(name):
     """`python docs/mkdocs/reference.py` writes it anew."""
     path, wanted = reference.page(name)
@@ -238,8 +242,7 @@ def test_the_reference_is_what_the_package_says(name):
 
 
 def test_every_table_of_a_scene_has_an_example_and_every_entry_a_meaning():
-    text = "\n".join(reference.scene_entries())
-    tables = {part.partition("\n")[0]: part for part in text.split("## ")[1:]}
+    tables = {name: "\n".join(lines) for name, lines in reference.scene_sections().items()}
     without = [name for name, part in tables.items() if "```toml" not in part]
     # Their tables stand below them, each with its own example; the program writes those of plug-ins into result files.
     written = ["[plugins]", "[plugins.files.NAME]", "[plugins.packages.NAME]"]
@@ -256,3 +259,36 @@ def test_no_code_of_ours_is_left_in_the_pages(site):
         assert "no-run:" not in text, path
         assert " slow:" not in text, path
         assert "<!--" not in text, path
+
+
+@pytest.fixture(scope="module")
+def served(site: Path) -> Iterator[str]:
+    """The address of the site."""
+    handler = partial(SimpleHTTPRequestHandler, directory=str(site))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+
+
+@pytest.mark.nightly
+def test_a_reader_finds_entries_and_moved_sections(served):
+    """In a browser: the search leads to the section of an entry, and a former anchor to where the section is now."""
+    browser = Browser()
+    for word, place in {
+        "stribeck_speed": "reference/scene-effects/#effectsfriction",
+        "joints.guide": "reference/scene-slider-crank/#jointsguide-of-kind-slide",
+        "deviation_within": "reference/files-study/#verification",
+    }.items():
+        browser.visit(f"{served}/?q={word}")
+        link = f"[...document.querySelectorAll('.md-search-result__link')].find(a => a.href.includes('{place}'))"
+        browser.wait(link)
+    for old, new in {
+        "reference/scene/#studysensitivity": "reference/scene-study/#studysensitivity",
+        "reference/files/#what-a-response-contains": "reference/files-response/#what-a-response-contains",
+        "theory/#integration": "theory-numerics/#integration",
+    }.items():
+        browser.visit(f"{served}/{old}")
+        browser.wait(f"location.href === '{served}/{new}'")
+        browser.wait(f"document.getElementById('{new.partition('#')[2]}')")
+    browser.close()

@@ -1,4 +1,4 @@
-"""What the site shows otherwise than the repository: tables of measured results, and fences without our marks."""
+"""What the site shows otherwise than the repository: tables of measured results, fences without our marks, moved sections."""
 
 import csv
 import re
@@ -10,6 +10,16 @@ MARKED = re.compile(r"^(`{3,})(\w+) (?:slow\b|from ).*$", re.MULTILINE)
 
 MEASURED = re.compile(r"^\[measured: (\w+)\]\((?:\.\./)+analysis/results/\1\.csv\)$", re.MULTILINE)
 """A line in place of a table: a link to what scripts measured, from which the site is filled."""
+
+MOVED = """<script>
+function follow() {
+  const place = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  if (place && place.matches("a.moved")) location.replace(place.nextElementSibling.href);
+}
+addEventListener("hashchange", follow);
+follow();
+</script>"""
+"""Leads from the former anchor of a section, which stands before a link, to its place."""
 
 RESULTS = Path(__file__).parents[2] / "analysis" / "results"
 
@@ -27,3 +37,8 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     text = MEASURED.sub(lambda match: table(match[1]), markdown)
     text = NOT_RUN.sub(r"*(not run by the tests: \3)*\n\n\1\2", text)
     return MARKED.sub(r"\1\2", text)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """A page, with a script if sections of it have moved."""
+    return html + MOVED if 'class="moved"' in html else html

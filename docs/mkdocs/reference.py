@@ -1,12 +1,14 @@
 """Pages of the reference that come from the package itself: `python docs/mkdocs/reference.py` writes them, a test compares.
 
 Commands from their `--help`, entries of a scene from its schema with examples out of the scene files here, result files
-from the tables that write them. Each stands between two marks of its page.
+from the tables that write them. Each stands between two marks of its page. Long references are several pages by subject;
+the first lists the sections of the others, at the anchors that these sections had before.
 """
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +36,53 @@ def commands() -> Iterator[str]:
         yield from (f"## {name}", "", "```text", command.get_help(context), "```", "")
 
 
-def scene_entries() -> Iterator[str]:
-    """Every table of a scene file: its entries, and an example; a part is told where it is first used."""
+SCENE_PAGES = {
+    "scene": ("The file", "[output", "[plugins"),
+    "scene-slider-crank": ("[mechanism] of kind slider-crank", "[mechanism.crank", "[mechanism.slider", "[drive", "[joints"),
+    "scene-linkage": ("[mechanism] of kind planar", "[mechanism.bodies", "[mechanism.ground", "[mechanism.joints"),
+    "scene-loads": ("[mechanism.drives", "[mechanism.loads"),
+    "scene-effects": ("[effects", "[numerics", "[wear"),
+    "scene-study": ("[study",),
+}  # fmt: skip
+"""Pages of a scene's tables, and how the headings on each begin."""
+
+FILES_PAGES = {
+    "files": ("bifurcation", "statistics", "wear", "effects", "identify", "timing", "accuracy"),
+    "files-response": ("response",),
+    "files-samples": ("samples",),
+    "files-study": (
+        "sensitivity", "kriging", "front", "verification", "chaos", "contributions", "worst", "claims", "readings",
+    ),
+}  # fmt: skip
+"""Pages of result files, and the kinds on each."""
+
+SHARED = 3
+"""So many equal entries of two tables are described once."""
+
+
+def _page_of(heading: str, pages: dict[str, tuple[str, ...]]) -> str:
+    return next(page for page, begins in pages.items() if heading.startswith(begins))
+
+
+def _moved(first: str, pages: dict[str, tuple[str, ...]], headings: list[str]) -> Iterator[str]:
+    """The sections of other pages, each at its anchor of the time when all stood on the first."""
+    for page in pages:
+        if page != first:
+            title = (
+                (PAGES / f"{page}.md").read_text(encoding="utf-8").partition("\n")[0].strip("# ")
+            )
+            links = ", ".join(
+                f'<a id="{_anchor(one)}" class="moved"></a>[`{one}`]({page}.md#{_anchor(one)})'
+                for one in headings
+                if _page_of(one, pages) == page
+            )
+            yield from (f"- **[{title}]({page}.md)**: {links}",)
+    yield ""
+
+
+@cache
+def scene_sections() -> dict[str, list[str]]:
+    """Every table of a scene file by its heading: its entries, and an example; a part is described where it is first used."""
     schema = scene_schema()
     parts = {"Scene": schema, **schema["$defs"]}
     for name, part in parts.items():  # a pair in a list is the same as a table
@@ -43,19 +90,54 @@ def scene_entries() -> Iterator[str]:
         parts[name].setdefault("description", part.get("description", ""))
     places = _places(parts)
     names = {part: _heading(parts[part], paths) for part, paths in places.items()}
+    sections: dict[str, list[str]] = {}
+    before: dict[str, dict[str, str]] = {}
     for name, paths in places.items():
-        part = parts[name]
-        yield from (f"## {names[name]}", "", _cell(part.get("description", "")), "")
+        part, heading = parts[name], names[name]
+        page = _page_of(heading, SCENE_PAGES)
+        lines = sections[heading] = [f"## {heading}", "", _cell(part.get("description", "")), ""]
         if paths[1:]:
-            yield from ("Also " + ", ".join(f"`[{path}]`" for path in paths[1:]) + ".", "")
-        yield from ("| entry | value | default | meaning |", "| --- | --- | --- | --- |")
+            lines += ["Also " + ", ".join(f"`[{path}]`" for path in paths[1:]) + ".", ""]
+        rows = {}
         for entry, field in part["properties"].items():
+            if entry == "kind" and "const" in field and "default" not in field:
+                continue  # stands in the heading
             required = entry in part.get("required", ())
             default = "required" if required else _default(field)
             meaning = _cell(field.get("description") or _first_meaning(field, parts))
-            yield f"| `{entry}` | {_value(field, names)} | {default} | {meaning} |"
-        yield ""
-        yield from _example(paths, part)
+            rows[entry] = f"| `{entry}` | {_value(field, names, page)} | {default} | {meaning} |"
+        equal = {one: [e for e in rows if rows[e] == before[one].get(e)] for one in before}
+        most = max(equal, key=lambda one: len(equal[one]), default="")
+        shared = equal.get(most, []) if len(equal.get(most, ())) >= SHARED else []
+        before[heading] = rows
+        if rest := [row for entry, row in rows.items() if entry not in shared]:
+            lines += [
+                "| entry | value | default | meaning |",
+                "| --- | --- | --- | --- |",
+                *rest,
+                "",
+            ]
+        if shared:
+            words = ", ".join(f"`{entry}`" for entry in shared)
+            lines += [f"{words}: as in {_link(most, most, page)}.", ""]
+        lines += _example(paths, part)
+    return sections
+
+
+def scene_entries(page: str = "scene") -> Iterator[str]:
+    """The tables of a scene on one page."""
+    sections = scene_sections()
+    if page == "scene":
+        yield from _moved(page, SCENE_PAGES, list(sections))
+    for heading, lines in sections.items():
+        if _page_of(heading, SCENE_PAGES) == page:
+            yield from lines
+
+
+def _link(words: str, heading: str, page: str) -> str:
+    """A link from a page to the section of a table."""
+    other = _page_of(heading, SCENE_PAGES)
+    return f"[`{words}`]({'' if other == page else other + '.md'}#{_anchor(heading)})"
 
 
 def _places(parts: dict[str, Any]) -> dict[str, list[str]]:
@@ -115,11 +197,11 @@ def _default(field: dict[str, Any]) -> str:
     return "see there" if isinstance(field["default"], dict | list) else f"`{field['default']}`"
 
 
-def _value(field: dict[str, Any], names: dict[str, str]) -> str:
+def _value(field: dict[str, Any], names: dict[str, str], page: str) -> str:
     """Kind and bounds of an entry, in words."""
     if "$ref" in field:
         heading = names[field["$ref"].rpartition("/")[2]]
-        return f"[`{heading}`](#{_anchor(heading)})"
+        return _link(heading, heading, page)
     if "enum" in field:
         return ", ".join(f"`{word}`" for word in field["enum"])
     if "const" in field:
@@ -127,15 +209,14 @@ def _value(field: dict[str, Any], names: dict[str, str]) -> str:
     for key in ("anyOf", "oneOf"):
         if key in field:
             kept = [choice for choice in field[key] if not {"null", "like"} & _shape(choice)]
-            words = [_value(choice, names) for choice in kept]
-            return " or ".join(dict.fromkeys(words))
+            return _choice([_value(choice, names, page) for choice in kept])
     if isinstance(field.get("type"), list):
-        return " or ".join(_value({**field, "type": one}, names) for one in field["type"])
+        return _choice([_value({**field, "type": one}, names, page) for one in field["type"]])
     if field.get("type") == "array":
         inside = field.get("items") or field.get("prefixItems", [{}])[0]
-        return f"list of {_value(inside, names)}"
+        return f"list of {_value(inside, names, page)}"
     if field.get("type") == "object":
-        return f"table of {_value(field.get('additionalProperties', {}), names)}"
+        return f"table of {_value(field.get('additionalProperties', {}), names, page)}"
     if field.get("type") == "string" and "%" in field.get("pattern", ""):
         return "text in %"
     if field.get("type") == "string":
@@ -151,6 +232,21 @@ def _value(field: dict[str, Any], names: dict[str, str]) -> str:
         field.get("type", ""), "number"
     )
     return " ".join([kind, *limits])
+
+
+def _choice(words: list[str]) -> str:
+    """Alternatives: a number or text with its unit is a quantity or a ratio, and tables differ in their kind alone."""
+    words = list(dict.fromkeys(words))
+    for text, name in {"text with a unit": "quantity", "text in %": "ratio"}.items():
+        if text in words and words[0].startswith("number"):
+            words.remove(text)
+            words[0] = name + words[0].removeprefix("number")
+    kinds = [re.fullmatch(r"\[`(\[.*\]) of kind (.*)`\](\(.*\))", one) for one in words]
+    if words[1:] and all(kinds):
+        return f"`{kinds[0][1]}` of kind " + ", ".join(
+            f"[`{one[2]}`]{one[3]}" for one in kinds if one
+        )
+    return " or ".join(words)
 
 
 def _shape(choice: dict[str, Any]) -> set[str]:
@@ -223,9 +319,13 @@ def _written(value: Any) -> str:
     return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
 
 
-def files() -> Iterator[str]:
-    """A table for each kind of result file."""
+def files(page: str = "files") -> Iterator[str]:
+    """A table for each kind of result file on one page."""
+    if page == "files":
+        yield from _moved(page, FILES_PAGES, list(KINDS))
     for kind, table in KINDS.items():
+        if _page_of(kind, FILES_PAGES) != page:
+            continue
         yield from (
             f"## {kind}",
             "",
@@ -244,12 +344,15 @@ def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("[[", "\\[[").replace("<", "&lt;")
 
 
-MADE: dict[str, Callable[[], Iterator[str]]] = {
-    "commands": commands,
-    "scene": scene_entries,
-    "files": files,
-}
-"""What is generated of each page."""
+MADE = ("commands", *SCENE_PAGES, *FILES_PAGES)
+"""Pages with a generated part."""
+
+
+def made(name: str) -> Iterator[str]:
+    """What is generated of a page."""
+    if name in SCENE_PAGES:
+        return scene_entries(name)
+    return files(name) if name in FILES_PAGES else commands()
 
 
 def page(name: str) -> tuple[Path, str]:
@@ -259,8 +362,8 @@ def page(name: str) -> tuple[Path, str]:
     begin, end = f"<!-- {name}: begin (docs/mkdocs/reference.py) -->\n", f"<!-- {name}: end -->\n"
     before, _, rest = text.partition(begin)
     after = rest.partition(end)[2]
-    made = "\n".join(line.rstrip() for part in MADE[name]() for line in part.split("\n"))
-    return path, f"{before}{begin}\n{made}\n{end}{after}"
+    lines = "\n".join(line.rstrip() for part in made(name) for line in part.split("\n"))
+    return path, f"{before}{begin}\n{lines}\n{end}{after}"
 
 
 if __name__ == "__main__":
