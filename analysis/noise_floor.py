@@ -10,7 +10,7 @@ import itertools
 
 import numpy as np
 
-from hpcclear.statistics.sensitivity import analyse_sobol, noise_share, sobol_design
+from hpcclear.statistics.sensitivity.sobol import analyse_sobol, noise_share, sobol_design
 
 SHARES, ROWS, SEEDS = (0.05, 0.3, 0.6, 0.95), (64, 256, 1024), 100
 INPUTS = 3

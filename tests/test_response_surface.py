@@ -18,11 +18,9 @@ from hpcclear.statistics.surrogate.response_surface import (
     latin_hypercube,
 )
 from hpcclear.statistics.surrogate.surface_search import (
-    Search,
     SearchSettings,
     SurfaceSearch,
     fit_until_accepted,
-    search,
 )
 
 MASSES = np.array([[0.105, 0.42], [0.07, 0.28]])  # kg, m2 and m3 of the paper
@@ -56,10 +54,9 @@ def search_for(
     rng: np.random.Generator,
     **settings: object,
 ) -> SurfaceSearch:
-    asking = search(bounds, rng, SearchSettings(**settings))  # type: ignore[arg-type]
-    return fit_until_accepted(lambda asked: {k: function(at) for k, at in asked.items()}, [asking])[
-        0
-    ]
+    made = SurfaceSearch(bounds, rng, SearchSettings(**settings))  # type: ignore[arg-type]
+    fit_until_accepted(lambda asked: {k: function(at) for k, at in asked.items()}, [made])
+    return made
 
 
 def sample(n: int, bounds: np.ndarray, seed: int) -> np.ndarray:
@@ -214,18 +211,17 @@ def test_search_takes_the_paper_sample_when_it_suffices() -> None:
     f = Counted(lambda x: x[:, 0] ** 3 + x[:, 1])
     search = search_for(f, BOX, np.random.default_rng(0))
     assert search.accepted
-    assert search.surface.order == 3
+    assert search.best[0].order == 3
     assert [len(x) for x in f.asked[1:]] == [5, 45]
-    assert len(search.attempts) == 1
 
 
 def test_search_changes_the_order() -> None:
     f = Counted(lambda x: np.cos(2 * x[:, 0]) * x[:, 1] ** 2)
     search = search_for(f, BOX, np.random.default_rng(1), n_test=20, r2_min=0.97, rmae_max=0.5)
     assert search.accepted
-    assert [a.order for a in search.attempts] == [3, 2, 4]
-    assert search.surface.order == 4
-    assert search.accuracy.r2 >= 0.97
+    assert [len(x) for x in f.asked[1:]] == [20, 45]  # by the same points
+    assert search.best[0].order == 4
+    assert search.best[1].r2 >= 0.97
 
 
 def test_search_raises_the_sample_by_new_points_and_keeps_the_test_points_apart() -> None:
@@ -236,11 +232,9 @@ def test_search_raises_the_sample_by_new_points_and_keeps_the_test_points_apart(
     assert search.accepted
     test, *training = f.asked[1:]
     assert [len(x) for x in training] == [20, 20, 40][: len(training)]
-    assert search.surface.n_points == sum(map(len, training)) > 36
-    assert not search.attempts[0].accuracy  # 20 points cannot bear 36 terms
-    assert "36 terms" in search.attempts[0].note
+    assert search.best[0].n_points == sum(map(len, training)) > 36  # 20 points cannot bear 36 terms
     true = np.sin(3 * test[:, 0]) + test[:, 1]
-    assert accuracy(true, search.surface.predict(test)) == search.accuracy
+    assert accuracy(true, search.best[0].predict(test)) == search.best[1]
 
 
 def test_search_reports_that_noise_cannot_be_fitted() -> None:
@@ -248,9 +242,9 @@ def test_search_reports_that_noise_cannot_be_fitted() -> None:
     f = Counted(lambda x: noise.standard_normal(len(x)))
     search = search_for(f, BOX, np.random.default_rng(4), n_test=30, max_points=150)
     assert not search.accepted
-    assert "no order of (3, 2, 4)" in search.reason
     assert [len(x) for x in f.asked[1:]] == [30, 45, 45, 60]  # never past max_points
-    assert search.accuracy.rmse == min(a.accuracy.rmse for a in search.attempts if a.accuracy)
+    with pytest.raises(InputError, match=r"no surface could be fitted: .*36 terms"):
+        search_for(f, BOX, np.random.default_rng(4), orders=(7,), n_points=10, max_points=30)
 
 
 def test_searches_side_by_side_find_what_each_finds_alone() -> None:
@@ -262,21 +256,19 @@ def test_searches_side_by_side_find_what_each_finds_alone() -> None:
     def truth(wave: float, x: np.ndarray) -> np.ndarray:
         return np.asarray(cubic(x) + 1e-4 * np.sin(wave * x[:, 0]) * (wave > 0.0))
 
-    def searches() -> list[Search]:
-        return [search(MASSES, np.random.default_rng(seed), settings) for seed in range(len(waves))]
+    def searches() -> list[SurfaceSearch]:
+        seeds = range(len(waves))
+        return [SurfaceSearch(MASSES, np.random.default_rng(seed), settings) for seed in seeds]
 
     def evaluate(asked: Mapping[int, np.ndarray]) -> dict[int, np.ndarray]:
         rounds.append(tuple(asked))
         return {k: truth(waves[k], at) for k, at in asked.items()}
 
-    together = fit_until_accepted(evaluate, searches())
+    together = searches()
+    fit_until_accepted(evaluate, together)
     assert rounds[0] == (0, 1, 2)
     assert rounds[-1] == (2,)
-    for k, one in enumerate(searches()):
-        wave = waves[k]
-        alone = fit_until_accepted(partial(lambda w, asked: {0: truth(w, asked[0])}, wave), [one])[
-            0
-        ]
-        assert alone.attempts == together[k].attempts
+    for k, alone in enumerate(searches()):
+        fit_until_accepted(partial(lambda w, asked: {0: truth(w, asked[0])}, waves[k]), [alone])
         assert alone.accepted == together[k].accepted == (k < 2)
-        assert alone.accuracy == together[k].accuracy
+        assert alone.best[1] == together[k].best[1]

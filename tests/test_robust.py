@@ -219,17 +219,17 @@ def pieces():
     return Piecewise(tuple(leaves), np.ones(4), np.zeros(4), np.ones(4, bool))
 
 
-@pytest.mark.parametrize("inputs", [UNIFORM, NORMAL, TRUNCATED, UNIFORM[:1], UNIFORM[1:2]])
-def test_piecewise_model_is_integrated_piece_by_piece(inputs):
-    fixed = {} if inputs[0].name == "C" else {"C": 6e-4}
-    objective = RobustObjective(pieces(), DESIGN, inputs, fixed=fixed)
+def test_piecewise_model_is_averaged_over_draws():
+    with pytest.raises(InputError, match="monte-carlo"):
+        RobustObjective(pieces(), DESIGN, UNIFORM)
+    objective = RobustObjective(
+        pieces(), DESIGN, UNIFORM, draws=(300_000, np.random.default_rng(6))
+    )
     places = designs(3)
     found = objective(places)
     sampled = objective.monte_carlo(places, 300_000, np.random.default_rng(5))
-    assert (abs(found[:, 0] - sampled.mean) < 3.5 * sampled.mean_error).all()
-    assert (abs(found[:, 1] - sampled.deviation) < 3.5 * sampled.deviation_error).all()
-    finer = RobustObjective(pieces(), DESIGN, inputs, fixed=fixed, tolerance=1e-11)
-    assert abs(finer(places) / found - 1).max() < 1e-6
+    assert (abs(found[:, 0] - sampled.mean) < 5 * sampled.mean_error).all()
+    assert (abs(found[:, 1] - sampled.deviation) < 5 * sampled.deviation_error).all()
 
 
 # Refusals

@@ -6,11 +6,19 @@ from margins import at_least, at_most
 from sklearn.linear_model import LinearRegression
 
 from hpcclear.scene.stages import Sensitivity
-from hpcclear.statistics.sensitivity import IntervalSettings, analyse_intervals, design_intervals
+from hpcclear.statistics.sensitivity.intervals import (
+    IntervalSettings,
+    analyse_intervals,
+    design_intervals,
+)
 from hpcclear.statistics.surrogate.metrics import accuracy
 from hpcclear.statistics.surrogate.polynomial import monomials, n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface, latin_hypercube
-from hpcclear.statistics.surrogate.surface_search import SearchSettings, fit_until_accepted, search
+from hpcclear.statistics.surrogate.surface_search import (
+    SearchSettings,
+    SurfaceSearch,
+    fit_until_accepted,
+)
 from hpcclear.statistics.surrogate.term_choice import least_points
 
 DIMS = 20
@@ -132,10 +140,10 @@ def test_intervals_and_searches_choose_where_they_are_told_to() -> None:
     values[: 60 - least_points(8) + 1] = np.nan  # of the first surface one too few are left
     assert np.isnan(analyse_intervals(design, values).sensitivity[0]).all()
     tried = SearchSettings(orders=(3,), n_points=60, n_test=20, max_points=60, chosen=True)
-    asking = [search(bounds, np.random.default_rng(19), tried)]
-    (found,) = fit_until_accepted(lambda at: {k: function(x) for k, x in at.items()}, asking)
+    found = SurfaceSearch(bounds, np.random.default_rng(19), tried)
+    fit_until_accepted(lambda at: {k: function(x) for k, x in at.items()}, [found])
     assert found.accepted
-    assert len(found.surface.coefficients) < n_terms(8, 3)
+    assert len(found.best[0].coefficients) < n_terms(8, 3)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ PROBES = 64
 """Designs, beside the corners, at which the rules of derived random inputs are chosen."""
 
 TOGETHER = 256
-"""Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a kernel that is no product of
+"""Points of a Sobol sequence at which the surrogate is taken for inputs that vary together, for a model that is no product over
 them, and for all that is not mean and standard deviation."""
 
 
@@ -134,14 +134,14 @@ class _Averages:
     def objective(self, model: Piecewise) -> RobustObjective:
         """Mean and standard deviation of f, by an exact rule where there is one."""
         rng = generator(self.study.seed, "moments", self.case)
-        probes, derived = self.probes(rng), self.derived()
+        probes = self.probes(rng)
         statistics, by_chance = (
             self.study.swarm.statistics,
             (self.study.swarm.monte_carlo_samples, rng),
         )
         if self.moving or self.correlated or (statistics == "quadrature" and not model.separable):
             return self.averaged(model, probes, self.drawn(self.chances(rng)))
-        if statistics != "monte-carlo" and not self.askew(model, derived):
+        if statistics != "monte-carlo":
             with contextlib.suppress(InputError):  # length scales too short for a quadrature rule
                 return self.averaged(model, probes)
         return self.averaged(model, probes, by_chance)
@@ -184,14 +184,6 @@ class _Averages:
         variables = [self.study.variable(name) for name in self.study.optimisation]
         return [_ratio(self.scene, one.paths[0]) for one in variables if one.ratio is not None]
 
-    def askew(self, model: Piecewise, derived: Sequence[Derived]) -> bool:
-        """Whether borders of the surrogate's subintervals cut the random inputs where no rule can be split."""
-        random = {row.name for row in self.rows}
-        return len(model.leaves) > 1 and (
-            any(set(one.of) & random for one in derived)
-            or any(isinstance(row.law, quantiles.Cut) for row in self.rows)
-        )
-
     def chances(self, rng: np.random.Generator) -> Array:
         """Probabilities of the random inputs, (inputs, s)."""
         return sobol(len(self.rows), rng, 0, TOGETHER).T
@@ -224,11 +216,9 @@ def problem_of(
 ) -> Problem:
     """The problem of one case on a surrogate of its objective, and on those of further responses.
 
-    A surrogate that is cut into subintervals has no exact rule for an inertia that scatters while
-    the model knows its ratio, nor for distributions that are known by their quantiles; no surrogate has one
-    for inputs that vary together, or for a model whose length scales are a small part of a random input's range (it has
-    found noise). Such a case is averaged by Monte Carlo; one on a kernel that is no product of its inputs over points of a
-    Sobol sequence.
+    A surrogate that is cut into subintervals has no exact rule, nor has one for inputs that vary together or on a kernel
+    that is no product of its inputs: these are averaged over points of a Sobol sequence. A model whose length scales are a
+    small part of a random input's range (it has found noise) is averaged by Monte Carlo.
     """
     averages = _Averages(scene, case)
     objective = averages.objective(model)

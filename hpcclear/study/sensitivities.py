@@ -11,14 +11,21 @@ from hpcclear.results.content import Results
 from hpcclear.scene.domain import box
 from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
-from hpcclear.statistics import sensitivity
+from hpcclear.statistics.sensitivity.convergence import best_estimates, convergence_intervals
+from hpcclear.statistics.sensitivity.intervals import (
+    IntervalDesign,
+    IntervalSettings,
+    analyse_intervals,
+    design_intervals,
+)
+from hpcclear.statistics.sensitivity.selection import select_influential
+from hpcclear.statistics.sensitivity.sobol import analyse_sobol, noise_share, sobol_design
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
 from hpcclear.statistics.surrogate.surface_search import (
     SearchSettings,
     SurfaceSearch,
     fit_until_accepted,
-    search,
 )
 from hpcclear.study.run import Result, StudyRun
 
@@ -34,7 +41,7 @@ class Sampled(NamedTuple):
     """A surface that was simulated: its inputs, its design, and the objective there, (n,)."""
 
     inputs: tuple[str, ...]
-    design: sensitivity.IntervalDesign
+    design: IntervalDesign
     values: Array
 
 
@@ -112,18 +119,18 @@ def write(run: StudyRun, result: Result) -> None:
     run.write(content)
 
 
-def _designs(run: StudyRun) -> list[sensitivity.IntervalDesign]:
+def _designs(run: StudyRun) -> list[IntervalDesign]:
     settings = run.study.sensitivity
     lower, upper = run.study.variable(parameter(run)).bounds
     clearances = np.linspace(lower, upper, settings.levels)
     found = []
     for names, laid_out in zip(surfaces(run.study), _layouts(run.study), strict=True):
         rng = run.rng("sensitivity", " ".join(names))
-        found.append(sensitivity.design_intervals(_bounds(run, names), clearances, rng, laid_out))
+        found.append(design_intervals(_bounds(run, names), clearances, rng, laid_out))
     return found
 
 
-def _layouts(study: Study) -> list[sensitivity.IntervalSettings]:
+def _layouts(study: Study) -> list[IntervalSettings]:
     """How many points each surface gets."""
     settings, found = study.sensitivity, []
     for k, names in enumerate(surfaces(study)):
@@ -131,7 +138,7 @@ def _layouts(study: Study) -> list[sensitivity.IntervalSettings]:
         order = settings.together_order if together else settings.order
         points = settings.together_samples if together else settings.samples
         found.append(
-            sensitivity.IntervalSettings(
+            IntervalSettings(
                 steps=settings.rounds,
                 shrink=settings.shrink,
                 n_points=points,
@@ -164,9 +171,9 @@ def _first_order(run: StudyRun, made: Sequence[Sampled]) -> Result:
         result[name] = np.full(of_clearance, np.nan)
     fractions = (1.0 - settings.shrink) ** np.arange(settings.rounds)
     for k, (names, design, values) in enumerate(made):
-        history = sensitivity.analyse_intervals(design, values)
-        found = sensitivity.convergence_intervals(history)
-        slope, uncertainty = sensitivity.best_estimates(history, found)
+        history = analyse_intervals(design, values)
+        found = convergence_intervals(history)
+        slope, uncertainty = best_estimates(history, found)
         at, span = _columns(run, names), np.ptp(_bounds(run, names), axis=1)
         result["sensitivity"][k][..., at] = history.sensitivity * span
         result["standard_error"][k][..., at] = history.standard_error * span
@@ -214,7 +221,7 @@ def _ranked(run: StudyRun, inputs: Sequence[Sequence[str]], result: Result) -> R
     error = np.stack(
         [result["uncertainty"][k][:, c] for (k, _), c in zip(where, at, strict=True)], 1
     )
-    chosen = sensitivity.select_influential(
+    chosen = select_influential(
         names, slope, error, np.ones(len(names)), fraction=run.study.sensitivity.influence
     )
     influence = np.full(len(run.study.names), np.nan)
@@ -239,9 +246,10 @@ def _accepted(run: StudyRun, sampled: Sequence[Sampled]) -> Result:
     if run.study.sensitivity.resamplings > 0:
         refused = [place for place, one in made.items() if not one[-1]]
         for place, one in zip(refused, _searched(run, sampled, refused), strict=True):
-            surface = one.surface
+            assert one.best is not None  # or the search would have been refused
+            surface, tested = one.best
             counts = surface.order, surface.n_points, len(surface.coefficients)
-            made[place] = one.accuracy, *counts, one.accepted
+            made[place] = tested, *counts, one.accepted
     if any(one.design.settings.chosen for one in sampled):
         result["surface_terms"] = np.zeros(shape, np.int64)
     for (k, c), (reached, order, count, terms, accepted) in made.items():
@@ -297,7 +305,7 @@ def _searched(
             chosen=laid_out.chosen,
         )
         rng = run.rng("surface", " ".join(sampled[k].inputs), str(level))
-        searches.append(search(design.intervals[0], rng, tried))
+        searches.append(SurfaceSearch(design.intervals[0], rng, tried))
 
     def evaluate(asked: Mapping[int, Array]) -> dict[int, Array]:
         batches = []
@@ -308,7 +316,8 @@ def _searched(
             batches.append(run.simulations.designs((*inputs, parameter(run)), where).values)
         return dict(zip(asked, _simulated(run, batches), strict=True))
 
-    return fit_until_accepted(evaluate, searches)
+    fit_until_accepted(evaluate, searches)
+    return searches
 
 
 def _sobol_points(run: StudyRun) -> Array:
@@ -317,7 +326,7 @@ def _sobol_points(run: StudyRun) -> Array:
         return np.empty((0, len(run.study.names)))
     bounds = _bounds(run, run.study.names)
     names = run.study.names
-    points = snapped(run.study, names, sensitivity.sobol_design(bounds, rows, run.rng("sobol")))
+    points = snapped(run.study, names, sobol_design(bounds, rows, run.rng("sobol")))
     near = points[: _beside(run.study)]
     steps = (
         NEARBY
@@ -350,8 +359,8 @@ def _global(run: StudyRun, values: Array | None) -> Result:
         return dict.fromkeys(names, nothing) | unknown
     beside = _beside(run.study)
     values, near = values[:-beside], values[-beside:]
-    found = sensitivity.analyse_sobol(values, count)
-    noise, error = sensitivity.noise_share(values[:beside], near, found.variance)
+    found = analyse_sobol(values, count)
+    noise, error = noise_share(values[:beside], near, found.variance)
     total_error = np.ptp(found.total_interval, axis=1) / (2 * _NORMAL_95)
     return {
         "sobol_first": found.first,

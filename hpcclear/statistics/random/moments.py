@@ -4,7 +4,8 @@ Three ways, each a check on the others:
 
 - tensor Gauss rules (`RobustObjective`, the default): the kernel is a product over the inputs, so
   N1 x N2 x ... nodes cost little more than N1 + N2 + ... kernels; no sampling noise;
-- Monte Carlo with standard errors, the paper's way, and the one of a kernel that is no product (Matern);
+- Monte Carlo with standard errors, the paper's way, and the one of a kernel that is no product (Matern) and of models on
+  several boxes;
 - the closed form in error functions, for independent inputs of one model.
 
 Random inputs are independent, unless their draws are given. They may stand for the model's inputs themselves or act through
@@ -23,9 +24,10 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
 from hpcclear.statistics.random.rules import kernel_integral
-from hpcclear.statistics.random.tensor_rule import Surrogate, TensorRule
+from hpcclear.statistics.random.tensor_rule import TensorRule
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 
 Drawn = Callable[[np.ndarray], Mapping[str, np.ndarray]]
 """Designs (n, k) to draws (n or 1, s) of each random input."""
@@ -82,10 +84,6 @@ class RobustObjective:
     Called with designs ``(n, k)`` it returns ``(n, 2)``: mean and standard deviation, in the unit of the
     surrogate. The result of a design does not depend on the others in the call.
 
-    On a `Piecewise` model the rules are split at the borders of the boxes (each piece is smooth);
-    this needs inputs that are not `Derived` (a border would then cut the rule askew): those take
-    `draws`.
-
     Parameters
     ----------
     design_names : sequence of str
@@ -107,22 +105,16 @@ class RobustObjective:
         Of inputs that vary together, independent draws of them all: (count, numpy Generator) to a mapping of str to
         array (count,).
 
-    Attributes
-    ----------
-    nodes : tuple of dict
-        For each model of the surrogate, the nodes of each random input.
-
     Raises
     ------
     InputError
-        A random input too wide for the tolerance, derived random
-        inputs on a piecewise model, a kernel that is no product of the inputs; and on a call, a
+        A random input too wide for the tolerance, a model that is no product over the inputs; and on a call, a
         support that leaves the surrogate's domain.
     """
 
     def __init__(
         self,
-        model: Surrogate,
+        model: Kriging | Piecewise,
         design_names: Sequence[str],
         random_inputs: Sequence[RandomVariable],
         *,
@@ -136,7 +128,6 @@ class RobustObjective:
         self.model = model
         self._wiring = Wiring(model.names, design_names, random_inputs, fixed or {}, derived)
         self._draws: Drawn | None = None
-        self._rules: tuple[TensorRule, ...] = ()
         self._joint = joint
         if callable(draws):
             self._draws = draws
@@ -152,24 +143,16 @@ class RobustObjective:
                 'use "monte-carlo"',
             )
         else:
-            self._rules = tuple(
-                TensorRule(leaf, model, self._wiring, tolerance, probes)  # type: ignore[arg-type]
-                for leaf in model.leaves
-            )
-        self.nodes = tuple(rule.counts for rule in self._rules)
+            (leaf,) = model.leaves
+            self._rule = TensorRule(leaf, self._wiring, tolerance, probes)  # type: ignore[arg-type]
 
     def __call__(self, designs: np.ndarray) -> np.ndarray:
         """Return mean and standard deviation of each design (n, k), shape (n, 2)."""
         designs = self._checked(designs)
         if self._draws is not None:
             return self._averaged(designs, self._draws(designs))
-        share, mean, variance = (np.zeros((len(self._rules), len(designs))) for _ in range(3))
-        for k, rule in enumerate(self._rules):
-            share[k], mean[k], variance[k] = rule.moments(designs)
-        share /= share.sum(axis=0)
-        total = (share * mean).sum(axis=0)
-        spread = (share * (variance + (mean - total) ** 2)).sum(axis=0)
-        return np.stack([total, np.sqrt(spread)], axis=1)
+        mean, variance = self._rule.moments(designs)
+        return np.stack([mean, np.sqrt(variance)], axis=1)
 
     def sampled(self, designs: np.ndarray, draws: Mapping[str, np.ndarray]) -> np.ndarray:
         """The surrogate at given draws of the random inputs, (s,) each, or (n, s): ``(n, s)``.
@@ -192,8 +175,8 @@ class RobustObjective:
     def closed_form(self, designs: np.ndarray) -> np.ndarray:
         """The same in error functions, ``(n, 2)``: one `Kriging` model, squared exponential, no derived inputs."""
         designs = self._checked(designs)
-        leaf, *others = self.model.leaves
-        simple = isinstance(leaf, Kriging) and leaf.separable and not others
+        leaf = self.model.leaves[0]
+        simple = isinstance(leaf, Kriging) and self.model.separable
         if not simple or self._wiring.derived or self._joint is not None:
             raise InputError(
                 "model",

@@ -16,7 +16,6 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.special import ndtr, roots_legendre
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import TAIL, Normal, Quantiles, Samples, Uniform, truncated_quantile
 
 FINE = 400
@@ -112,58 +111,6 @@ def _(law: Samples, centres: Array, length: float) -> Array:
     return whole / len(law.values)
 
 
-@singledispatch
-def pieces(law: Quantiles, count: int, lower: Array, upper: Array) -> Rule:
-    """Rules over the part of the span between bounds (n,): ``(n, count)`` nodes and weights.
-
-    The weights of a row add up to the probability of its part: 0 where the bounds leave nothing. The highest of some values
-    belongs to the piece that ends with it.
-
-    Raises
-    ------
-    InputError
-        If the law is known by its quantiles alone.
-    """
-    raise InputError("distribution", law, "has no density here", 'use "monte-carlo"')
-
-
-@pieces.register
-def _(law: Uniform, count: int, lower: Array, upper: Array) -> Rule:
-    places, weights = _legendre_between(law, count, lower, upper)
-    low, high = law.span
-    return places, weights * np.full(places.shape, 1.0 / (high - low))
-
-
-@pieces.register
-def _(law: Normal, count: int, lower: Array, upper: Array) -> Rule:
-    places, weights = _legendre_between(law, count, lower, upper)
-    bell = np.exp(-0.5 * np.square((places - law.middle) / law.deviation)) / sqrt(2 * pi)
-    return places, weights * (bell / (law.deviation * _mass(law)))
-
-
-@pieces.register
-def _(law: Samples, count: int, lower: Array, upper: Array) -> Rule:
-    rules = [_sampled_piece(law, count, *ends) for ends in zip(lower, upper, strict=True)]
-    return np.stack([one[0] for one in rules]), np.stack([one[1] for one in rules])
-
-
-def _legendre_between(law: Quantiles, count: int, lower: Array, upper: Array) -> Rule:
-    """The rules of a density of 1."""
-    low = np.maximum(lower, law.span[0])[:, None]
-    width = np.maximum(np.minimum(upper, law.span[1])[:, None] - low, 0.0)
-    nodes, weights = legendre(count)
-    return low + width * nodes, width * weights
-
-
-def _sampled_piece(law: Samples, count: int, lower: float, upper: float) -> Rule:
-    low, high = law.span
-    inside = tuple(x for x in law.values if lower <= x < upper or x == upper == high)
-    if not inside:
-        return np.full(count, np.clip(lower, low, high)), np.zeros(count)
-    nodes, weights = _sampled_rule(inside, count)
-    return nodes, weights * (len(inside) / len(law.values))
-
-
 @lru_cache(maxsize=64)
 def legendre(count: int) -> Rule:
     """Nodes and weights (they add up to 1) of the Gauss-Legendre rule on [0, 1]; read-only."""
@@ -174,9 +121,7 @@ def legendre(count: int) -> Rule:
     return nodes, weights
 
 
-def nodes_needed(
-    law: Quantiles, length: float, tolerance: float, most: int, *, by_pieces: bool = False
-) -> int:
+def nodes_needed(law: Quantiles, length: float, tolerance: float, most: int) -> int:
     """Fewest nodes that integrate every kernel, and every product of two, to `tolerance`.
 
     Second moments need the product of two kernels of length scale l, which is one of l / sqrt(2)
@@ -191,8 +136,6 @@ def nodes_needed(
         Absolute; the kernel itself is at most 1.
     most : int
         Where to give up.
-    by_pieces : bool
-        Whether for `pieces` instead of `rule`.
 
     Returns
     -------
@@ -203,12 +146,8 @@ def nodes_needed(
     low, high = law.span
     centres = np.linspace(low - 3 * narrow, high + 3 * narrow, 201)
     exact = kernel_integral(_inside(law) if isinstance(law, Normal) else law, centres, narrow)
-    ends = np.array([low]), np.array([high])
     for count in range(1, most + 1):
-        if by_pieces:
-            nodes, weights = (a[0] for a in pieces(law, count, *ends))
-        else:
-            nodes, weights = rule(law, count)
+        nodes, weights = rule(law, count)
         kernels = np.exp(-0.5 * ((nodes[:, None] - centres) / narrow) ** 2)
         if abs(weights @ kernels - exact).max() <= tolerance:
             return count

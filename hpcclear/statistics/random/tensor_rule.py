@@ -1,6 +1,5 @@
 """Tensor Gauss rules on a Kriging model: which nodes, and what of them can be made ready."""
 
-from collections.abc import Sequence
 from itertools import product
 from math import sqrt
 
@@ -8,12 +7,10 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.random.inputs import Group, Wiring, tensor
-from hpcclear.statistics.random.rules import nodes_needed, pieces, rule
+from hpcclear.statistics.random.rules import nodes_needed, rule
 from hpcclear.statistics.surrogate.kriging import Kriging
-from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import tensor_moments
 
-Surrogate = Kriging | Piecewise
 MOST_NODES = 48
 """For one random input; needing more means that it spans many length scales of the surrogate."""
 MOST_TENSOR = 200_000
@@ -26,13 +23,11 @@ class TensorRule:
     def __init__(
         self,
         leaf: Kriging,
-        model: Surrogate,
         wiring: Wiring,
         tolerance: float,
         probes: np.ndarray | None,
     ) -> None:
-        self.leaf, self.model, self.wiring = leaf, model, wiring
-        self.whole = len(model.leaves) == 1
+        self.leaf, self.wiring = leaf, wiring
         self.counts = self._choose(tolerance, probes)
         if np.prod([float(count) for count in self.counts.values()]) > MOST_TENSOR:
             raise InputError("random_inputs", self.counts, "too many nodes", 'use "monte-carlo"')
@@ -44,71 +39,45 @@ class TensorRule:
         self.sizes = np.array(sizes, dtype=np.int64)
         self.starts = np.cumsum([0, *(len(group.dims) for group in self.moving)])
         self.dims = np.array([dim for group in self.moving for dim in group.dims], dtype=np.int64)
-        self.share, self.steady, self.steady_shares = self._still()
+        self.steady, self.steady_shares = self._still()
 
-    def moments(self, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Probability of this model's box, mean and variance in it, ``(n,)`` each."""
+    def moments(self, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance, ``(n,)`` each."""
         leaf, count = self.leaf, len(designs)
-        share = np.full(count, self.share)
         places, shares = [], []
         for group in self.moving:
             at, weights = self._nodes(group, designs)
-            part = weights.sum(axis=1)
-            share = share * part
-            shares.append(weights / np.where(part > 0, part, 1.0)[:, None])
+            shares.append(weights)
             span = leaf.upper[list(group.dims)] - leaf.lower[list(group.dims)]
             unit = (at - leaf.lower[list(group.dims)]) / span
             places.append(unit.reshape(count, unit.shape[1] * unit.shape[2]))
-        mean, variance = np.zeros(count), np.zeros(count)
-        here = share > 0
-        if here.any():
-            found = tensor_moments(
-                np.concatenate(places, axis=1)[here],
-                np.concatenate(shares, axis=1)[here],
-                self.sizes,
-                self.starts,
-                self.dims,
-                self.steady,
-                self.steady_shares,
-                leaf.packed[0],
-                leaf.length_scales,
-            )
-            mean[here], variance[here] = leaf.mean + found[:, 0], found[:, 1]
-        return share, mean, variance
+        found = tensor_moments(
+            np.concatenate(places, axis=1),
+            np.concatenate(shares, axis=1),
+            self.sizes,
+            self.starts,
+            self.dims,
+            self.steady,
+            self.steady_shares,
+            leaf.packed[0],
+            leaf.length_scales,
+        )
+        return leaf.mean + found[:, 0], found[:, 1]
 
     def _nodes(self, group: Group, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places ``(n, N, D)`` of a group's nodes and their probabilities ``(n, N)``."""
-        axes = [self._axis(group, name, designs) for name in group.sources]
-        draws = dict(zip(group.sources, tensor([axis[0] for axis in axes]), strict=True))
+        rules = [rule(self.wiring.random[name].law, self.counts[name]) for name in group.sources]
+        nodes = tensor([places[None] for places, _ in rules])
         weights = np.ones((1, 1))
-        for part in tensor([axis[1] for axis in axes]):
+        for part in tensor([weights[None] for _, weights in rules]):
             weights = weights * part
+        draws = dict(zip(group.sources, nodes, strict=True))
         places = self.wiring.places(group.dims, designs, draws)
-        weights = np.broadcast_to(weights, places.shape[:2])
-        if not self.whole and not group.sources:
-            weights = weights * self._holds(group.dims, places[:, 0])[:, None]
-        return places, weights
+        return places, np.broadcast_to(weights, places.shape[:2])
 
-    def _axis(self, group: Group, name: str, designs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes and weights of one random input: of all of it, or of the part in this box."""
-        one, count = self.wiring.random[name], self.counts[name]
-        if self.whole:
-            nodes, weights = rule(one.law, count)
-            return nodes[None], weights[None]
-        (dim,) = group.dims
-        offset = designs[:, self.wiring.column[name]] if one.about_design else np.zeros(1)
-        ends = (self.leaf.lower[dim] - offset, self.leaf.upper[dim] - offset)
-        return pieces(one.law, count, *ends)
-
-    def _holds(self, dims: Sequence[int], places: np.ndarray) -> np.ndarray:
-        """Whether inputs that do not scatter lie in this box; a border belongs to the upper one."""
-        low, high = self.leaf.lower[list(dims)], self.leaf.upper[list(dims)]
-        first, last = self.model.lower[list(dims)] == low, self.model.upper[list(dims)] == high
-        return (((places >= low) | first) & ((places < high) | last)).all(axis=1)
-
-    def _still(self) -> tuple[float, np.ndarray, np.ndarray]:
-        """Probability, kernel rows times weights, and node probabilities of what never moves."""
-        leaf, share = self.leaf, 1.0
+    def _still(self) -> tuple[np.ndarray, np.ndarray]:
+        """Kernel rows times weights, and node probabilities of what never moves."""
+        leaf = self.leaf
         scaled, weights = leaf.packed
         rows, shares = weights[None], np.ones(1)
         for group in self.wiring.groups:
@@ -119,13 +88,11 @@ class TensorRule:
             unit = (places[0] - leaf.lower[dims]) / (leaf.upper[dims] - leaf.lower[dims])
             steps = (unit / leaf.length_scales[dims])[:, :, None] - scaled[dims]
             kernels = np.exp(-0.5 * np.square(steps).sum(axis=1))
-            share *= float(chances.sum())
-            chance = chances[0] / chances.sum() if chances.sum() > 0 else chances[0]
             rows = (rows[:, None, :] * kernels).reshape(-1, scaled.shape[1])
-            shares = (shares[:, None] * chance).ravel()
+            shares = (shares[:, None] * chances[0]).ravel()
         missing = -len(rows) % 4
         rows = np.concatenate([rows, np.zeros((missing, rows.shape[1]))])
-        return share, rows, np.concatenate([shares, np.zeros(missing)])
+        return rows, np.concatenate([shares, np.zeros(missing)])
 
     def _choose(self, tolerance: float, probes: np.ndarray | None) -> dict[str, int]:
         """Nodes of each random input."""
@@ -140,11 +107,6 @@ class TensorRule:
                         float(lengths[group.dims[0]]),
                         tolerance,
                         MOST_NODES,
-                        by_pieces=not self.whole,
-                    )
-                elif not self.whole:
-                    raise InputError(
-                        name, None, "derived on a piecewise model", 'use "monte-carlo"'
                     )
                 else:
                     counts[name] = self._probed(group, name, lengths, tolerance, probes)

@@ -47,11 +47,6 @@ class ConvergenceIntervals:
     uncertainty: Array
     """sensitivity and uncertainty, shape (c, d): there, in units of f per unit of the variable; the uncertainty holds the
     standard error and the truncation that may be left. NaN where not determined."""
-    converged: Booleans
-    """Shape (k, c, d): the convergence interval and all shorter ones."""
-    confidence: float
-    tolerance: float
-    """confidence and tolerance: the rule's settings."""
 
 
 def convergence_intervals(
@@ -71,7 +66,7 @@ def convergence_intervals(
     -------
     ConvergenceIntervals
     """
-    n_steps, *shape = history.sensitivity.shape
+    _, *shape = history.sensitivity.shape
     interval, plateau = np.full((2, *shape), -1, np.int64)
     estimate = np.full((2, *shape), np.nan)
     lengths = np.ptp(history.intervals[:, 0], axis=1)
@@ -89,18 +84,7 @@ def convergence_intervals(
         if at is not None:
             interval[c, j] = usable[at]
             estimate[:, c, j] = slope[at], uncertainty[at]
-    found = interval >= 0
-    later = np.arange(n_steps)[:, np.newaxis, np.newaxis] >= interval
-    return ConvergenceIntervals(
-        found=found,
-        interval=interval,
-        plateau=plateau,
-        sensitivity=estimate[0],
-        uncertainty=estimate[1],
-        converged=found & later,
-        confidence=confidence,
-        tolerance=tolerance,
-    )
+    return ConvergenceIntervals(interval >= 0, interval, plateau, *estimate)
 
 
 def best_estimates(

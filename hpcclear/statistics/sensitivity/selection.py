@@ -22,14 +22,14 @@ its own, and being selected in one is enough.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from hpcclear.base.arrays import Array, Booleans, Integers
+from hpcclear.base.arrays import Array, Booleans
 
 
 class Influence(IntEnum):
@@ -40,26 +40,15 @@ class Influence(IntEnum):
     INFLUENTIAL = 2
 
 
-@dataclass(frozen=True)
-class Selection:
+class Selection(NamedTuple):
     """Ranking and selection; m columns, each a variable in a surface."""
 
-    names: tuple[str, ...]
-    """Variable of each column."""
     effect: Array
-    effect_error: Array
-    """effect and effect_error, shape (c, m): magnitude of the derivative times the interval length, and its standard error,
-    in the unit of f."""
+    """Shape (c, m): magnitude of the derivative times the interval length, in the unit of f."""
     influence: NDArray[np.int8]
     """Shape (c, m): `Influence` at each clearance."""
-    rank: Integers
-    """Shape (c, m): 1 for the largest effect; 0 without an estimate."""
-    share: Array
-    """Shape (m,): share of the clearances with an estimate at which the column is influential; NaN if none."""
     selected: tuple[str, ...]
     """X_G-I, each name once, the largest mean relative effect first."""
-    order_stable: bool
-    """No two columns change their order from one clearance to another by more than z standard errors at both."""
 
 
 def select_influential(
@@ -109,16 +98,7 @@ def select_influential(
     reached = _mean_known(influence == Influence.INFLUENTIAL, known)
     relative = _mean_known(effect / np.where(largest > 0.0, largest, np.nan), known)
     order = [j for j in np.argsort(-relative, kind="stable") if reached[j] >= share]
-    return Selection(
-        names=tuple(names),
-        effect=effect,
-        effect_error=effect_error,
-        influence=influence,
-        rank=np.where(known, _ranks(effect), 0),
-        share=reached,
-        selected=tuple(dict.fromkeys(names[j] for j in order)),
-        order_stable=_order_stable(effect, margin),
-    )
+    return Selection(effect, influence, tuple(dict.fromkeys(names[j] for j in order)))
 
 
 def _mean_known(quantity: NDArray[np.generic], known: Booleans) -> Array:
@@ -126,16 +106,3 @@ def _mean_known(quantity: NDArray[np.generic], known: Booleans) -> Array:
     counts = np.count_nonzero(known, axis=0)
     usable = np.where(known & np.isfinite(quantity), quantity, 0.0)
     return np.asarray(usable.sum(axis=0) / np.where(counts > 0, counts, np.nan))
-
-
-def _ranks(effect: Array) -> Integers:
-    """Place of each column at each clearance, 1 for the largest, NaN last."""
-    order = np.argsort(-effect, axis=1, kind="stable")
-    return np.argsort(order, axis=1, kind="stable") + 1
-
-
-def _order_stable(effect: Array, margin: Array) -> bool:
-    lead = effect[:, :, np.newaxis] - effect[:, np.newaxis, :]
-    allowed = np.hypot(margin[:, :, np.newaxis], margin[:, np.newaxis, :])
-    ahead = (lead > allowed).any(axis=0)
-    return not bool((ahead & ahead.T).any())

@@ -45,7 +45,6 @@ class SobolIndices:
     n_dropped: int
     """n_rows and n_dropped: rows (d + 2 simulations each) that counted, and rows dropped whole because a simulation in them
     failed. Dropping leaves that corner of the box out: many of them are a warning."""
-    confidence: float
 
 
 def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Array:
@@ -77,22 +76,13 @@ def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Ar
     return np.vstack([a, b, *mixed])
 
 
-def analyse_sobol(
-    values: ArrayLike,
-    n_inputs: int,
-    rng: np.random.Generator | None = None,
-    *,
-    confidence: float = 0.95,
-    n_resamples: int = 0,
-) -> SobolIndices:
+def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95) -> SobolIndices:
     """Indices from the values at the points of `sobol_design`.
 
     Parameters
     ----------
     values : array_like, shape (n_rows * (n_inputs + 2),)
         Those that are not finite are failed simulations; their rows are dropped and counted.
-    rng, n_resamples
-        Accepted and not used: nothing is resampled.
     confidence : float
         Of the intervals, in (0, 1).
 
@@ -130,7 +120,6 @@ def analyse_sobol(
         variance=float(y[:2].var()),
         n_rows=y.shape[1],
         n_dropped=n_dropped,
-        confidence=confidence,
     )
 
 

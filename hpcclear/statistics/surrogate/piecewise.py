@@ -87,8 +87,8 @@ class Piecewise:
 
     @property
     def separable(self) -> bool:
-        """Whether moments have tensor rules."""
-        return all(leaf.separable for leaf in self.leaves)
+        """Whether moments have a tensor rule: not where the model jumps between boxes."""
+        return len(self.leaves) == 1 and self.leaves[0].separable
 
     def predict(self, points: np.ndarray) -> np.ndarray:
         """Values at ``(n, d)`` points, each by its box's model; InputError outside the domain."""

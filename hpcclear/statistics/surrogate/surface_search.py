@@ -1,6 +1,6 @@
 """The search for a response surface that is accurate enough (section 4.2, step 1)."""
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,47 +8,12 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate import response_surface as surfaces
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.response_surface import ResponseSurface
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One surface that was tried: its order, the points it had, and what came of it.
-
-    `accuracy` is None where no surface could be fitted; `note` then says why.
-    """
-
-    order: int
-    n_points: int
-    accuracy: Accuracy | None
-    note: str
-
-
-@dataclass(frozen=True)
-class SurfaceSearch:
-    """Outcome of a `search`.
-
-    Attributes
-    ----------
-    surface : ResponseSurface
-        The accepted surface, or the one with the least RMSE on the test points if none was.
-    accuracy : Accuracy
-        Its accuracy on the test points.
-    accepted : bool
-        Whether it met the targets.
-    reason : str
-        The verdict in one sentence.
-    attempts : tuple of Attempt
-        Everything that was tried, in order.
-    """
-
-    surface: ResponseSurface
-    accuracy: Accuracy
-    accepted: bool
-    reason: str
-    attempts: tuple[Attempt, ...]
+from hpcclear.statistics.surrogate.response_surface import (
+    ResponseSurface,
+    fit_response_surface,
+    latin_hypercube,
+)
 
 
 @dataclass(frozen=True)
@@ -64,116 +29,108 @@ class SearchSettings:
     chosen: bool = False  # whether surfaces choose their terms (`fit_response_surface`)
 
 
-Search = Generator[Array, Array, SurfaceSearch]
-"""A search under way: yields points, shape (n, d), and is sent the true function there, (n,)."""
-
-
-def fit_until_accepted(
-    evaluate: Callable[[Mapping[int, Array]], Mapping[int, Array]], searches: Sequence[Search]
-) -> list[SurfaceSearch]:
-    """Carry out searches in one batch: what all of them request is evaluated at once, round by round.
-
-    Parameters
-    ----------
-    evaluate : callable
-        From points by number of the search to values.
-    searches : sequence of `search`
-
-    Raises
-    ------
-    InputError
-        As `search`.
-    """
-    found: dict[int, SurfaceSearch] = {}
-    asked = {number: next(one) for number, one in enumerate(searches)}
-    while asked:
-        values, more = evaluate(asked), {}
-        for number in asked:
-            try:
-                more[number] = searches[number].send(values[number])
-            except StopIteration as ended:
-                found[number] = ended.value
-        asked = more
-    return [found[number] for number in range(len(searches))]
-
-
-def search(
-    bounds: ArrayLike,
-    rng: np.random.Generator,
-    settings: SearchSettings,
-    sample: surfaces.Sampler = surfaces.latin_hypercube,
-) -> Search:
-    """Raise the sample or change the order until a surface passes, or say that none does.
+class SurfaceSearch:
+    """The search for one surface.
 
     At each sample size the orders are tried as listed and the first that passes is taken (section
     4.2, step 1: 45 points, 5 test points, a cubic). If none does, the sample is doubled by new
     points, up to `max_points`. The test points are drawn once and never trained on: fresh ones in
     each round would let a poor surface pass by luck.
 
+    Attributes
+    ----------
+    best : (ResponseSurface, Accuracy) or None
+        The accepted surface, or the one with the least RMSE on the test points if none was, and its accuracy on these.
+    accepted : bool
+        Whether it met the targets.
+    """
+
+    def __init__(
+        self, bounds: ArrayLike, rng: np.random.Generator, settings: SearchSettings
+    ) -> None:
+        self._bounds, self._rng, self._settings = np.asarray(bounds, float), rng, settings
+        self._test = latin_hypercube(settings.n_test, self._bounds, rng)
+        self._true: Array | None = None
+        self._points, self._values = np.empty((0, len(self._bounds))), np.empty(0)
+        self._refusal: InputError | None = None
+        self.best: tuple[ResponseSurface, Accuracy] | None = None
+        self.accepted = False
+
+    @property
+    def over(self) -> bool:
+        """Whether no more points are needed, or allowed."""
+        return self.accepted or len(self._points) >= self._settings.max_points
+
+    def wanted(self) -> Array:
+        """Points (n, d) to evaluate next: the test points first."""
+        if self._true is None:
+            return self._test
+        count = len(self._points)
+        more = min(count or self._settings.n_points, self._settings.max_points - count)
+        fresh = latin_hypercube(more, self._bounds, self._rng)
+        self._points = np.vstack([self._points, fresh])
+        return fresh
+
+    def take(self, values: Array) -> None:
+        """Take the true function (n,) at the points that were wanted; raises InputError as `fit_until_accepted`."""
+        if self._true is not None:
+            self._values = np.append(self._values, values)
+            self._try()
+            return
+        self._true = values
+        if np.count_nonzero(np.isfinite(values)) < 2:  # before anything is spent on training
+            raise InputError(
+                "test points",
+                len(values),
+                "fewer than two of them have a finite value",
+                "use more test points or correct the failing simulations",
+            )
+
+    def _try(self) -> None:
+        settings = self._settings
+        for order in settings.orders:
+            try:
+                surface = fit_response_surface(
+                    self._points, self._values, self._bounds, order, chosen=settings.chosen
+                )
+            except InputError as refusal:
+                self._refusal = refusal
+                continue
+            assert self._true is not None  # the test points come first
+            reached = accuracy(self._true, surface.predict(self._test))
+            self.accepted = reached.meets(settings.r2_min, settings.rmae_max)
+            if self.accepted or self.best is None or reached.rmse < self.best[1].rmse:
+                self.best = surface, reached
+            if self.accepted:
+                return
+        if self.over and self.best is None:
+            raise InputError(
+                "surrogate",
+                tuple(settings.orders),
+                f"no surface could be fitted: {self._refusal}",
+                "raise max_points, lower the orders, or correct the failing simulations",
+            )
+
+
+def fit_until_accepted(
+    evaluate: Callable[[Mapping[int, Array]], Mapping[int, Array]],
+    searches: Sequence[SurfaceSearch],
+) -> None:
+    """Carry out searches in one batch: what all of them request is evaluated at once, round by round.
+
     Parameters
     ----------
-    bounds : array_like, shape (d, 2)
-    sample : callable
-        ``sample(n, bounds, rng)`` -> points of shape (n, d).
-
-    Returns
-    -------
-    SurfaceSearch
+    evaluate : callable
+        From points by number of the search to values.
+    searches : sequence of SurfaceSearch
+        They know the surfaces afterwards.
 
     Raises
     ------
     InputError
         If no order can be fitted at any allowed sample, or fewer than two test values are finite.
     """
-    limits = np.asarray(bounds, float)
-    orders, targets = settings.orders, (settings.r2_min, settings.rmae_max)
-    test = sample(settings.n_test, limits, rng)
-    true = _test_values((yield test))
-    attempts: list[Attempt] = []
-    best: tuple[ResponseSurface, Accuracy] | None = None
-    points, values = np.empty((0, len(limits))), np.empty(0)
-    while len(points) < settings.max_points:
-        # doubled each time by new points
-        more = min(len(points) or settings.n_points, settings.max_points - len(points))
-        fresh = sample(more, limits, rng)
-        points, values = np.vstack([points, fresh]), np.append(values, (yield fresh))
-        for order in orders:
-            try:
-                surface = surfaces.fit_response_surface(
-                    points, values, limits, order, chosen=settings.chosen
-                )
-            except InputError as refusal:
-                attempts.append(Attempt(order, len(points), None, str(refusal)))
-                continue
-            reached = accuracy(true, surface.predict(test))
-            attempts.append(Attempt(order, len(points), reached, ""))
-            if reached.meets(*targets):
-                reason = f"order {order} on {len(points)} points meets the targets"
-                return SurfaceSearch(surface, reached, True, reason, tuple(attempts))
-            if best is None or reached.rmse < best[1].rmse:
-                best = surface, reached
-    if best is None:
-        raise InputError(
-            "surrogate",
-            tuple(orders),
-            f"no surface could be fitted: {attempts[-1].note}",
-            "raise max_points, lower the orders, or correct the failing simulations",
-        )
-    reason = (
-        f"no order of {tuple(orders)} reaches R2 >= {targets[0]:g} and RMAE <= {targets[1]:g} "
-        f"with up to {attempts[-1].n_points} points; the best has R2 = {best[1].r2:.3g}, "
-        f"RMAE = {best[1].rmae:.3g}"
-    )
-    return SurfaceSearch(*best, False, reason, tuple(attempts))
-
-
-def _test_values(values: Array) -> Array:
-    """The test values, refused before anything is spent on training if most of them failed."""
-    if np.count_nonzero(np.isfinite(values)) < 2:
-        raise InputError(
-            "test points",
-            len(values),
-            "fewer than two of them have a finite value",
-            "use more test points or correct the failing simulations",
-        )
-    return values
+    while going := {number: one for number, one in enumerate(searches) if not one.over}:
+        values = evaluate({number: one.wanted() for number, one in going.items()})
+        for number, one in going.items():
+            one.take(values[number])

@@ -15,6 +15,7 @@ import warnings
 from itertools import product
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
@@ -84,10 +85,9 @@ def least_points(n_inputs: int) -> int:
 
 
 def _or_all(
-    z: Array, values: Array, order: int, least: float, chosen: list[Term]
+    z: Array, values: Array, order: int, least: float, best: Integers
 ) -> tuple[Integers, float]:
     """The chosen terms, whose mean square error is given, or all up to an order, if their own error is less; with the error."""
-    best = np.array(chosen, dtype=np.int64)
     for whole in range(2, order + 1):
         if n_terms(z.shape[1], whole) >= len(z):
             break
@@ -101,33 +101,51 @@ def _or_all(
 
 def _followed(
     z: Array, values: Array, order: int, train: Booleans
-) -> tuple[list[list[Term]], list[float]]:
-    """Terms after each step along the path of the training points, and the mean square error on the others."""
+) -> tuple[list[Integers], list[float]]:
+    """Terms after each step along the path of the training points, and the mean square error on the others, if any."""
     known = exponents_up_to(z.shape[1], 1)
     most = min(int(MOST_SHARE * train.sum()), MOST_TERMS)
-    surface = _Grown(values, train, most)
-    for term in known:
-        surface.add(tuple(term), z)
-    terms, errors = [list(surface.terms)], [surface.error()]
-    if surface.is_exact():
-        return terms, errors
-    for term in _path(z[train], surface.residual[train], known, order, most - len(known)):
-        for part in _parts(term):
-            surface.add(part, z)
-        terms.append(list(surface.terms))
-        errors.append(surface.error())
-        if surface.is_exact() or len(surface.terms) == most:
+    terms = dict.fromkeys(map(tuple, known.tolist()))  # in their order
+    counts = [len(known)]
+    for product_of in _path(z[train], values[train], known, order, most - len(known)):
+        terms |= dict.fromkeys(_parts(product_of))
+        counts.append(min(len(terms), most))
+        if len(terms) >= most:
             break
-    return terms, errors
+    found = np.array(list(terms))[:most]
+    table = monomials(z, found)
+    basis, factor = np.linalg.qr(table[train])
+    while (lost := _dependent(table[train], factor)).any():
+        first = int(lost.argmax())
+        found, table = (np.delete(one, first, axis) for one, axis in ((found, 0), (table, 1)))
+        counts = [count - (count > first) for count in counts]
+        basis, factor = np.linalg.qr(table[train])
+    # the fit by the first k columns of an orthonormal basis is the sum of its first k parts
+    parts = solve_triangular(factor.T, table.T, lower=True).T * (basis.T @ values[train])
+    squares = (values[:, None] - np.cumsum(parts, axis=1)) ** 2
+    rounding = train.sum() * (ROUNDING * np.abs(values).max()) ** 2
+    exact = [k for k, count in enumerate(counts) if squares[train, count - 1].sum() <= rounding]
+    counts = counts[: exact[0] + 1] if exact else counts  # nothing is left to follow
+    others = squares[~train]
+    errors = [float(others[:, count - 1].sum() / max(len(others), 1)) for count in counts]
+    return [found[:count] for count in counts], errors
 
 
-def _path(z: Array, left: Array, known: Integers, order: int, steps: int) -> list[Term]:
-    """Further terms by least angle regression, in their order; left (n,) is what the known ones leave of the values."""
+def _dependent(table: Array, factor: Array) -> Booleans:
+    """Columns of a table that, beyond what those before them say, are nearly nothing, by its triangular factor."""
+    return np.abs(np.diag(factor)) <= DEPENDENT * np.linalg.norm(table, axis=0)
+
+
+def _path(z: Array, values: Array, known: Integers, order: int, steps: int) -> list[Term]:
+    """Further terms by least angle regression, in their order; values (n,) are followed as far as known terms leave them."""
     from sklearn.exceptions import ConvergenceWarning  # loading it takes a second
     from sklearn.linear_model import lars_path
 
     further = exponents_up_to(z.shape[1], order)[len(known) :]
     basis, _ = np.linalg.qr(monomials(z, known))
+    left = values - basis @ (basis.T @ values)
+    if left @ left <= len(values) * (ROUNDING * np.abs(values).max()) ** 2:
+        return []
     columns = _legendre(z, further)
     whole = np.linalg.norm(columns, axis=0)
     columns -= basis @ (basis.T @ columns)
@@ -153,41 +171,3 @@ def _legendre(z: Array, degrees: Integers) -> Array:
 def _parts(degrees: Term) -> list[Term]:
     """Monomials that make up a product of Legendre polynomials: each is even or odd."""
     return list(product(*(range(degree, -1, -2) for degree in degrees)))
-
-
-class _Grown:
-    """A least-squares surface that takes in term by term, fitted to training points and known at all."""
-
-    def __init__(self, values: Array, train: Booleans, most: int) -> None:
-        self.terms: list[Term] = []
-        self.residual = np.array(values, dtype=np.float64)
-        self._train = train
-        self._basis = np.empty((len(values), most))  # orthonormal over the training points
-        self._rounding = train.sum() * (ROUNDING * np.abs(values).max()) ** 2
-
-    def add(self, term: Term, z: Array) -> None:
-        """Take in a term, unless it is there, the limit is reached, or the training points do not determine it."""
-        if term in self.terms or len(self.terms) == self._basis.shape[1]:
-            return
-        column = monomials(z, np.array([term]))[:, 0]
-        known, train = self._basis[:, : len(self.terms)], self._train
-        whole = np.linalg.norm(column[train])
-        for _ in range(2):  # once leaves rounding errors
-            column = column - known @ (known[train].T @ column[train])
-        own = np.linalg.norm(column[train])
-        if own <= DEPENDENT * whole:
-            return
-        column /= own
-        self._basis[:, len(self.terms)] = column
-        self.residual -= column * (column[train] @ self.residual[train])
-        self.terms.append(tuple(int(power) for power in term))
-
-    def is_exact(self) -> bool:
-        """Whether nothing but rounding is left at the training points."""
-        left = self.residual[self._train]
-        return bool(left @ left <= self._rounding)
-
-    def error(self) -> float:
-        """Mean square error at the other points; 0 if there are none."""
-        others = self.residual[~self._train]
-        return float(others @ others / max(len(others), 1))
