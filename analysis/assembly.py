@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from hpcclear.base.jit import FASTMATH
 from hpcclear.base.lowering.compiled import assembly_of, optimised_module
-from hpcclear.base.one_text import one_text
 from hpcclear.dynamics.layout import Effects
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.rhs import KINDS
@@ -108,5 +107,6 @@ def force_evaluation(problem: Problem, width: int) -> str:
 
 @cache
 def _compiled(linkage: Linkage, effects: Effects, width: int) -> str:
-    text = one_text(linkage.module(effects).motion, f"motion_{width}", effects=effects, W=width)
-    return assembly_of(optimised_module(text, KINDS, FASTMATH))
+    motion = linkage.module(effects).motion
+    module = optimised_module(motion, KINDS, FASTMATH, "motion", effects=effects, W=width)
+    return assembly_of(module)

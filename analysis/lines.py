@@ -61,8 +61,8 @@ FEATURES = {
         "study/loads.py scene/loads.py",
     "implicit steps of stiff samples":
         "dynamics/stepping/implicit/* dynamics/implicit/* base/eight.py",
-    "the compiler's text, cache and widths":
-        "base/lowering/* base/text/* base/one_text.py base/cached.py base/code_folder.py base/width.py base/bits.py "
+    "compiling, its cache and widths":
+        "base/lowering/* base/generated.py base/cached.py base/code_folder.py base/width.py base/bits.py "
         "base/jit.py base/unrolled.py base/numbered.py ensemble/compiling.py base/hashing.py",
     "error against run time, plans of jobs":
         "accuracy/* cli/accuracy.py cli/plan.py cli/commands/accuracy.py "

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.jit import FASTMATH
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import kind_of
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.layout import RATES, START, START_CONTACTS
@@ -35,6 +38,11 @@ SCENES = {
     "oil": [f"joints.crank_rod.{FILM}", f"joints.rod_slider.{FILM}"],
     "always": ["numerics.method='radau'"],
 }
+
+
+def compiled(function, *arguments) -> None:
+    """Call a function of the kernel by its machine code."""
+    Compiled(function, kind_of(arguments).parts, FASTMATH)(*arguments)
 
 
 def scene_of(name: str) -> Scene:
@@ -116,8 +124,8 @@ def test_inverses_of_eight_matrices(n: int):
     place(mem.REAL)[:] = np.moveaxis(real, 0, 2)
     place(mem.COMPLEX_RE)[:] = np.moveaxis(real, 0, 2)
     place(mem.COMPLEX_IM)[:] = np.moveaxis(imaginary, 0, 2)
-    invert_real(n, m, mem.REAL)
-    invert_complex(n, m, mem.COMPLEX_RE, mem.COMPLEX_IM)
+    compiled(invert_real, n, m, mem.REAL)
+    compiled(invert_complex, n, m, mem.COMPLEX_RE, mem.COMPLEX_IM)
     both = np.moveaxis(place(mem.COMPLEX_RE) + 1j * place(mem.COMPLEX_IM), 2, 0)
     unit = np.broadcast_to(np.eye(n), real.shape)
     np.testing.assert_allclose(np.moveaxis(place(mem.REAL), 2, 0) @ real, unit, atol=1e-9)
@@ -130,7 +138,7 @@ def test_one_singular_matrix_spoils_no_other():
     for k in range(2):
         held[mem.REAL + k * mem.N + k] = 2.0
     held[mem.REAL + mem.N + 1, 5] = 0.0
-    invert_real(2, m, mem.REAL)
+    compiled(invert_real, 2, m, mem.REAL)
     found = held[mem.REAL + mem.N + 1]
     assert not np.isfinite(found[5])
     assert (np.delete(found, 5) == 0.5).all()

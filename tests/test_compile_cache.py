@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from patience import crowded
 
-from hpcclear.base import cached, code_folder, host, kept, one_text
+from hpcclear.base import cached, code_folder, host, kept
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "analysis"))
 from compile_cache import KINDS, damaged
@@ -42,36 +42,29 @@ def test_whatever_a_file_holds_it_is_whole_or_dropped(tmp_path, said, kind):
 
 @pytest.fixture
 def compiled(tmp_path, monkeypatch):
-    """A function from a generated text and one of a module, each loaded or compiled anew: their values, and the loaded ones."""
+    """Two functions, each loaded or compiled anew: their values, and how many were loaded."""
     monkeypatch.setattr(cached, "chosen_folder", lambda: str(tmp_path / "cache"))
-    monkeypatch.setattr(one_text, "_folder", lambda: tmp_path / "cache" / "texts")
-    monkeypatch.setattr(sys, "dont_write_bytecode", False)
-    monkeypatch.setattr(sys, "pycache_prefix", None)
-    (tmp_path / "cache" / "texts").mkdir(parents=True)
-    (tmp_path / "module.py").write_text("def twice(x):\n    return 2.0 * x\n")
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "module.py").write_text(
+        "def twice(x):\n    return 2.0 * x\n\n\ndef thrice(x):\n    return 3.0 * x\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
-    plain = importlib.import_module("module").twice
+    module = importlib.import_module("module")
 
     def load():
-        for name in [name for name in sys.modules if name.startswith("hpcclear_texts")]:
-            monkeypatch.delitem(sys.modules, name)
-        text = one_text.module_of("text", lambda: "def thrice(x):\n    return 3.0 * x\n")
-        functions = [cached.cached(one) for one in (plain, text.thrice)]
+        functions = [cached.cached(one) for one in (module.twice, module.thrice)]
         values = [function(1.0) for function in functions]
         return values, sum(sum(one.stats.cache_hits.values()) for one in functions)
 
     yield load
     sys.modules.pop("module")
-    for name in [name for name in sys.modules if name.startswith("hpcclear_texts")]:
-        sys.modules.pop(name)
 
 
 def test_a_damaged_file_of_any_sort_is_made_again_and_that_is_said(tmp_path, compiled, said):
-    """Machine code, generated source and its byte code."""
     assert compiled() == ([2.0, 3.0], 0)
     assert compiled() == ([2.0, 3.0], 2)
     files = sorted(path for path in (tmp_path / "cache").rglob("*") if path.is_file())
-    assert sorted(path.suffix for path in files) == [".code", ".code", ".py", ".pyc"]
+    assert sorted(path.suffix for path in files) == [".code", ".code"]
     rng = random.Random(4)
     for path in files:
         for kind in KINDS:

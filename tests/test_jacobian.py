@@ -5,6 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpcclear.base.jit import FASTMATH
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import kind_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.setup.parameters import parameters
@@ -62,8 +65,8 @@ def differentiate(problem: Problem, m: np.ndarray) -> None:
     """Evaluate the stages, and the Jacobians at the middle one."""
     motion = problem.motion(problem.effects, COLUMNS).address
     moved = Moved(0, motion, problem.coordinates, problem.tables)
-    evaluate_stages(moved, m)
-    new_jacobian(moved, m)
+    for function in (evaluate_stages, new_jacobian):
+        Compiled(function, kind_of((moved, m)).parts, FASTMATH)(moved, m)
 
 
 @pytest.mark.parametrize("name", TOPOLOGIES)

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numba import njit
 from running import scene_with
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import FASTMATH, lane_function
-from hpcclear.base.one_text import one_text
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import kind_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.setup.problem import problem_of
@@ -38,9 +38,6 @@ def last_stage_and_error(n, effects, work, room, par, weights, atol, stages, W):
 def test_a_stage_and_its_error_reach_every_coordinate(n: int, pair: tab.Tableau):
     """Of any number of coordinates, once each, and no number beside them is touched."""
     s = pair.stages - 1
-    text = one_text(last_stage_and_error, "both", W=W, stages=pair.stages)
-    both = njit(error_model="numpy", fastmath=FASTMATH)(text)
-
     rng = np.random.default_rng(n)
     work, par = rng.normal(size=(at.WORK, W)), np.ones((at.PARAMETERS, W))
     room, atol = (
@@ -51,7 +48,9 @@ def test_a_stage_and_its_error_reach_every_coordinate(n: int, pair: tab.Tableau)
     work[at.STEP] = 1e-2
     work[at.STRICTER] = 4.0
     before = work.copy()
-    both(n, NONE_OPEN, work.ravel(), room.ravel(), par.ravel(), pair.packed(), atol.ravel())
+    given = n, NONE_OPEN, *(one.ravel() for one in (work, room, par, pair.packed(), atol))
+    known = {"W": W, "stages": pair.stages}
+    Compiled(last_stage_and_error, kind_of(given).parts, FASTMATH, **known)(*given)
     h = before[at.STEP]
     q, v, a = (before[row : row + n] for row in (at.Q, at.V, at.ACC))
     stages[s - 1] = a  # the latest, put away on the way

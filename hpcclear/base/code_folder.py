@@ -26,14 +26,8 @@ def _compiled_sources(root: Path) -> list[Path]:
     kernel = ("layout", "physics", "contacts", "linkage", "stepping")
     parts = {path for room in kernel for path in (root / "dynamics" / room).rglob("*.py")}
     parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
-    parts |= set((root / "base" / "text").glob("*.py"))
-    return sorted(
-        parts
-        | {
-            root / "base" / name
-            for name in ("numbered.py", "one_text.py", "outcome.py", "unrolled.py")
-        }
-    )
+    names = ("numbered.py", "outcome.py", "unrolled.py")
+    return sorted(parts | {root / "base" / name for name in names})
 
 
 def _compiles(source: bytes) -> bool:

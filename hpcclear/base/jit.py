@@ -73,7 +73,7 @@ _apart: set[Any] = set()
 
 
 def written_kind(function: object) -> str | None:
-    """Whether `one_text` writes calls of a function out, and in which texts: "lane", "scalar" or None."""
+    """Whether calls of a function are written out, and in functions of which kind: "lane", "scalar" or None."""
     return _written.get(function) if isinstance(function, Hashable) else None
 
 
@@ -90,10 +90,10 @@ def stands_apart(function: object) -> bool:
 
 
 def apart(compiled: object) -> Any:
-    """Leave a function a function of its own beside the text; to stand above the decorator that compiles.
+    """Have a function optimised on its own before it is inlined; to stand above the decorator that compiles.
 
     For sums of products: which of two products is fused with their sum goes by the order the compiler has put them in, and
-    a function of its own is looked at before it is inlined, whatever stands around it. Without this a sum may come out
+    a function of its own is looked at whatever stands around its calls. Without this a sum may come out
     another way in one scene than in the next, in the last bit.
     """
     _apart.add(compiled)

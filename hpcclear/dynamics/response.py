@@ -14,7 +14,6 @@ from hpcclear.base.objectives import Objective, asked
 from hpcclear.base.outcome import STEADY, WIDEST, Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.evaluator import (
-    DEFAULT_LANES,
     alone,
     impacts_reported,
     outcome_records,
@@ -162,9 +161,9 @@ def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
         return None
     problem = problem_of(scene)
     kinds = (problem.effects, effects_of(scene, series=True, energies=True, impacts=True))
-    texts = [problem.motion_text(effects, DEFAULT_LANES) for effects in kinds]
+    motions = [(problem.linkage.module(effects).__name__, effects) for effects in kinds]
     settings = problem.settings().rows.tobytes()
-    return (*texts, settings, problem.tables.tobytes(), problem.tableau.packed().tobytes())
+    return (*motions, settings, problem.tables.tobytes(), problem.tableau.packed().tobytes())
 
 
 Found = tuple[Array, dict[str, Any], Records]

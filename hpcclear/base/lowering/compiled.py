@@ -1,6 +1,7 @@
 """Lowered functions as machine code: optimised by LLVM, kept on disk, called by their addresses or from Python."""
 
 import ctypes
+import linecache
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,8 +13,8 @@ from numba.core.registry import cpu_target
 from hpcclear.base import kept
 from hpcclear.base.cached import features_in_use
 from hpcclear.base.code_folder import chosen_folder, source_key
-from hpcclear.base.lowering.statements import Function
-from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind, flat, types_of
+from hpcclear.base.lowering.statements import Function, definition_of
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind, flat, kind_of, types_of
 
 
 def _target() -> Any:
@@ -105,10 +106,14 @@ def _optimised(written: ir.Module, called: Sequence[Any]) -> Any:
     return module
 
 
-def optimised_module(function: Any, kinds: Sequence[Kind], flags: Any) -> Any:
-    """Return the optimised code of a function, which `str` shows; arguments as of `Compiled`."""
-    name = function.__name__
-    return _Program(name).code(function, kinds, flags, name).module
+def optimised_module(
+    function: Any, kinds: Sequence[Kind], flags: Any, name: str, **known: Any
+) -> Any:
+    """Return the optimised code of a function by a name, which `str` shows; other arguments as of `Compiled`."""
+    others = iter(kinds)
+    parameters = [one.arg for one in definition_of(function).args.args]
+    every = [kind_of(known[p], known=True) if p in known else next(others) for p in parameters]
+    return _Program(name).code(function, every, flags, name).module
 
 
 def assembly_of(module: Any) -> str:
@@ -129,31 +134,38 @@ def _kept(path: Path, compiled: Callable[[], bytes]) -> bytes:
 
 
 class Compiled:
-    """A function of a text as machine code. `address` is what C functions are called by; Python calls the object.
+    """A function as machine code. `address` is what C functions are called by; Python calls the object.
 
     Parameters
     ----------
     function : callable
-        From a text of its own, or marked by `scalar_function`.
+        At the top of a module; marked by `lane_function` or `scalar_function`, if calls are to be written out.
     kinds : sequence of Kind
-        Of its arguments.
+        Of its arguments that are not known.
     flags : set of str
         Rewrites allowed in its arithmetic.
     result : ctypes type, optional
         What it returns to Python; whether something is true it returns as a whole number.
+    **known
+        Parameters that are known: numbers, None, tuples of them. The code has the others.
     """
 
     def __init__(
-        self, function: Any, kinds: Sequence[Kind], flags: Any, result: Any = None
+        self, function: Any, kinds: Sequence[Kind], flags: Any, result: Any = None, **known: Any
     ) -> None:
         plain = getattr(function, "py_func", function)
-        text = kept.digest(Path(plain.__code__.co_filename).read_bytes())
-        asked = repr(
-            (source_key(), text, plain.__qualname__, kinds, sorted(flags), features_in_use())
-        )
-        name = function.__name__
-        path = Path(chosen_folder()) / f"{name}.{kept.digest(asked.encode()).hex()[:32]}.code"
-        code = _kept(path, lambda: _target().emit_object(optimised_module(function, kinds, flags)))
+        asked = repr((
+            source_key(), linecache.getlines(plain.__code__.co_filename), plain.__qualname__,
+            kinds, sorted(known.items()), sorted(flags), features_in_use(),
+        ))  # fmt: skip
+        name = f"{plain.__name__}.{kept.digest(asked.encode()).hex()[:32]}"
+        path = Path(chosen_folder()) / f"{name}.code"
+
+        def compiled() -> bytes:
+            module = optimised_module(function, kinds, flags, name, **known)
+            return bytes(_target().emit_object(module))
+
+        code = _kept(path, compiled)
         engine = (
             cpu_target.target_context.codegen()._engine._ee
         )  # which keeps the machine code of this process

@@ -1,169 +1,49 @@
-"""Expressions of a text as LLVM's instructions: the same as Numba would emit, in the order in which Python evaluates them."""
+"""Expressions as LLVM's instructions, in the order in which Python evaluates them; what is known is computed at once.
+
+A value is LLVM's, or one of Python's that is known: a number, a function, an effect's flag, None. A tuple holds either.
+"""
 
 import ast
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 
+from hpcclear.base.lowering.arithmetic import Arithmetic
 from hpcclear.base.lowering.values import (
     DOUBLE,
-    NUMBA,
-    TRUTH,
-    VECTOR,
     WHOLE,
     Array,
+    is_known,
     rebuilt,
     whole,
     wider,
 )
+from hpcclear.base.unrolled import written_out
 
-_ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
-_BITS = {
-    ast.BitAnd: "and_",
-    ast.BitOr: "or_",
-    ast.BitXor: "xor",
-    ast.LShift: "shl",
-    ast.RShift: "ashr",
-}
-_COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _INTRINSICS = {
     math.sqrt: "llvm.sqrt",
     np.sqrt: "llvm.sqrt",
     math.copysign: "llvm.copysign",
     abs: "llvm.fabs",
 }
+_FOLDED = (len, int, float, min, max, abs, range, written_out)
+"""What is called at once, if its arguments are known."""
 
 
-class _NoValues:
-    """What the code of an emitted function takes of Numba's context."""
-
-    def make_array(self, kind: Any) -> Callable[..., Any]:
-        return lambda context, builder, value: value
-
-    def get_dummy_value(self) -> None:
-        return None
-
-
-class Expressions:
+class Expressions(Arithmetic):
     """Expressions of one function; `hpcclear.base.lowering.statements.Function` has the rest of it."""
-
-    builder: ir.IRBuilder
-    names: dict[str, Any]
 
     def read(self, name: str) -> Any:
         """The value of a local, or of a name of the module."""
         raise NotImplementedError
 
-    def called(self, function: Any, arguments: list[Any]) -> Any:
-        """What a compiled function returns."""
+    def called(self, function: Any, arguments: list[Any], named: dict[str, Any]) -> Any:
+        """What a function of the kernel returns."""
         raise NotImplementedError
-
-    # ---- numbers --------------------------------------------------------------------------------
-
-    def value(self, known: Any) -> Any:
-        """Something of Python as a value."""
-        if isinstance(known, bool | np.bool_):
-            return ir.Constant(TRUTH, int(known))
-        if isinstance(known, int | np.integer):
-            return whole(int(known))
-        if isinstance(known, float):
-            return ir.Constant(DOUBLE, float(known))
-        if isinstance(known, np.ndarray):
-            return self.constant_array(known)
-        if isinstance(known, tuple):
-            return rebuilt(type(known), map(self.value, known))
-        return known
-
-    def constant_array(self, known: np.ndarray) -> Array:
-        """An array of the module's, as part of the code."""
-        kind = DOUBLE if known.dtype == np.float64 else WHOLE
-        content = ir.Constant(ir.ArrayType(kind, known.size), known.ravel().tolist())
-        module = self.builder.module
-        place = ir.GlobalVariable(module, content.type, module.get_unique_name("constant"))
-        place.initializer, place.global_constant, place.linkage = content, True, "internal"
-        return Array(self.builder.gep(place, [whole(0), whole(0)]), tuple(map(whole, known.shape)))
-
-    def cast(self, value: Any, kind: ir.Type) -> Any:
-        """A number as one of a type that holds it."""
-        b = self.builder
-        if value.type == kind:
-            return value
-        if kind == VECTOR:
-            one = b.insert_element(
-                ir.Constant(VECTOR, ir.Undefined),
-                self.cast(value, DOUBLE),
-                ir.Constant(ir.IntType(32), 0),
-            )
-            mask = ir.Constant(ir.VectorType(ir.IntType(32), VECTOR.count), None)
-            return b.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), mask)
-        if kind == WHOLE:
-            return b.zext(value, WHOLE)
-        if isinstance(value, ir.Constant):
-            return ir.Constant(DOUBLE, float(value.constant))
-        return b.uitofp(value, DOUBLE) if value.type == TRUTH else b.sitofp(value, DOUBLE)
-
-    def both(self, one: Any, other: Any) -> tuple[Any, Any, ir.Type]:
-        """Two numbers as of one type, and the type."""
-        kind = wider(one.type, other.type)
-        return self.cast(one, kind), self.cast(other, kind), kind
-
-    def truth(self, value: Any) -> Any:
-        """Whether a number is not zero."""
-        if value.type == TRUTH:
-            return value
-        if value.type == WHOLE:
-            return self.builder.icmp_signed("!=", value, whole(0))
-        return self.builder.fcmp_unordered("!=", value, ir.Constant(DOUBLE, 0.0))
-
-    def binary(self, op: type[ast.operator], one: Any, other: Any) -> Any:
-        """One number combined with another."""
-        b = self.builder
-        one, other, kind = self.both(one, other)
-        if op in _BITS:
-            return getattr(b, _BITS[op])(one, other)
-        if kind == TRUTH or (kind == WHOLE and op is ast.Div):
-            kind = DOUBLE if op is ast.Div else WHOLE
-            one, other = self.cast(one, kind), self.cast(other, kind)
-        if op in _ARITHMETIC:
-            if kind == WHOLE:
-                return getattr(b, _ARITHMETIC[op])(one, other)
-            return getattr(b, f"f{_ARITHMETIC[op]}")(one, other)
-        if op is ast.Pow:
-            return self.intrinsic("llvm.pow", [self.cast(one, DOUBLE), self.cast(other, DOUBLE)])
-        assert kind == WHOLE, "// and % are of whole numbers"
-        rest = b.srem(one, other)
-        signs = b.icmp_signed("<", b.xor(rest, other), whole(0))
-        less = b.and_(b.icmp_signed("!=", rest, whole(0)), signs)
-        if op is ast.Mod:
-            return b.add(rest, b.select(less, other, whole(0)))
-        assert op is ast.FloorDiv
-        return b.sub(b.sdiv(one, other), b.zext(less, WHOLE))
-
-    def compared(self, op: type[ast.cmpop], one: Any, other: Any) -> Any:
-        """Whether one number compares so with another."""
-        one, other, kind = self.both(one, other)
-        if kind != DOUBLE:
-            return self.builder.icmp_signed(_COMPARED[op], one, other)
-        kept = self.builder.fcmp_unordered if op is ast.NotEq else self.builder.fcmp_ordered
-        return kept(_COMPARED[op], one, other)
-
-    def intrinsic(self, name: str, arguments: list[Any]) -> Any:
-        """A function of LLVM, of doubles."""
-        kind = ir.FunctionType(DOUBLE, [DOUBLE] * len(arguments))
-        function = self.builder.module.declare_intrinsic(name, [DOUBLE], kind)
-        return self.builder.call(function, arguments)
-
-    def place(self, array: Array, index: list[Any]) -> Any:
-        """The address of what an index names, or where a row begins."""
-        offset = index[0]
-        for length, one in zip(array.shape[1:], index[1:], strict=False):
-            offset = self.builder.add(self.builder.mul(offset, length), one)
-        for length in array.shape[len(index) :]:
-            offset = self.builder.mul(offset, length)
-        return self.builder.gep(array.data, [offset])
 
     # ---- expressions ----------------------------------------------------------------------------
 
@@ -172,16 +52,22 @@ class Expressions:
         return getattr(self, f"_of_{type(node).__name__}")(node)
 
     def _of_Constant(self, node: ast.Constant) -> Any:
-        return self.value(node.value)
+        return node.value
 
     def _of_Name(self, node: ast.Name) -> Any:
         return self.read(node.id)
 
     def _of_Tuple(self, node: ast.Tuple) -> Any:
-        return tuple(map(self.expression, node.elts))
+        items: tuple[Any, ...] = ()
+        for one in node.elts:
+            if isinstance(one, ast.Starred):
+                items += self.expression(one.value)
+            else:
+                items += (self.expression(one),)
+        return items
 
     def _of_Attribute(self, node: ast.Attribute) -> Any:
-        return self.value(getattr(self.expression(node.value), node.attr))
+        return getattr(self.expression(node.value), node.attr)
 
     def _of_BinOp(self, node: ast.BinOp) -> Any:
         one = self.expression(node.left)
@@ -190,19 +76,16 @@ class Expressions:
     def _of_UnaryOp(self, node: ast.UnaryOp) -> Any:
         value = self.expression(node.operand)
         if isinstance(node.op, ast.Not):
-            return self.builder.not_(self.truth(value))
+            test = self.truth(value)
+            return not test if is_known(test) else self.builder.not_(test)
         assert isinstance(node.op, ast.USub)
-        if isinstance(value, ir.Constant):
-            return ir.Constant(value.type, -value.constant)
+        if is_known(value):
+            return -value
         if value.type == WHOLE:
             return self.builder.neg(value)
         return self.builder.fsub(self.cast(self.value(-0.0), value.type), value)
 
     def _of_Compare(self, node: ast.Compare) -> Any:
-        one = self.expression(node.left)
-        if len(node.ops) == 1:
-            return self.compared(type(node.ops[0]), one, self.expression(node.comparators[0]))
-
         def link(k: int, one: Any) -> Any:
             other = self.expression(node.comparators[k])
             found = self.compared(type(node.ops[k]), one, other)
@@ -210,7 +93,7 @@ class Expressions:
                 return found
             return self.either(found, lambda: link(k + 1, other), lambda: found)
 
-        return link(0, one)
+        return link(0, self.expression(node.left))
 
     def _of_BoolOp(self, node: ast.BoolOp) -> Any:
         def link(k: int) -> Any:
@@ -232,69 +115,78 @@ class Expressions:
         )
 
     def either(self, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
-        """The value of one of two branches."""
+        """The value of one of two branches; of the one that is taken, where that is known."""
+        if is_known(test):
+            return yes() if test else no()
         b, ends = self.builder, []
         blocks = [b.append_basic_block() for _ in range(2)]
-        last = b.append_basic_block()
         b.cbranch(test, *blocks)
         for block, branch in zip(blocks, (yes, no), strict=True):
             b.position_at_end(block)
             ends.append((branch(), b.block))
-        joined = self._joined([value for value, _ in ends])
-        for k, (value, block) in enumerate(ends):
+        return self.merged(ends)
+
+    def merged(self, ends: list[tuple[Any, ir.Block]]) -> Any:
+        """The value that comes out of the ends of blocks, behind which it goes on."""
+        b = self.builder
+        if len(ends) == 1:
+            ((value, block),) = ends
             b.position_at_end(block)
-            ends[k] = (self._as(value, joined), block)
+            return value
+        values, blocks = zip(*ends, strict=True)
+        cast = [[] for _ in ends]  # type: list[list[Any]]
+        shape = self._cast(values, blocks, cast)
+        last = b.append_basic_block()
+        for block in blocks:
+            b.position_at_end(block)
             b.branch(last)
         b.position_at_end(last)
-        return self._chosen(ends)
+        chosen = []
+        for column in zip(*cast, strict=True):
+            chosen.append(b.phi(column[0].type))
+            for value, block in zip(column, blocks, strict=True):
+                chosen[-1].add_incoming(value, block)
+        return shape(iter(chosen))
 
-    def _joined(self, values: list[Any]) -> Any:
-        """Types that hold values of two branches."""
-        if isinstance(values[0], tuple):
-            return [self._joined(list(pair)) for pair in zip(*values, strict=True)]
-        return wider(values[0].type, values[1].type)
-
-    def _as(self, value: Any, kinds: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(self._as, value, kinds))
-        return self.cast(value, kinds)
-
-    def _chosen(self, ends: list[tuple[Any, ir.Block]]) -> Any:
-        first = ends[0][0]
+    def _cast(self, values: Any, blocks: Any, cast: list[list[Any]]) -> Callable[[Any], Any]:
+        """Put numbers that differ by block into `cast`, as of one type; what makes one value of those that are chosen."""
+        first = values[0]
+        if all(value is first for value in values):
+            return lambda chosen: first
         if isinstance(first, tuple):
-            return tuple(
-                self._chosen([(value[k], block) for value, block in ends])
-                for k in range(len(first))
-            )
-        chosen = self.builder.phi(first.type)
-        for value, block in ends:
-            chosen.add_incoming(value, block)
-        return chosen
+            parts = [self._cast(one, blocks, cast) for one in zip(*values, strict=True)]
+            return lambda chosen: rebuilt(type(first), [part(chosen) for part in parts])
+        kind = reduce(wider, [self.value(value).type for value in values])
+        for value, block, column in zip(values, blocks, cast, strict=True):
+            self.builder.position_at_end(block)
+            column.append(self.cast(value, kind))
+        return next
 
     def _of_Subscript(self, node: ast.Subscript) -> Any:
         owner, index = self.expression(node.value), node.slice
         if isinstance(index, ast.Slice):
-            low, high = self.expression(index.lower), self.expression(index.upper)  # type: ignore[arg-type]
+            low, high = (self.value(self.expression(end)) for end in (index.lower, index.upper))  # type: ignore[arg-type]
             return Array(self.builder.gep(owner.data, [low]), (self.builder.sub(high, low),))
-        return self.item(owner, self.index(index))
-
-    def index(self, node: ast.expr) -> list[Any]:
-        """The numbers of an index."""
-        return list(map(self.expression, node.elts if isinstance(node, ast.Tuple) else [node]))
+        known = self.expression(index)
+        if is_known((known, owner)):
+            found = owner[known]
+            return found.item() if isinstance(found, np.generic) else found
+        return self.item(owner, list(known) if isinstance(known, tuple) else [known])
 
     def item(self, owner: Any, index: list[Any]) -> Any:
         """What an index names: a number, a row, a part of a tuple."""
+        owner = self.value(owner) if isinstance(owner, np.ndarray) else owner
         if isinstance(owner, Array):
             place = self.place(owner, index)
             left = owner.shape[len(index) :]
             return Array(place, left) if left else self.builder.load(place)
         if not isinstance(owner, tuple):  # a place in memory
-            return self.builder.load(self.builder.gep(owner, index))
+            return self.builder.load(self.builder.gep(owner, list(map(self.value, index))))
         (one,) = index
-        if isinstance(one, ir.Constant):
-            return owner[one.constant]
-        chosen = owner[0]
-        for k, other in enumerate(owner[1:], 1):
+        if is_known(one):
+            return owner[one]
+        chosen, *others = map(self.value, owner)
+        for k, other in enumerate(others, 1):
             chosen = self.builder.select(
                 self.builder.icmp_signed("==", one, whole(k)), other, chosen
             )
@@ -303,87 +195,16 @@ class Expressions:
     def _of_Call(self, node: ast.Call) -> Any:
         function = self.expression(node.func)
         arguments = list(map(self.expression, node.args))
+        named = {str(one.arg): self.expression(one.value) for one in node.keywords}
+        if function is getattr or (isinstance(function, type) and issubclass(function, tuple)):
+            return function(*arguments, **named)
+        if function in _FOLDED and all(map(is_known, arguments)):
+            return function(*arguments)
+        if hasattr(function, "py_func"):
+            return self.called(function, arguments, named)
+        arguments = list(map(self.value, arguments))
         if function in _INTRINSICS and arguments[0].type != WHOLE:
             return self.intrinsic(
                 _INTRINSICS[function], [self.cast(one, DOUBLE) for one in arguments]
             )
-        name = getattr(function, "__name__", "")
-        own = getattr(self, f"_call_{name}", None)
-        if own is not None:
-            return own(*arguments)
-        if isinstance(function, type):  # a named tuple
-            return function(*arguments)
-        if hasattr(function, "py_func"):
-            return self.called(function, arguments)
-        return self.emitted(function._defn, arguments)
-
-    def emitted(self, define: Any, arguments: list[Any]) -> Any:
-        """A function that emits its code."""
-        numbers = [not isinstance(one, tuple | Array) for one in arguments]
-        kinds = [
-            NUMBA[one.type] if is_number else None
-            for one, is_number in zip(arguments, numbers, strict=True)
-        ]
-        signature, code = define(None, *kinds)
-        wanted = {kind: own for own, kind in NUMBA.items()}
-        given = [
-            self.cast(one, wanted[kind]) if is_number and kind in wanted else one
-            for one, is_number, kind in zip(arguments, numbers, signature.args, strict=True)
-        ]
-        return code(_NoValues(), self.builder, signature, given)
-
-    # ---- functions of Python, and those that views of memory are made with ----------------------
-
-    def _call_max(self, *values: Any) -> Any:
-        return self._extreme(ast.Gt, values)
-
-    def _call_min(self, *values: Any) -> Any:
-        return self._extreme(ast.Lt, values)
-
-    def _extreme(self, op: type[ast.cmpop], values: Iterable[Any]) -> Any:
-        first, *others = values
-        for one in others:
-            first, one, _ = self.both(first, one)
-            first = self.builder.select(self.compared(op, one, first), one, first)
-        return first
-
-    def _call_abs(self, value: Any) -> Any:
-        negative = self.builder.icmp_signed("<", value, whole(0))
-        return self.builder.select(negative, self.builder.neg(value), value)
-
-    def _call_int(self, value: Any) -> Any:
-        return (
-            self.builder.fptosi(value, WHOLE) if value.type == DOUBLE else self.cast(value, WHOLE)
-        )
-
-    def _call_float(self, value: Any) -> Any:
-        return self.cast(value, DOUBLE)
-
-    def _call_floor(self, value: Any) -> Any:
-        return self._call_int(self.intrinsic("llvm.floor", [value]))
-
-    def _call_isfinite(self, value: Any) -> Any:
-        none = self.builder.fsub(value, value)
-        return self.builder.fcmp_ordered("ord", none, none)
-
-    def _call_sign(self, value: Any) -> Any:
-        nothing = self.value(0.0)
-        below = self.builder.select(self.compared(ast.Lt, value, nothing), self.value(-1.0), value)
-        return self.builder.select(self.compared(ast.Gt, value, nothing), self.value(1.0), below)
-
-    def _call_len(self, value: Any) -> Any:
-        return value.shape[0] if isinstance(value, Array) else whole(len(value))
-
-    def _call_carray(self, place: Any, shape: Any) -> Any:
-        return Array(place, shape if isinstance(shape, tuple) else (shape,))
-
-    def _call_beyond(self, array: Array, offset: Any) -> Any:
-        return Array(self.builder.gep(array.data, [offset]), array.shape)
-
-    def _call_borrowed(self, array: Any) -> Any:
-        return array
-
-    def _call_call_at(self, address: Any, arrays: tuple[Array, ...]) -> None:
-        places = [one.data for one in arrays]
-        function = ir.FunctionType(ir.VoidType(), [place.type for place in places])
-        self.builder.call(self.builder.inttoptr(address, function.as_pointer()), places)
+        return getattr(self, f"_call_{function.__name__}")(*arguments)

@@ -5,17 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import types
 
-from hpcclear.base.eight import EIGHT, eight
+from hpcclear.base.eight import EIGHT
 
 DOUBLE, WHOLE, TRUTH = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 VECTOR = ir.VectorType(DOUBLE, EIGHT)
 ORDER = [TRUTH, WHOLE, DOUBLE, VECTOR]
 """Types of numbers, each of which holds those before."""
-
-NUMBA = {DOUBLE: types.float64, WHOLE: types.int64, TRUTH: types.boolean, VECTOR: eight}
-"""Numba's names of them, for `hpcclear.base.jit.emitted`."""
 
 
 class Array(NamedTuple):
@@ -39,7 +35,8 @@ class Kind(NamedTuple):
     """What an argument is, without its values: the same kinds have the same code."""
 
     of: Any
-    """A type of numbers; "array" of `parts[0]` with `parts[1]` dimensions; a class of tuples; None."""
+    """A type of numbers; "array" of `parts[0]` with `parts[1]` dimensions; a class of tuples; None; "known", not
+    passed: `parts[1]` of the type `parts[0]`."""
     parts: tuple[Any, ...] = ()
 
 
@@ -47,8 +44,15 @@ DOUBLES, COUNTS = Kind(DOUBLE.as_pointer()), Kind(WHOLE.as_pointer())
 """Places of numbers in memory."""
 
 
-def kind_of(value: Any) -> Kind:
-    """The kind of a value: of LLVM, or as Python has it."""
+def is_known(value: Any) -> bool:
+    """Whether a value is Python's, and not LLVM's or a tuple with some of LLVM's."""
+    return (
+        all(map(is_known, value)) if isinstance(value, tuple) else not isinstance(value, ir.Value)
+    )
+
+
+def kind_of(value: Any, known: bool = False) -> Kind:
+    """The kind of a value: of LLVM, or as Python has it; where it counts as `known`, what Python has is part of the kind."""
     if value is None:
         return Kind(None)
     if isinstance(value, Array):
@@ -56,9 +60,11 @@ def kind_of(value: Any) -> Kind:
     if isinstance(value, np.ndarray):
         return Kind("array", (DOUBLE if value.dtype == np.float64 else WHOLE, value.ndim))
     if isinstance(value, tuple):
-        return Kind(type(value), tuple(map(kind_of, value)))
+        return Kind(type(value), tuple(kind_of(one, known) for one in value))
     if isinstance(value, ir.Value):
         return Kind(value.type)
+    if known:
+        return Kind("known", (type(value), value))
     return Kind(DOUBLE if isinstance(value, float) else WHOLE)
 
 
@@ -69,7 +75,7 @@ def types_of(kind: Kind) -> Iterator[ir.Type]:
         yield from [WHOLE] * kind.parts[1]
     elif isinstance(kind.of, ir.Type):
         yield kind.of
-    else:
+    elif kind.of != "known":
         for part in kind.parts:
             yield from types_of(part)
 
@@ -93,6 +99,8 @@ def gathered(kind: Kind, parts: Iterator[Any]) -> Any:
         return Array(next(parts), tuple(next(parts) for _ in range(kind.parts[1])))
     if isinstance(kind.of, ir.Type):
         return next(parts)
+    if kind.of == "known":
+        return kind.parts[1]
     return (
         None if kind.of is None else rebuilt(kind.of, [gathered(one, parts) for one in kind.parts])
     )

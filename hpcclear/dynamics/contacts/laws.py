@@ -1,12 +1,12 @@
-"""Laws and rates of objectives compiled into the lanes: modules of their texts, which motions have written out."""
+"""Laws and rates of objectives compiled into the lanes: modules of their generated source, whose functions motions call."""
 
 import hashlib
 from functools import cache
 from types import ModuleType
 from typing import Any
 
+from hpcclear.base.generated import module_of
 from hpcclear.base.objectives import Objective
-from hpcclear.base.one_text import module_of
 from hpcclear.laws.declared import Law
 from hpcclear.laws.objectives import text_of_rate
 from hpcclear.laws.sources import text_of
@@ -22,7 +22,7 @@ class InLanes:
         self._made_of = text, title, facts
         self.title, self.facts = title, facts
         self.name = f"law_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-        module: ModuleType = module_of(self.name, lambda: text)
+        module: ModuleType = module_of(self.name, text)
         for entry, function in vars(module).items():
             if entry.startswith("joint_"):
                 setattr(self, entry.removeprefix("joint_"), function)

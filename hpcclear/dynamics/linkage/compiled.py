@@ -1,14 +1,11 @@
-"""A generated text as a module: a motion of all lanes that `rhs.compiled_motion` can compile and steppers call by its address.
-
-The file stands beside Numba's cache, to be read; it is named by its content.
-"""
+"""A generated source as a module: the motion of all lanes that `rhs.compiled_motion` compiles, called by its address."""
 
 import hashlib
 import inspect
 from collections.abc import Callable
 from types import ModuleType
 
-from hpcclear.base.one_text import module_of
+from hpcclear.base.generated import module_of
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout import curves
 from hpcclear.dynamics.linkage.elements import functions
@@ -94,7 +91,7 @@ def _source(function: Callable[..., object], name: str) -> str:
 
 
 def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:
-    """The module of a motion: ``accelerations`` of all lanes and, ready for `one_text`, ``motion``."""
+    """The module of a motion: ``accelerations`` of all lanes and ``motion``, which steppers call."""
     text = module_text(motion, joints)
     name = f"linkage_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    return module_of(name, lambda: text)
+    return module_of(name, text)

@@ -58,7 +58,7 @@ _KINDS = (Kind(WHOLE), Kind(WHOLE), _ROW, _ROW, _TABLE, _TABLE, _ROW, _ROW, _TAB
 @cache
 def observing_code() -> Compiled:
     """The compiled `_observe`, which `observe` calls."""
-    return Compiled(_observe.py_func, _KINDS, ())
+    return Compiled(_observe, _KINDS, ())
 
 
 @scalar_function

@@ -11,8 +11,8 @@ from hpcclear.base.bits import call_at
 from hpcclear.base.jit import FASTMATH, interleaved, lane_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import DOUBLES
-from hpcclear.base.one_text import one_text, text_named
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.compiled import BANK
 
 LONG = 200
 """Lines of a text from which half of its vectors stand batched: of all of them there are more instructions than the
@@ -21,6 +21,7 @@ processor keeps decoded."""
 KINDS = (DOUBLES, DOUBLES)
 
 
+@cache  # a study requires it with every lane's compilation, some hundred times
 def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Compiled:
     """The compiled ``motion`` of a module for W lanes; its ``address`` is what steppers take.
 
@@ -40,24 +41,9 @@ def compiled_motion(module: ModuleType, effects: at.Effects, W: int) -> Compiled
     compiled with `FASTMATH` and without branches on a lane's numbers.
     The object is kept for as long as the process lives: a stepper may hold its address.
     """
-    return compiled_text(motion_text(module, effects, W))
-
-
-@cache  # a study asks for it with every lane's compilation, some hundred times
-def motion_text(module: ModuleType, effects: at.Effects, W: int) -> str:
-    """The name of the text that ``motion`` of a module is compiled from."""
-    text = one_text(module.motion, f"motion_{W}", effects=effects, W=W)
-    return str(text.__name__)
-
-
-@cache
-def compiled_text(name: str) -> Compiled:
-    """The compiled motion of a text by its name; its second word is the number of lanes."""
-    text = getattr(text_named(name), name)
-    lanes = int(name.split("_")[1])
-    long = inspect.getsource(text).count("\n") > LONG
-    with interleaved(lanes // 2 if long else lanes):
-        return Compiled(text, KINDS, FASTMATH)
+    long = inspect.getsource(module.lane.py_func).count("\n") > LONG
+    with interleaved(W // 2 if long and W == BANK else W):
+        return Compiled(module.motion, KINDS, FASTMATH, effects=effects, W=W)
 
 
 @lane_function

@@ -16,7 +16,7 @@ from hpcclear.dynamics.layout.settings import STRICT
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Settings, Start
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import modes_of
-from hpcclear.dynamics.linkage.rhs import compiled_text, motion_text
+from hpcclear.dynamics.linkage.rhs import compiled_motion
 from hpcclear.dynamics.stepping.explicit.tableau import Tableau
 
 TORN = 0.25
@@ -116,11 +116,7 @@ class Problem:
 
     def motion(self, effects: at.Effects, width: int) -> Any:
         """The compiled motion of so many lanes with these effects (`rhs.compiled_motion`)."""
-        return compiled_text(self.motion_text(effects, width))
-
-    def motion_text(self, effects: at.Effects, width: int) -> str:
-        """The name of the text that it is compiled from."""
-        return motion_text(self.linkage.module(effects), effects, width)
+        return compiled_motion(self.linkage.module(effects), effects, width)
 
     def marked(self, outcome: Outcome, par: Array, start: Start) -> Outcome:
         """Outcomes (m) of samples (m, PARAMETERS), with the statuses that the kernel does not know: of those that failed at

@@ -15,7 +15,6 @@ from numba import carray
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import DOUBLES
-from hpcclear.base.one_text import one_text
 from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.stepping.control import keep
@@ -99,5 +98,4 @@ def profile_code(effects: at.Effects, W: int) -> Compiled:
     """The compiled `profiles` of these effects for W lanes; its ``address`` is what steppers take, as that of a motion."""
     places = tuple(at.places_of(effects))
     counts = {"bearing": effects.bearing_waves or 0, "journal": effects.journal_waves or 0}
-    text = one_text(profiles, f"profiles_{W}", places=places, W=W, **counts)
-    return Compiled(text, _KINDS, FASTMATH)
+    return Compiled(profiles, _KINDS, FASTMATH, places=places, W=W, **counts)

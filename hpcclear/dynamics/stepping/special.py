@@ -11,7 +11,6 @@ from hpcclear.base.bits import call_at
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
-from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
     ASKED,
@@ -122,7 +121,7 @@ _KINDS = (COUNTS, *[DOUBLES] * 9, *[COUNTS] * 2)
 @cache
 def special_code() -> Compiled:
     """The compiled `special`; its ``address`` is what steppers take."""
-    return Compiled(one_text(special, "special"), _KINDS, FASTMATH)
+    return Compiled(special, _KINDS, FASTMATH)
 
 
 @lane_function

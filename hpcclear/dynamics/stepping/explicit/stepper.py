@@ -12,7 +12,6 @@ from hpcclear.base.bits import call_at
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import Kind
-from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import GAP_TOLERANCE, PROFILE
 from hpcclear.dynamics.linkage.rhs import run_motion
@@ -119,5 +118,4 @@ def make_stepper(W: int, kinds: tuple[Kind, ...], *, implicit: bool = False) -> 
     known: dict[str, object] = {"W": W}
     if not implicit:
         known["memory"] = None
-    text = one_text(advance, f"stepper_{W}", **known)
-    return Compiled(text, kinds, FASTMATH, ctypes.c_int64)
+    return Compiled(advance, kinds, FASTMATH, ctypes.c_int64, **known)

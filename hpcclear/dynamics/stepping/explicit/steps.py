@@ -8,7 +8,6 @@ from hpcclear.base.bits import beyond
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
-from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
     ATOL,
@@ -172,5 +171,4 @@ _KINDS = (COUNTS, *[DOUBLES] * 4, COUNTS)
 @cache
 def explicit_code(W: int, stages: int) -> Compiled:
     """The compiled steps of W lanes by pairs of so many stages; their ``address`` is what steppers take."""
-    text = one_text(explicit_steps, f"explicit_{W}_{stages}", W=W, stages=stages)
-    return Compiled(text, _KINDS, FASTMATH)
+    return Compiled(explicit_steps, _KINDS, FASTMATH, W=W, stages=stages)

@@ -14,7 +14,6 @@ from hpcclear.base.eight import above, fetch, put, size, spread
 from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
-from hpcclear.base.one_text import one_text
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import (
     COORDINATES,
@@ -359,8 +358,7 @@ _KINDS = (COUNTS, *[DOUBLES] * 5, COUNTS, DOUBLES)
 @cache
 def batch_code() -> Compiled:
     """The compiled implicit steps of any lanes, joints and coordinates; steppers take their ``address``."""
-    text = one_text(batch_steps, "batch")
-    return Compiled(text, _KINDS, FASTMATH)
+    return Compiled(batch_steps, _KINDS, FASTMATH)
 
 
 @lane_function

@@ -1,0 +1,256 @@
+"""What compiled code computes with numbers: operators, functions of Python and of the kernel, vectors of eight."""
+
+import ast
+import operator
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+
+from hpcclear.base.lowering.values import (
+    DOUBLE,
+    TRUTH,
+    VECTOR,
+    WHOLE,
+    Array,
+    is_known,
+    rebuilt,
+    whole,
+    wider,
+)
+
+_ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
+_BITS = {
+    ast.BitAnd: "and_",
+    ast.BitOr: "or_",
+    ast.BitXor: "xor",
+    ast.LShift: "shl",
+    ast.RShift: "ashr",
+}
+_COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
+    ast.BitOr: operator.or_, ast.BitAnd: operator.and_, ast.LShift: operator.lshift,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le,
+    ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Is: operator.is_, ast.IsNot: operator.is_not,
+}  # fmt: skip
+_ALIGNED = 8  # bytes that a row's address is known to be a multiple of
+
+
+class Arithmetic:
+    """Numbers of one function, and what is done with them."""
+
+    builder: ir.IRBuilder
+
+    # ---- numbers --------------------------------------------------------------------------------
+
+    def value(self, known: Any) -> Any:
+        """Something of Python as a value."""
+        if isinstance(known, bool | np.bool_):
+            return ir.Constant(TRUTH, int(known))
+        if isinstance(known, int | np.integer):
+            return whole(int(known))
+        if isinstance(known, float):
+            return ir.Constant(DOUBLE, float(known))
+        if isinstance(known, np.ndarray):
+            return self.constant_array(known)
+        if isinstance(known, tuple):
+            return rebuilt(type(known), map(self.value, known))
+        return known
+
+    def constant_array(self, known: np.ndarray) -> Array:
+        """An array of the module's, as part of the code."""
+        kind = DOUBLE if known.dtype == np.float64 else WHOLE
+        content = ir.Constant(ir.ArrayType(kind, known.size), known.ravel().tolist())
+        module = self.builder.module
+        place = ir.GlobalVariable(module, content.type, module.get_unique_name("constant"))
+        place.initializer, place.global_constant, place.linkage = content, True, "internal"
+        return Array(self.builder.gep(place, [whole(0), whole(0)]), tuple(map(whole, known.shape)))
+
+    def cast(self, value: Any, kind: ir.Type) -> Any:
+        """A number as one of a type that holds it."""
+        b, value = self.builder, self.value(value)
+        if value.type == kind:
+            return value
+        if kind == VECTOR:
+            one = b.insert_element(
+                ir.Constant(VECTOR, ir.Undefined),
+                self.cast(value, DOUBLE),
+                ir.Constant(ir.IntType(32), 0),
+            )
+            mask = ir.Constant(ir.VectorType(ir.IntType(32), VECTOR.count), None)
+            return b.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), mask)
+        if kind == WHOLE:
+            return b.zext(value, WHOLE)
+        if isinstance(value, ir.Constant):
+            return ir.Constant(DOUBLE, float(value.constant))
+        return b.uitofp(value, DOUBLE) if value.type == TRUTH else b.sitofp(value, DOUBLE)
+
+    def both(self, one: Any, other: Any) -> tuple[Any, Any, ir.Type]:
+        """Two numbers as of one type, and the type."""
+        one, other = self.value(one), self.value(other)
+        kind = wider(one.type, other.type)
+        return self.cast(one, kind), self.cast(other, kind), kind
+
+    def truth(self, value: Any) -> Any:
+        """Whether a number is not zero."""
+        if is_known(value):
+            return bool(value)
+        if value.type == TRUTH:
+            return value
+        if value.type == WHOLE:
+            return self.builder.icmp_signed("!=", value, whole(0))
+        return self.builder.fcmp_unordered("!=", value, ir.Constant(DOUBLE, 0.0))
+
+    def binary(self, op: type[ast.operator], one: Any, other: Any) -> Any:
+        """One number combined with another."""
+        if is_known((one, other)):
+            return _OPERATORS[op](one, other)
+        b = self.builder
+        one, other, kind = self.both(one, other)
+        if op in _BITS:
+            return getattr(b, _BITS[op])(one, other)
+        if kind == TRUTH or (kind == WHOLE and op is ast.Div):
+            kind = DOUBLE if op is ast.Div else WHOLE
+            one, other = self.cast(one, kind), self.cast(other, kind)
+        if op in _ARITHMETIC:
+            if kind == WHOLE:
+                return getattr(b, _ARITHMETIC[op])(one, other)
+            return getattr(b, f"f{_ARITHMETIC[op]}")(one, other)
+        if op is ast.Pow:
+            return self.intrinsic("llvm.pow", [self.cast(one, DOUBLE), self.cast(other, DOUBLE)])
+        assert kind == WHOLE, "// and % are of whole numbers"
+        rest = b.srem(one, other)
+        signs = b.icmp_signed("<", b.xor(rest, other), whole(0))
+        less = b.and_(b.icmp_signed("!=", rest, whole(0)), signs)
+        if op is ast.Mod:
+            return b.add(rest, b.select(less, other, whole(0)))
+        assert op is ast.FloorDiv
+        return b.sub(b.sdiv(one, other), b.zext(less, WHOLE))
+
+    def compared(self, op: type[ast.cmpop], one: Any, other: Any) -> Any:
+        """Whether one number compares so with another."""
+        if is_known((one, other)) or op in (ast.Is, ast.IsNot):
+            return _OPERATORS[op](one, other)
+        one, other, kind = self.both(one, other)
+        if kind != DOUBLE:
+            return self.builder.icmp_signed(_COMPARED[op], one, other)
+        kept = self.builder.fcmp_unordered if op is ast.NotEq else self.builder.fcmp_ordered
+        return kept(_COMPARED[op], one, other)
+
+    def intrinsic(self, name: str, arguments: list[Any]) -> Any:
+        """A function of LLVM, of doubles."""
+        kind = ir.FunctionType(DOUBLE, [DOUBLE] * len(arguments))
+        function = self.builder.module.declare_intrinsic(name, [DOUBLE], kind)
+        return self.builder.call(function, arguments)
+
+    def place(self, array: Array, index: list[Any]) -> Any:
+        """The address of what an index names, or where a row begins."""
+        offset, *others = map(self.value, index)
+        for length, one in zip(array.shape[1:], others, strict=False):
+            offset = self.builder.add(self.builder.mul(offset, length), one)
+        for length in array.shape[len(index) :]:
+            offset = self.builder.mul(offset, length)
+        return self.builder.gep(array.data, [offset])
+
+    # ---- functions of Python, and those that views of memory are made with ----------------------
+
+    def _call_max(self, *values: Any) -> Any:
+        return self._extreme(ast.Gt, values)
+
+    def _call_min(self, *values: Any) -> Any:
+        return self._extreme(ast.Lt, values)
+
+    def _extreme(self, op: type[ast.cmpop], values: Iterable[Any]) -> Any:
+        first, *others = values
+        for one in others:
+            first, one, _ = self.both(first, one)
+            first = self.builder.select(self.compared(op, one, first), one, first)
+        return first
+
+    def _call_abs(self, value: Any) -> Any:
+        negative = self.builder.icmp_signed("<", value, whole(0))
+        return self.builder.select(negative, self.builder.neg(value), value)
+
+    def _call_int(self, value: Any) -> Any:
+        return (
+            self.builder.fptosi(value, WHOLE) if value.type == DOUBLE else self.cast(value, WHOLE)
+        )
+
+    def _call_float(self, value: Any) -> Any:
+        return self.cast(value, DOUBLE)
+
+    def _call_floor(self, value: Any) -> Any:
+        return self._call_int(self.intrinsic("llvm.floor", [value]))
+
+    def _call_isfinite(self, value: Any) -> Any:
+        none = self.builder.fsub(value, value)
+        return self.builder.fcmp_ordered("ord", none, none)
+
+    def _call_sign(self, value: Any) -> Any:
+        nothing = self.value(0.0)
+        below = self.builder.select(self.compared(ast.Lt, value, nothing), self.value(-1.0), value)
+        return self.builder.select(self.compared(ast.Gt, value, nothing), self.value(1.0), below)
+
+    def _call_len(self, value: Any) -> Any:
+        return value.shape[0] if isinstance(value, Array) else len(value)
+
+    def _call_carray(self, place: Any, shape: Any) -> Any:
+        return Array(place, shape if isinstance(shape, tuple) else (shape,))
+
+    def _call_beyond(self, array: Array, offset: Any) -> Any:
+        return Array(self.builder.gep(array.data, [offset]), array.shape)
+
+    def _call_borrowed(self, array: Any) -> Any:
+        return array
+
+    def _call_call_at(self, address: Any, arrays: tuple[Array, ...]) -> None:
+        places = [one.data for one in arrays]
+        function = ir.FunctionType(ir.VoidType(), [place.type for place in places])
+        self.builder.call(self.builder.inttoptr(address, function.as_pointer()), places)
+
+    # ---- what `bits` and `jit` have --------------------------------------------------------------
+
+    def _call_bits_of(self, value: Any) -> Any:
+        return self.builder.bitcast(value, WHOLE)
+
+    def _call_double_of(self, value: Any) -> Any:
+        return self.builder.bitcast(value, DOUBLE)
+
+    def _call_no_less(self, value: Any, least: Any) -> Any:
+        return self._extreme(ast.Gt, (self.cast(value, DOUBLE), least))
+
+    def _call_no_more(self, value: Any, most: Any) -> Any:
+        return self._extreme(ast.Lt, (self.cast(value, DOUBLE), most))
+
+    def _call_narrow_vectors(self) -> None:
+        # llvmlite's own `add` lets only those pass that it knows
+        set.add(self.builder.function.attributes, '"prefer-vector-width"="256"')
+
+    # ---- vectors of eight -----------------------------------------------------------------------
+
+    def _row(self, array: Array, row: Any) -> Any:
+        """Address of a row of a flat array, as that of a vector."""
+        start = self.builder.mul(row, whole(VECTOR.count))
+        return self.builder.bitcast(self.builder.gep(array.data, [start]), VECTOR.as_pointer())
+
+    def _call_fetch(self, array: Array, row: Any) -> Any:
+        return self.builder.load(self._row(array, row), align=_ALIGNED)
+
+    def _call_put(self, array: Array, row: Any, vector: Any) -> None:
+        place = self._row(array, row)
+        self.builder.store(self.cast(vector, VECTOR), place, align=_ALIGNED)
+
+    def _call_spread(self, number: Any) -> Any:
+        return self.cast(number, VECTOR)
+
+    def _call_above(self, vector: Any, yes: Any, no: Any) -> Any:
+        is_above = self.builder.fcmp_ordered(">", vector, self.cast(0.0, VECTOR))
+        return self.builder.select(is_above, self.cast(yes, VECTOR), self.cast(no, VECTOR))
+
+    def _call_size(self, vector: Any) -> Any:
+        bits = self.builder.bitcast(vector, ir.VectorType(WHOLE, VECTOR.count))
+        mask = ir.Constant(bits.type, [whole((1 << 63) - 1)] * VECTOR.count)
+        return self.builder.bitcast(self.builder.and_(bits, mask), VECTOR)
