@@ -8,6 +8,8 @@ import pytest
 from light import loaded_by
 from patience import crowded
 
+from hpcclear.cli import Program
+
 SCENE = Path(__file__).parent.parent / "jobs" / "slider_crank.toml"
 HEAVY = {
     "h5py",
@@ -40,6 +42,23 @@ def command(*words: str) -> str:
 def test_help_loads_no_library_of_numbers(words):
     light = HEAVY if words != ["show", "citation"] else {"numba", "xarray", "scipy"}
     assert not loaded_by(command(*words), light)
+
+
+TAKES_SCENES = sorted(
+    name
+    for name, one in Program().every().items()
+    if {"file", "overrides"} <= {option.name for option in one.params}
+)
+
+
+@pytest.mark.parametrize("name", TAKES_SCENES)
+def test_a_scene_is_refused_before_what_simulates_is_loaded(name):
+    needed = {"map": ["--x", "C=0.1mm:1mm:3"], "identify": ["--unknown", "C=0.1mm:1mm"]}
+    place = [] if name == "check" else ["-o", "refused.nc"]
+    words = [name, str(SCENE), "--set", "effects.gravity=heavy", *place, *needed.get(name, [])]
+    heavy = HEAVY - {"numpy", "pydantic"}
+    ours = ("accuracy", "dynamics.evaluation", "ensemble.session", "identify", "report", "study")
+    assert not loaded_by(command(*words), heavy | {f"hpcclear.{one}" for one in ours})
 
 
 def test_a_response_that_is_compiled_loads_nothing_that_only_compiling_needs(tmp_path):

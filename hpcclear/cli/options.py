@@ -115,11 +115,16 @@ class Written(NamedTuple):
     overrides: tuple[str, ...]
 
 
-def remarked(scene: "Scene") -> "Scene":
-    """The scene; Python files that it runs, readings of units and likely slips of units are printed."""
+def read_scene(written: Written) -> "Scene":
+    """The scene; Python files that it runs, readings of units and likely slips of units are printed.
+
+    Call it before anything that simulates is loaded: a scene that is refused is refused within a second.
+    """
+    from hpcclear.scene import load_scene
     from hpcclear.scene.describing import implausible
     from hpcclear.scene.plugged import files_run
 
+    scene = load_scene(*written)
     for text in (*files_run(scene.plugins), *scene.readings):
         say(f"Note: {text}")
     for text in implausible(scene):

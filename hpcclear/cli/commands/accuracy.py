@@ -4,34 +4,22 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import (
-    FRESH,
-    LIMIT,
-    PATH,
-    Amount,
-    Written,
-    check_mode,
-    command,
-    flag,
-    on_ranks,
-    place_of,
-    remarked,
-    say,
-    with_scene,
-)  # fmt: skip
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Plot accuracy against run time; plan the job of a run.", ranks=True)
-@with_scene
-@click.option("-o", "--output", type=PATH, help="Directory for accuracy.nc and the figures.")
-@flag("--quick", "Measure with fewer points, in about a minute.")
-@FRESH
-@LIMIT
-@flag("--plan", "Estimate core-hours and wall time of a run instead, and print its Slurm options.")
+@cli.command("compute", "Plot accuracy against run time; plan the job of a run.", ranks=True)
+@cli.with_scene
+@click.option("-o", "--output", type=cli.PATH, help="Directory for accuracy.nc and the figures.")
+@cli.flag("--quick", "Measure with fewer points, in about a minute.")
+@cli.FRESH
+@cli.LIMIT
+@cli.flag(
+    "--plan", "Estimate core-hours and wall time of a run instead, and print its Slurm options."
+)
 @click.option(
     "--error",
-    type=Amount(0.0, 0.5, min_open=True),
+    type=cli.Amount(0.0, 0.5, min_open=True),
     metavar="RELATIVE",
     help="With --plan, target error of the objective, relative. By default the settings of the file are used.",
 )
@@ -43,7 +31,7 @@ from hpcclear.ranks.stopping import Exit
     help="With --plan, number of ranks to plan for. By default those of this run.",
 )
 def run(
-    written: Written,
+    written: cli.Written,
     output: Path | None,
     quick: bool,
     fresh: bool,
@@ -63,7 +51,7 @@ def run(
 
     Example: hpcclear accuracy jobs/quickstart.toml --plan --error 1e-3 --ranks 16
     """
-    check_mode("--plan", plan, ("output", "quick", "fresh", "time_limit"), ("error", "workers"))
+    cli.check_mode("--plan", plan, ("output", "quick", "fresh", "time_limit"), ("error", "workers"))
     if plan:
         _plan(written, error, workers)
     elif output is None:
@@ -74,33 +62,32 @@ def run(
 
 
 def _measure(
-    written: Written, output: Path, quick: bool, fresh: bool, time_limit: float | None
+    written: cli.Written, output: Path, quick: bool, fresh: bool, time_limit: float | None
 ) -> None:
-    with on_ranks(time_limit) as ranks:
+    with cli.on_ranks(time_limit) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
         from hpcclear.cli.accuracy import describe
         from hpcclear.ensemble.session import Options
-        from hpcclear.scene import load_scene
 
         def notify(text: str) -> None:
-            say(f"accuracy: {text}")
+            cli.say(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
-        scene, place = remarked(load_scene(*written)), place_of(output)
+        place = cli.place_of(output)
         describe(*run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh)))
 
 
-def _plan(written: Written, error: float | None, workers: int | None) -> None:
-    with on_ranks(resumes=False) as ranks:
+def _plan(written: cli.Written, error: float | None, workers: int | None) -> None:
+    with cli.on_ranks(resumes=False) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.accuracy.plan import ladder, measure
         from hpcclear.cli.plan import describe, preview
-        from hpcclear.scene import load_scene
 
         planned = ranks.size if workers is None else workers
-        scene = remarked(load_scene(*written))
         made = measure(
-            scene, ranks, ladder(scene, error), planned, say,
-            lambda plan: say(preview(plan, planned)), "auto",
+            scene, ranks, ladder(scene, error), planned, cli.say,
+            lambda plan: cli.say(preview(plan, planned)), "auto",
         )  # fmt: skip
         describe(made, str(written.file), error, planned)

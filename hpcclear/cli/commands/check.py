@@ -6,21 +6,21 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import PATH, Written, command, on_ranks, with_scene
+from hpcclear.cli import options as cli
 from hpcclear.ranks.launcher import is_launched
 from hpcclear.ranks.stopping import Exit
 
 
-@command("start", "Validate an input file and estimate run time.", ranks=True)
-@with_scene
+@cli.command("start", "Validate an input file and estimate run time.", ranks=True)
+@cli.with_scene
 @click.option("--cost/--no-cost", default=True, help="Simulate one sample and report its run time.")
 @click.option(
     "--sketch",
-    type=PATH,
+    type=cli.PATH,
     metavar="FIGURE",
     help="Draw the mechanism with names, axes and signs to this file (png, svg, pdf).",
 )
-def run(written: Written, cost: bool, sketch: Path | None) -> int:
+def run(written: cli.Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
 
     If the design in the file cannot turn, the exit code is 1 if the study varies its geometry, and 2 otherwise.
@@ -33,7 +33,9 @@ def run(written: Written, cost: bool, sketch: Path | None) -> int:
 
     launched = is_launched()
     with (
-        on_ranks(ahead=(), resumes=False) if launched else contextlib.nullcontext(alone()) as ranks
+        cli.on_ranks(ahead=(), resumes=False)
+        if launched
+        else contextlib.nullcontext(alone()) as ranks
     ):
         from hpcclear.scene import load_scene
 

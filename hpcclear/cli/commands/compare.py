@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcclear.cli.options import PATH, command, place_of, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
     from hpcclear.report.compare import Quantity
 
 
-@command("look", "Compare a response with measurements.")
-@click.argument("file", type=PATH)
-@click.argument("measured", type=PATH)
-@click.option("-o", "--output", type=PATH, help="Draw both to this file (png, svg, pdf).")
+@cli.command("look", "Compare a response with measurements.")
+@click.argument("file", type=cli.PATH)
+@click.argument("measured", type=cli.PATH)
+@click.option("-o", "--output", type=cli.PATH, help="Draw both to this file (png, svg, pdf).")
 @click.option(
     "--align",
     type=click.Choice(["auto", "angle", "correlation", "none"]),
@@ -63,7 +63,7 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
     if output is not None:
         from hpcclear.report import overlay_figure, save
 
-        show(f"figure   {save(overlay_figure(found), place_of(output))}")
+        cli.show(f"figure   {save(overlay_figure(found), cli.place_of(output))}")
     return Exit.DONE
 
 

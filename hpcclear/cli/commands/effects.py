@@ -5,26 +5,13 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import (
-    PATH,
-    How,
-    Written,
-    check_free,
-    command,
-    flag,
-    on_ranks,
-    output_option,
-    place_of,
-    remarked,
-    with_how,
-    with_scene,
-)  # fmt: skip
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Find effects that can be neglected.", ranks=True)
-@with_scene
-@output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
+@cli.command("compute", "Find effects that can be neglected.", ranks=True)
+@cli.with_scene
+@cli.output_option("NetCDF file to write; by default NAME-effects.nc here.", required=False)
 @click.option(
     "--tolerance",
     default="1%",
@@ -38,25 +25,25 @@ from hpcclear.ranks.stopping import Exit
     metavar="N",
     help="Largest number of samples of a variant. By default a twentieth of the study's simulations is spent.",
 )
-@flag(
+@cli.flag(
     "--forces", "Apply the tolerance to peak contact forces too. Without it they are only reported."
 )
 @click.option(
     "--scene",
     "reduced",
-    type=PATH,
+    type=cli.PATH,
     metavar="FILE",
     help="Write the recommended scene to this file.",
 )
-@with_how
+@cli.with_how
 def run(
-    written: Written,
+    written: cli.Written,
     output: Path | None,
     tolerance: str,
     samples: int | None,
     forces: bool,
     reduced: Path | None,
-    how: How,
+    how: cli.How,
 ) -> int:
     """Find effects that can be neglected: clearance in each joint, friction, gravity, loads and others.
 
@@ -65,21 +52,20 @@ def run(
     Example: mpiexec -n 2 hpcclear effects jobs/quickstart.toml --tolerance 2% -o results/effects.nc
     """
 
-    with on_ranks(how.time_limit) as ranks:
+    with cli.on_ranks(how.time_limit) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.cli.effects import describe, tolerance_of
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted
-        from hpcclear.scene import load_scene
         from hpcclear.study.extent import certificate_extent
 
         allowed = tolerance_of(tolerance)
-        scene = remarked(load_scene(*written))
         if reduced is not None:
-            check_free(reduced)
+            cli.check_free(reduced)
         most, budget = certificate_extent(scene, samples)
         found = run_effects(
             scene,
-            place_of(output or Path(f"{written.file.stem}-effects.nc")),
+            cli.place_of(output or Path(f"{written.file.stem}-effects.nc")),
             ranks,
             how.options(),
             Wanted(allowed, most, budget, forces),
@@ -88,6 +74,6 @@ def run(
         if reduced is not None:
             from hpcclear.results import files
 
-            files.write_bytes(place_of(reduced), found.content.attrs["reduced_scene"].encode())
+            files.write_bytes(cli.place_of(reduced), found.content.attrs["reduced_scene"].encode())
         sys.exit(code)
     return Exit.DONE

@@ -5,13 +5,13 @@ from pathlib import Path
 import click
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.options import PATH, command, directory_option, flag, place_of, say, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("keep", "Write results as a table for Excel, MATLAB or pandas.")
-@click.argument("files", type=PATH, nargs=-1, required=True, metavar="FILE...")
-@directory_option("Table to write: its name ends in .csv, .xlsx, .mat or .parquet.")
+@cli.command("keep", "Write results as a table for Excel, MATLAB or pandas.")
+@click.argument("files", type=cli.PATH, nargs=-1, required=True, metavar="FILE...")
+@cli.directory_option("Table to write: its name ends in .csv, .xlsx, .mat or .parquet.")
 @click.option(
     "--unit",
     "units",
@@ -19,7 +19,7 @@ from hpcclear.ranks.stopping import Exit
     metavar="UNIT",
     help='Unit for all quantities of its kind, such as kN. Repeatable. "SI" gives SI units. Default: those of the scene.',
 )
-@flag(
+@cli.flag(
     "--statistics",
     "Write statistics of samples instead: for each file columns of value and interval.",
 )
@@ -50,14 +50,14 @@ def run(
     if statistics:
         samples = writing.read_samples(files)
         lines = side_by_side(samples, beyond)
-        table = writing.statistics(samples, place_of(output), lines, units)
+        table = writing.statistics(samples, cli.place_of(output), lines, units)
         _print_rows(["statistic", *samples], rows_of(lines))
     else:
         _check_one(files, beyond)
-        table = writing.export(files[0], place_of(output), units)
+        table = writing.export(files[0], cli.place_of(output), units)
         for name in table.attrs["left_out"]:
-            say(f"Note: {name} is left out: it has too many columns. It stands in {files[0]}")
-    show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
+            cli.say(f"Note: {name} is left out: it has too many columns. It stands in {files[0]}")
+    cli.show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
     return Exit.DONE
 
 

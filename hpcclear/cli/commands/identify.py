@@ -6,35 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcclear.cli.options import (
-    PATH,
-    Amount,
-    How,
-    Written,
-    command,
-    flag,
-    on_ranks,
-    output_option,
-    place_of,
-    remarked,
-    with_how,
-    with_scene,
-)
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
 
 
-@command("compute", "Identify clearances from a measured signal.", ranks=True)
-@with_scene
-@output_option("NetCDF file to write.")
+@cli.command("compute", "Identify clearances from a measured signal.", ranks=True)
+@cli.with_scene
+@cli.output_option("NetCDF file to write.")
 @click.option(
     "--unknown", multiple=True, required=True, metavar="PATH=LO:HI",
     help="Entry to identify and its bounds. Repeatable.",
 )  # fmt: skip
 @click.option(
-    "--signal", multiple=True, type=PATH,
+    "--signal", multiple=True, type=cli.PATH,
     help="Measured table: time or crank angle, then signals. Repeatable, one for each date.",
 )  # fmt: skip
 @click.option(
@@ -54,7 +41,7 @@ if TYPE_CHECKING:
     "--resonance", metavar="HZ[:Q]", help="Mounting resonance of the sensor and its quality factor."
 )
 @click.option(
-    "--gain-error", type=Amount(min=0.0), default=0.0, metavar="SHARE",
+    "--gain-error", type=cli.Amount(min=0.0), default=0.0, metavar="SHARE",
     help="Standard deviation of the sensor's calibration factor, relative.",
 )  # fmt: skip
 @click.option(
@@ -62,7 +49,7 @@ if TYPE_CHECKING:
     help="Standard deviation of the crank-angle reference.",
 )  # fmt: skip
 @click.option(
-    "--noise", type=Amount(min=0.0, min_open=True), metavar="SHARE",
+    "--noise", type=cli.Amount(min=0.0, min_open=True), metavar="SHARE",
     help="Standard deviation of the sensor's noise, relative to the RMS of the signal. With it the scatter between "
          "revolutions is used too.",
 )  # fmt: skip
@@ -70,13 +57,13 @@ if TYPE_CHECKING:
     "--pressure", default="", metavar="COLUMN=AREA",
     help="Measured pressure on the slider as a known load: a column of the first table and the piston's area.",
 )  # fmt: skip
-@flag("--advise", "Compare signals: half-widths to expect, by number of revolutions.")
+@cli.flag("--advise", "Compare signals: half-widths to expect, by number of revolutions.")
 @click.option(
     "--members", type=click.IntRange(min=32), metavar="N",
     help="Simulations, rounded up to a power of two. By default 256, doubled by each further unknown.",
 )  # fmt: skip
-@with_how
-def run(written: Written, output: Path, how: How, **settings: Any) -> int:
+@cli.with_how
+def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> int:
     """Identify unknown clearances from a measured signal, with calibrated intervals.
 
     Random inputs of the scene's study are unknown too, within their distributions. Exit code 4 if the model does not
@@ -86,13 +73,12 @@ def run(written: Written, output: Path, how: How, **settings: Any) -> int:
     --unknown joints.crank_rod.clearance=10um:150um -o results/identify.nc
     """
 
-    with on_ranks(how.time_limit) as ranks:
+    with cli.on_ranks(how.time_limit) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.identify.answer import run_identify
         from hpcclear.identify.settings import Settings
-        from hpcclear.scene import load_scene
 
-        place, made = place_of(output), Settings(**settings)
-        scene = remarked(load_scene(*written))
+        place, made = cli.place_of(output), Settings(**settings)
         sys.exit(describe(run_identify(scene, place, ranks, made, how.options())))
     return Exit.DONE
 

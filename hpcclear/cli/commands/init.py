@@ -4,22 +4,22 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import PATH, check_free, check_mode, command, flag, place_of, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("start", "Write a starter scene, or a linkage from points or a drawing.")
-@click.argument("source", type=PATH, nargs=-1, metavar="[SOURCE]")
-@click.argument("file", type=PATH)
-@flag(
+@cli.command("start", "Write a starter scene, or a linkage from points or a drawing.")
+@click.argument("source", type=cli.PATH, nargs=-1, metavar="[SOURCE]")
+@click.argument("file", type=cli.PATH)
+@cli.flag(
     "--four-stroke",
     "A four-stroke engine, written as a linkage; its gas force repeats every two turns of the crank.",
 )
-@flag(
+@cli.flag(
     "--compressor",
     "A piston compressor with fits by ISO 286, and a sample of machines as they are made.",
 )
-@flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
+@cli.flag("--jobs", "All example scenes and Slurm scripts, in a new directory of this name.")
 @click.option(
     "--import",
     "imports",
@@ -34,7 +34,7 @@ from hpcclear.ranks.stopping import Exit
 )
 @click.option(
     "--sketch",
-    type=PATH,
+    type=cli.PATH,
     metavar="FIGURE",
     help="Draw the imported linkage with names, axes and signs to this file (png, svg, pdf).",
 )
@@ -63,14 +63,14 @@ def run(
 
     Example: hpcclear init --import points.csv linkage.toml --sketch linkage.png
     """
-    check_mode("--import", imports, ("four_stroke", "compressor", "jobs"), ("unit", "sketch"))
+    cli.check_mode("--import", imports, ("four_stroke", "compressor", "jobs"), ("unit", "sketch"))
     if imports and not source:
         raise click.UsageError("Missing argument 'SOURCE'.", click.get_current_context())
     if len(source) > imports:
         extra = " ".join(map(str, source[imports:]))
         words = f"Got unexpected extra argument ({extra})"
         raise click.UsageError(words, click.get_current_context())
-    check_free(file)
+    cli.check_free(file)
     if imports:
         _import(source[0], file, unit, sketch)
     elif jobs:
@@ -88,10 +88,10 @@ def _write_starter(file: Path, name: str) -> None:
 
     from hpcclear.results import files
 
-    files.probe(place_of(file))
+    files.probe(cli.place_of(file))
     text = resources.files("hpcclear.cli").joinpath(f"{name}.toml").read_text(encoding="utf-8")
     files.write_bytes(file, text.replace(" FILE", f" {file}").encode())
-    show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
+    cli.show(f"written  {file}\nnext     put your numbers in, then: hpcclear check {file}")
 
 
 def _copy_jobs(place: Path) -> None:
@@ -107,7 +107,7 @@ def _copy_jobs(place: Path) -> None:
             target = place / path.relative_to(source)
             target.parent.mkdir(parents=True, exist_ok=True)
             files.write_bytes(target, path.read_bytes())
-    show(
+    cli.show(
         f"written  {len(found)} files in {place}\nnext     hpcclear check {place / 'quickstart.toml'}"
     )
 
@@ -123,9 +123,11 @@ def _import(source: Path, file: Path, unit: str, sketch: Path | None) -> None:
     scene = load_scene(content)
     mechanism = content["mechanism"]
     files.write_bytes(file, importers.text_of(content, source.name, drawing.notes).encode())
-    show(f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints")
+    cli.show(
+        f"written  {file}: {len(mechanism['bodies'])} bodies, {len(mechanism['joints'])} joints"
+    )
     for label, text in importers.summary(content, drawing):
-        show(f"{label:8} {text}")
+        cli.show(f"{label:8} {text}")
     if sketch is not None:
         draw(scene, sketch)
-    show(f"next     put masses and the speed in, then: hpcclear check {file}")
+    cli.show(f"next     put masses and the speed in, then: hpcclear check {file}")

@@ -4,25 +4,13 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import (
-    How,
-    Written,
-    check_mode,
-    command,
-    flag,
-    on_ranks,
-    output_option,
-    place_of,
-    remarked,
-    with_how,
-    with_scene,
-)  # fmt: skip
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
-@with_scene
-@output_option("NetCDF file to write.")
+@cli.command("compute", "Map periodic and chaotic motion over one or two parameters.", ranks=True)
+@cli.with_scene
+@cli.output_option("NetCDF file to write.")
 @click.option(
     "--x",
     "x",
@@ -31,7 +19,9 @@ from hpcclear.ranks.stopping import Exit
     help="First parameter: scene entry, bounds, number of cells.",
 )
 @click.option("--y", "y", metavar="PATH=LO:HI:N", help="Second parameter.")
-@flag("--bifurcation", "Observe one value of each revolution instead, for a bifurcation diagram.")
+@cli.flag(
+    "--bifurcation", "Observe one value of each revolution instead, for a bifurcation diagram."
+)
 @click.option(
     "--observe",
     "name",
@@ -62,9 +52,9 @@ from hpcclear.ranks.stopping import Exit
     show_default=True,
     help="Revolutions that are observed.",
 )
-@with_how
+@cli.with_how
 def run(
-    written: Written,
+    written: cli.Written,
     output: Path,
     x: str,
     y: str | None,
@@ -73,7 +63,7 @@ def run(
     section: str,
     transient: int,
     revolutions: int,
-    how: How,
+    how: cli.How,
 ) -> int:
     """Map periodic and chaotic motion over one or two entries of the scene.
 
@@ -89,19 +79,18 @@ def run(
     -o results/b.nc
     """
     observing = ("name", "section", "transient", "revolutions")
-    check_mode("--bifurcation", bifurcation, ("y",), observing)
-    with on_ranks(how.time_limit) as ranks:
+    cli.check_mode("--bifurcation", bifurcation, ("y",), observing)
+    with cli.on_ranks(how.time_limit) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.cli.printing import describe_bifurcation, describe_map
         from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
         from hpcclear.ensemble.maps import number_of, run_map
-        from hpcclear.scene import load_scene
 
+        place = cli.place_of(output)
         if bifurcation:
             seen = Observation(name, number_of("--section", section, "rad"), transient, revolutions)
-            scene, place = remarked(load_scene(*written)), place_of(output)
             describe_bifurcation(run_bifurcation(scene, x, place, ranks, seen, how.options()))
         else:
             axes = (x,) if y is None else (x, y)
-            scene = remarked(load_scene(*written))
-            describe_map(run_map(scene, axes, place_of(output), ranks, how.options()))
+            describe_map(run_map(scene, axes, place, ranks, how.options()))
     return Exit.DONE

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hpcclear.base.errors import InputError, nearest
-from hpcclear.cli.options import PATH, TRUST, Amount, command, place_of, say, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from hpcclear.results.content import Results
 
 
-@command("look", "Draw figures and films of results.")
-@click.argument("place", type=PATH)
+@cli.command("look", "Draw figures and films of results.")
+@click.argument("place", type=cli.PATH)
 @click.option(
     "--figure",
     "names",
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     help="Figure to draw. Repeatable. Default: all. Without -o the names are listed.",
 )
 @click.option(
-    "-o", "--output", type=PATH, help="File for one figure (png, svg, pdf), otherwise a directory."
+    "-o",
+    "--output",
+    type=cli.PATH,
+    help="File for one figure (png, svg, pdf), otherwise a directory.",
 )
 @click.option(
     "--format",
@@ -38,10 +41,17 @@ if TYPE_CHECKING:
     help="Format of figures in a directory.",
 )
 @click.option(
-    "--animation", type=PATH, metavar="FILE", help="Film of the motion: .gif, or .mp4 with ffmpeg."
+    "--animation",
+    type=cli.PATH,
+    metavar="FILE",
+    help="Film of the motion: .gif, or .mp4 with ffmpeg.",
 )
 @click.option(
-    "--seconds", type=Amount(min=0.0), default=6.0, show_default=True, help="Length of the film."
+    "--seconds",
+    type=cli.Amount(min=0.0),
+    default=6.0,
+    show_default=True,
+    help="Length of the film.",
 )
 @click.option(
     "--revolutions",
@@ -50,7 +60,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Revolutions in the film, the last ones of the response.",
 )
-@TRUST
+@cli.TRUST
 def run(
     place: Path,
     names: tuple[str, ...],
@@ -72,15 +82,15 @@ def run(
 
     content = read(place)
     if animation is not None:
-        show(
-            f"film     {animate(_moving(content, place), place_of(animation), seconds, revolutions)}"
+        cli.show(
+            f"film     {animate(_moving(content, place), cli.place_of(animation), seconds, revolutions)}"
         )
     with trusting(trust):
         every = drawings(content.files, content.responses)
         if output is not None:
             _draw({name: known(name, every) for name in names} or every, output, kind, bool(names))
         elif animation is None:
-            show(f"figures of {place}: {', '.join(every)}")
+            cli.show(f"figures of {place}: {', '.join(every)}")
     return Exit.DONE
 
 
@@ -112,10 +122,10 @@ def _draw(
         output.mkdir(parents=True, exist_ok=True)
     for name, draw in figures.items():
         try:
-            show(
-                f"figure   {save(draw(), place_of(output) if single else output / f'{name}.{kind}')}"
+            cli.show(
+                f"figure   {save(draw(), cli.place_of(output) if single else output / f'{name}.{kind}')}"
             )
         except InputError as error:
             if chosen or error.key in ("figure", "matplotlib", "output"):
                 raise
-            say(f"Note: no {name}: {error.reason}. {error.remedy}")
+            cli.say(f"Note: no {name}: {error.reason}. {error.remedy}")

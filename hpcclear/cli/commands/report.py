@@ -4,16 +4,16 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import PATH, TRUST, command, place_of, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("look", "Write figures and an HTML page.")
-@click.argument("places", type=PATH, nargs=-1, required=True, metavar="DIRECTORY | FILE...")
+@cli.command("look", "Write figures and an HTML page.")
+@click.argument("places", type=cli.PATH, nargs=-1, required=True, metavar="DIRECTORY | FILE...")
 @click.option(
-    "-o", "--output", type=PATH, help="Page to write. Default: report.html beside the results."
+    "-o", "--output", type=cli.PATH, help="Page to write. Default: report.html beside the results."
 )
-@TRUST
+@cli.TRUST
 def run(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
     """Write figures and a self-contained HTML page from a directory of results, or from chosen files.
 
@@ -23,5 +23,5 @@ def run(places: tuple[Path, ...], output: Path | None, trust: bool) -> int:
     from hpcclear.report.html.page import write_report
 
     with trusting(trust):
-        show(f"report  {write_report(*places, output=output and place_of(output))}")
+        cli.show(f"report  {write_report(*places, output=output and cli.place_of(output))}")
     return Exit.DONE

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import PATH, TRUST, check_mode, command, flag, say, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("keep", "Repeat simulations bit by bit; describe results for an archive.")
-@click.argument("place", type=PATH)
+@cli.command("keep", "Repeat simulations bit by bit; describe results for an archive.")
+@click.argument("place", type=cli.PATH)
 @click.option(
     "--samples",
     type=click.IntRange(1),
@@ -17,8 +17,10 @@ from hpcclear.ranks.stopping import Exit
     show_default=True,
     help="Number of samples to repeat of each file.",
 )
-@TRUST
-@flag("--crate", "Describe a directory of results for an archive instead, as a Process Run Crate.")
+@cli.TRUST
+@cli.flag(
+    "--crate", "Describe a directory of results for an archive instead, as a Process Run Crate."
+)
 def run(place: Path, samples: int, trust: bool, crate: bool) -> int:
     """Repeat some simulations of a result from the scene in its file, and compare bit by bit.
 
@@ -32,7 +34,7 @@ def run(place: Path, samples: int, trust: bool, crate: bool) -> int:
 
     Example: hpcclear reproduce results/quickstart --crate
     """
-    check_mode("--crate", crate, ("samples", "trust"))
+    cli.check_mode("--crate", crate, ("samples", "trust"))
     return _describe(place) if crate else _repeat(place, samples, trust)
 
 
@@ -44,11 +46,13 @@ def _repeat(place: Path, samples: int, trust: bool) -> int:
         found = list(repeated(place, samples))
     for one in found:
         said = "not the same: " + ", ".join(one.differing) if one.differing else "the same"
-        show(f"{one.file}: {one.extent}" + ("" if one.extent.startswith("not") else f": {said}"))
+        cli.show(
+            f"{one.file}: {one.extent}" + ("" if one.extent.startswith("not") else f": {said}")
+        )
     for text in dict.fromkeys(text for one in found for text in one.changed):
-        show(f"made by another {text}")
+        cli.show(f"made by another {text}")
     if not found:
-        show("no samples and no responses: nothing was simulated again")
+        cli.show("no samples and no responses: nothing was simulated again")
     return Exit.FAILED if any(one.differing or one.unread for one in found) else Exit.DONE
 
 
@@ -56,7 +60,7 @@ def _describe(directory: Path) -> int:
     from hpcclear.results.crate import write_crate
 
     left_out: list[str] = []
-    show(f"crate  {write_crate(directory, left_out.append)}")
+    cli.show(f"crate  {write_crate(directory, left_out.append)}")
     for text in left_out:
-        say(f"Error: {text}")
+        cli.say(f"Error: {text}")
     return Exit.FAILED if left_out else Exit.DONE

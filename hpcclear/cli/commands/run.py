@@ -3,31 +3,18 @@
 from pathlib import Path
 from typing import Any
 
-from hpcclear.cli.options import (
-    FRESH,
-    LIMIT,
-    PROGRESS,
-    STUDYING,
-    Written,
-    command,
-    directory_option,
-    on_ranks,
-    place_of,
-    remarked,
-    say,
-    with_scene,
-)  # fmt: skip
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Run a complete study.", ranks=True)
-@with_scene
-@directory_option("Directory for the results.")
-@FRESH
-@LIMIT
-@PROGRESS
+@cli.command("compute", "Run a complete study.", ranks=True)
+@cli.with_scene
+@cli.directory_option("Directory for the results.")
+@cli.FRESH
+@cli.LIMIT
+@cli.PROGRESS
 def run(
-    written: Written,
+    written: cli.Written,
     output: Path,
     fresh: bool,
     time_limit: float | None,
@@ -38,18 +25,18 @@ def run(
     Example: mpiexec -n 2 hpcclear run jobs/quickstart.toml -o results/quickstart
     """
 
-    with on_ranks(time_limit, STUDYING) as ranks:
+    with cli.on_ranks(time_limit, cli.STUDYING) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.cli.printing import describe_study
-        from hpcclear.scene import load_scene
         from hpcclear.study import run_study
 
         place = run_study(
-            remarked(load_scene(*written)),
-            place_of(output),
+            scene,
+            cli.place_of(output),
             ranks,
             fresh=fresh,
             progress_style=progress,
-            notify=lambda text: say(text),
+            notify=lambda text: cli.say(text),
         )
         describe_study(place)
     return Exit.DONE

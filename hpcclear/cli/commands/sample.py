@@ -5,36 +5,21 @@ from pathlib import Path
 import click
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.options import (
-    PATH,
-    POINTS,
-    How,
-    Written,
-    check_mode,
-    command,
-    flag,
-    is_root,
-    on_ranks,
-    output_option,
-    place_of,
-    remarked,
-    with_how,
-    with_scene,
-)  # fmt: skip
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Simulate many designs.", ranks=True)
-@with_scene
-@output_option("NetCDF file to write.")
-@POINTS
-@flag(
+@cli.command("compute", "Simulate many designs.", ranks=True)
+@cli.with_scene
+@cli.output_option("NetCDF file to write.")
+@cli.POINTS
+@cli.flag(
     "--statistics",
     "Keep mean, standard deviation and histogram of Monte Carlo samples instead of the samples.",
 )
 @click.option(
     "--raw",
-    type=PATH,
+    type=cli.PATH,
     help="With --statistics: keep the samples too, in this directory. Open its samples.nc to read all of them.",
 )
 @click.option(
@@ -42,7 +27,7 @@ from hpcclear.ranks.stopping import Exit
     metavar="K/N",
     help="Simulate part K of N, for a job array. Each part has its own file; --merge joins them.",
 )
-@flag("--merge", "Merge the files of all parts into one, equal to the file of a single run.")
+@cli.flag("--merge", "Merge the files of all parts into one, equal to the file of a single run.")
 @click.option(
     "--beyond",
     "thresholds",
@@ -50,9 +35,9 @@ from hpcclear.ranks.stopping import Exit
     metavar="[RESULT=]VALUE",
     help='Print the share of samples above this value of f, or of a result: "peak_contact_force=3 kN". Repeatable.',
 )
-@with_how
+@cli.with_how
 def run(
-    written: Written,
+    written: cli.Written,
     output: Path,
     points: Path | None,
     thresholds: tuple[str, ...],
@@ -60,7 +45,7 @@ def run(
     raw: Path | None,
     part: str | None,
     merge: bool,
-    how: How,
+    how: cli.How,
 ) -> int:
     """Simulate the designs of the study, or those of a table (--points).
 
@@ -69,24 +54,23 @@ def run(
     Example: mpiexec -n 2 hpcclear sample jobs/quickstart.toml -o results/samples.nc
     """
     if merge:
-        simulating = ("thresholds", "statistics", "raw", "part", *How._fields)
-        check_mode("--merge", True, simulating)
-        return _merge(written, output, points) if is_root() else Exit.DONE
-    with on_ranks(how.time_limit) as ranks:
+        simulating = ("thresholds", "statistics", "raw", "part", *cli.How._fields)
+        cli.check_mode("--merge", True, simulating)
+        return _merge(written, output, points) if cli.is_root() else Exit.DONE
+    with cli.on_ranks(how.time_limit) as ranks:
         _check_kind(points, statistics, raw, part, how.fresh, thresholds)
+        scene = cli.read_scene(written)
         from hpcclear.cli.printing import describe_samples, describe_statistics
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
         from hpcclear.report.spread import beyond, units_of
-        from hpcclear.scene import load_scene
 
-        chosen = None if part is None else Part.parse(part)
-        scene, place = remarked(load_scene(*written)), place_of(output)
+        chosen, place = None if part is None else Part.parse(part), cli.place_of(output)
         units, joints = units_of(scene.objective), scene.joint_labels
         levels = [beyond(units, words, joints) for words in thresholds]
         if statistics:
-            kept = None if raw is None else place_of(raw)
+            kept = None if raw is None else cli.place_of(raw)
             describe_statistics(
                 run_statistics(scene, place, ranks, raw=kept, options=how.options())
             )
@@ -98,13 +82,12 @@ def run(
     return Exit.DONE
 
 
-def _merge(written: Written, output: Path, points: Path | None) -> int:
+def _merge(written: cli.Written, output: Path, points: Path | None) -> int:
+    scene = cli.read_scene(written)
     from hpcclear.cli.printing import describe_samples
     from hpcclear.ensemble.samples import design, run_merge
     from hpcclear.ranks.boundary import alone
-    from hpcclear.scene import load_scene
 
-    scene = remarked(load_scene(*written))
     describe_samples(run_merge(scene, design(scene, points), output, alone()))
     return Exit.DONE
 

@@ -5,11 +5,11 @@ from typing import Any
 import click
 
 from hpcclear import __version__
-from hpcclear.cli.options import command, show
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("start", "Show laws, the schema of scene files, or how to cite.")
+@cli.command("start", "Show laws, the schema of scene files, or how to cite.")
 @click.argument("what", type=click.Choice(["laws", "schema", "citation"]))
 def run(what: str) -> int:
     """Show what this version knows.
@@ -33,7 +33,7 @@ def _schema() -> None:
 
     from hpcclear.scene import scene_schema
 
-    show(json.dumps(scene_schema(), indent=2))
+    cli.show(json.dumps(scene_schema(), indent=2))
 
 
 PROGRAM = f"""@software{{hpcclear,
@@ -47,7 +47,7 @@ PROGRAM = f"""@software{{hpcclear,
 def _citation() -> None:
     from hpcclear.scene.describing import BIBTEX
 
-    show(f"{PROGRAM}\n\n{BIBTEX}")
+    cli.show(f"{PROGRAM}\n\n{BIBTEX}")
 
 
 _TITLES = {
@@ -73,7 +73,7 @@ def _laws() -> None:
 
     registries = {"contact": plugins.CONTACT_LAWS, "friction": plugins.FRICTION_LAWS}
     for kind, title in _TITLES.items():
-        show(title)
+        cli.show(title)
         offered = registries[kind].names() if kind in registries else ()
         for name, law in known_laws(kind).items():
             origin = registries[kind].origin(name) if name in offered else ""
@@ -87,7 +87,7 @@ def _list(place: str, registry: Any) -> None:
     from hpcclear.cli.terminal import console, table
 
     names, ours = registry.names(), registry.ours()
-    show(f"{place} ({registry.kind}): {', '.join(names)}")
+    cli.show(f"{place} ({registry.kind}): {', '.join(names)}")
     listed = names if place == "study.objective" else names[len(ours) :]
     rows = [(name, "; ".join(filter(None, _described(registry, name)))) for name in listed]
     if rows:

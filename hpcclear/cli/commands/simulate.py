@@ -5,34 +5,31 @@ from pathlib import Path
 
 import click
 
-from hpcclear.cli.options import (
-    Written,
-    command,
-    output_option,
-    place_of,
-    remarked,
-    say,
-    with_scene,
-)
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Simulate one design.")
-@with_scene
-@output_option("NetCDF file to write.")
+@cli.command("compute", "Simulate one design.")
+@cli.with_scene
+@cli.output_option("NetCDF file to write.")
 @click.option(
     "--keep",
     type=click.IntRange(1),
     metavar="N",
     help="Store the time series of the last N revolutions only.",
 )
-def run(written: Written, output: Path, keep: int | None) -> int:
+def run(written: cli.Written, output: Path, keep: int | None) -> int:
     """Simulate one design: objective, and time series of bearing forces, torque, motion and energies.
 
     Exit code 1 if the simulation failed, 4 if f was not as accurate as numerics.target_error. The file is written all the same.
 
     Example: hpcclear simulate jobs/slider_crank.toml -o results/response.nc
     """
+    if keep is not None:
+        written = written._replace(
+            overrides=(*written.overrides, f"output.keep_revolutions={keep}")
+        )
+    scene = cli.read_scene(written)
     from hpcclear.base.outcome import Flag, Status
     from hpcclear.cli.response import describe_response
     from hpcclear.dynamics import sizing
@@ -41,16 +38,10 @@ def run(written: Written, output: Path, keep: int | None) -> int:
     from hpcclear.ensemble.session import DEFAULT_OPTIONS, Place, Session
     from hpcclear.ranks.boundary import alone
     from hpcclear.results import dataset
-    from hpcclear.scene import load_scene
 
-    if keep is not None:
-        written = written._replace(
-            overrides=(*written.overrides, f"output.keep_revolutions={keep}")
-        )
-    scene = remarked(load_scene(*written))
     if sizing.stored_bytes(scene) > sizing.LARGE:
-        say(f"Time series: {sizing.words(scene)}. Shorter with --keep N")
-    place = Place.of_response(place_of(output))
+        cli.say(f"Time series: {sizing.words(scene)}. Shorter with --keep N")
+    place = Place.of_response(cli.place_of(output))
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
         if output.exists():
             dataset.read(output, "response")  # an earlier response is replaced, and nothing else
@@ -60,10 +51,10 @@ def run(written: Written, output: Path, keep: int | None) -> int:
     describe_response(response, output, time.perf_counter() - began)
     status = Status(int(response["status"]))
     if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:
-        say(f"Target missed: {why_missed(response, scene.numerics.target_error)}")
+        cli.say(f"Target missed: {why_missed(response, scene.numerics.target_error)}")
         return Exit.TARGET_MISSED
     if status.valid:
         return Exit.DONE
     said = response.attrs.get("ended", f"{status.name.lower()}: {status.message}")
-    say(f"Error: {said}. {status.remedy}")
+    cli.say(f"Error: {said}. {status.remedy}")
     return Exit.FAILED

@@ -3,25 +3,15 @@
 import sys
 from pathlib import Path
 
-from hpcclear.cli.options import (
-    How,
-    Written,
-    command,
-    on_ranks,
-    output_option,
-    place_of,
-    remarked,
-    with_how,
-    with_scene,
-)  # fmt: skip
+from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 
-@command("compute", "Simulate wear over the service life.", ranks=True)
-@with_scene
-@output_option("NetCDF file to write.")
-@with_how
-def run(written: Written, output: Path, how: How) -> int:
+@cli.command("compute", "Simulate wear over the service life.", ranks=True)
+@cli.with_scene
+@cli.output_option("NetCDF file to write.")
+@cli.with_how
+def run(written: cli.Written, output: Path, how: cli.How) -> int:
     """Simulate wear over the service life, for many mechanisms with random inputs.
 
     Results are clearance, f and peak force against revolutions, and the survival curve with confidence intervals.
@@ -31,11 +21,10 @@ def run(written: Written, output: Path, how: How) -> int:
     Example: mpiexec -n 2 hpcclear wear jobs/wear.toml -o results/wear.nc --set wear.lives=8
     """
 
-    with on_ranks(how.time_limit) as ranks:
+    with cli.on_ranks(how.time_limit) as ranks:
+        scene = cli.read_scene(written)
         from hpcclear.cli.wear import describe
         from hpcclear.ensemble.wear import run_wear
-        from hpcclear.scene import load_scene
 
-        scene = remarked(load_scene(*written))
-        sys.exit(describe(run_wear(scene, place_of(output), ranks, how.options())))
+        sys.exit(describe(run_wear(scene, cli.place_of(output), ranks, how.options())))
     return Exit.DONE
