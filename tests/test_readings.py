@@ -16,8 +16,7 @@ from hpcclear.identify.inputs import Unknown
 from hpcclear.scene import load_scene
 from hpcclear.scene.curves import Pairs, by_angle, by_time
 from hpcclear.scene.fields import Quantity
-from hpcclear.scene.paths import PHYSICAL, _entries_of_kinds, of_kinds, quantities
-from hpcclear.scene.planar import Planar
+from hpcclear.scene.paths import _all_entries, _quantity, of_kinds, quantities
 from hpcclear.scene.table import read_points
 from hpcclear.scene.variables import Variable
 
@@ -185,8 +184,8 @@ def test_a_width_in_percent_of_a_number_the_study_does_not_vary_is_of_the_scene(
 # ---- units by kind ----------------------------------------------------------------------------------
 ENTRIES = [
     (path, kind, quantity)
-    for top, model in (*PHYSICAL.items(), ("mechanism", Planar))
-    for path, quantity, kinds in _entries_of_kinds(model, top)
+    for path, field, kinds in _all_entries()
+    if (quantity := _quantity(field))
     for kind in kinds or ("",)
 ]
 TARGETS = sorted({quantity.unit for _, _, quantity in ENTRIES} - {""})

@@ -14,7 +14,7 @@ from hpcclear.base.units import UnitError, noting, to_si
 from hpcclear.ensemble.maps import axis
 from hpcclear.scene import load_scene
 from hpcclear.scene.numerics import Numerics
-from hpcclear.scene.paths import _entries, quantities
+from hpcclear.scene.paths import _entries, _quantity, quantities
 from hpcclear.scene.table import read_points
 
 JOBS = Path(__file__).parent.parent / "jobs"
@@ -54,7 +54,8 @@ OTHERS = (
 """Neither an angle nor a speed of one."""
 
 TARGETS = sorted(
-    {q.unit for q in (*quantities().values(), *dict(_entries(Numerics, "numerics")).values())}
+    {q.unit for q in quantities().values()}
+    | {q.unit for _, field, _ in _entries(Numerics, "numerics") if (q := _quantity(field))}
 )
 EVERY = {**BY_TIME, **OF_TURNS, **IN_HERTZ, **ANGLES}
 

@@ -100,6 +100,24 @@ def nearest(word: str, words: Sequence[str]) -> str:
     return "Use one of: " + ", ".join(words[:MOST_LISTED]) + (f" ({more} more)" if more > 0 else "")
 
 
+def content_of(path: Path, what: str, most: int, remedy: str, shorter: str) -> bytes:
+    """Bytes of a regular file, `most` of them at most; InputError of `what` says what to give instead, or how to shorten it."""
+    try:
+        if not path.is_file():
+            reason = "is not a regular file" if path.exists() else "there is no such regular file"
+            raise InputError(what, str(path), reason, remedy)
+        with path.open("rb") as stream:
+            data = stream.read(min(path.stat().st_size, most) + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+        raise InputError(what, str(path), reason, remedy) from None
+    if len(data) > most:
+        raise InputError(what, str(path), f"is larger than {most} bytes", shorter)
+    return data
+
+
 class StorageError(RuntimeError):
     """The disk refused a write; what was there before is intact. Exit code 1.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, at
 from hpcclear.base.units import UnitError, note, to_si
 from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
@@ -72,10 +72,8 @@ def _number(words: str, unit: str) -> float:
 
 def number_of(key: str, words: str, unit: str) -> float:
     """A plain number in SI, or one with a unit; raises InputError at `key` where it is neither."""
-    try:
+    with at(key, words):
         value = _number(words, unit)
-    except UnitError as error:
-        raise InputError(key, words, error.reason, error.remedy) from None
     if not np.isfinite(value):
         raise InputError(key, words, "is not a finite number", f"Write a number in {unit}")
     return value

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.base.objectives import Objective
 from hpcclear.base.outcome import FIELDS, Status
 from hpcclear.base.student import student
-from hpcclear.base.units import UnitError, to_si
+from hpcclear.base.units import to_si
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.results.content import Results
@@ -112,10 +112,8 @@ def beyond(units: Mapping[str, str], words: str, joints: Sequence[str] = ()) -> 
         raise InputError("--beyond", words, "the value has no unit", remedy)
     if np.isfinite(plain):
         return Beyond(name, plain, joint)
-    try:
+    with at("--beyond", words):
         return Beyond(name, to_si(text, unit), joint)
-    except UnitError as error:
-        raise InputError("--beyond", words, error.reason, error.remedy) from None
 
 
 def _of_joints(name: str) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, content_of
 from hpcclear.base.units import is_unit, may_be_thousands
 from hpcclear.scene import clock
 
@@ -54,19 +54,7 @@ Lines = list[tuple[int, str]]
 
 def bytes_of(path: Path, what: str) -> bytes:
     """Bytes of a file that may be a table; raises InputError where it is too large, or of another kind."""
-    remedy = "Give a CSV or .xlsx file"
-    try:
-        if not path.is_file():
-            raise InputError(what, str(path), "there is no such regular file", remedy)
-        with path.open("rb") as stream:
-            data = stream.read(min(path.stat().st_size, LARGEST_FILE) + 1)
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise InputError(what, str(path), reason, remedy) from None
-    if len(data) > LARGEST_FILE:
-        raise InputError(what, str(path), f"is larger than {LARGEST_FILE} bytes", "Split it")
+    data = content_of(path, what, LARGEST_FILE, "Give a CSV or .xlsx file", "Split it")
     for begin, kind in _FOREIGN.items():
         if data.startswith(begin):
             raise InputError(what, str(path), f"is {kind}", _SAVE)

@@ -15,8 +15,7 @@ from hpcclear.base.plain import plain
 from hpcclear.base.units import UnitError, factor, fits
 from hpcclear.scene.delimited import Column, parsed_heading
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
-from hpcclear.scene.loads import SIZED
-from hpcclear.scene.paths import replace
+from hpcclear.scene.paths import curves, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
 from hpcclear.scene.validation import validated
 
@@ -282,21 +281,6 @@ def _revolution(angles: Array, values: Array, where: tuple[str, str]) -> tuple[A
     return angles, values
 
 
-CURVES = {
-    "effects.slider_load": "N",
-    "drive.torque": "N*m",
-    "mechanism.drives.*.torque": "N*m",
-    **{f"mechanism.loads.*.{one.size_entry}": one.unit for one in SIZED},
-}
-"""Entries that may be a curve against the crank angle, and their units."""
-BY_TIME = {
-    "mechanism.drives.*.angle": "rad",
-    "mechanism.drives.*.speed_by_time": "rad/s",
-    **{f"mechanism.loads.*.{one.size_entry}_by_time": one.unit for one in SIZED},
-}
-"""Entries that are tables against the time."""
-
-
 def with_values(
     content: Mapping[str, object], folder: Path
 ) -> tuple[Mapping[str, object], list[str]]:
@@ -369,16 +353,16 @@ def _curve(
 ) -> tuple[list[list[float]], str]:
     parts = key.split(".")
     general = ".".join((*parts[:2], "*", *parts[3:])) if parts[0] == "mechanism" else key
-    if general not in CURVES and general not in BY_TIME:
-        raise InputError(
-            f"{key}.file", row["file"], "no file is read here",
-            f"Files stand in study.random.NAME, {', '.join((*CURVES, *BY_TIME)).replace('*', 'NAME')}",
-        )  # fmt: skip
+    if general not in curves():
+        listed = ", ".join(curves()).replace("*", "NAME")
+        remedy = f"Files stand in study.random.NAME, {listed}"
+        raise InputError(f"{key}.file", row["file"], "no file is read here", remedy)
     with at(key):
         curve = validated(FileCurve, row)
-    if general in BY_TIME:
-        return against_time(curve, folder, BY_TIME[general], key)
-    return pairs_of(curve, folder, CURVES[general], key, _turns(content))
+    unit = curves()[general].unit
+    if curves()[general].x == "s":
+        return against_time(curve, folder, unit, key)
+    return pairs_of(curve, folder, unit, key, _turns(content))
 
 
 def _turns(content: Mapping[str, object]) -> int:

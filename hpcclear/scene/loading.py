@@ -10,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, content_of
 from hpcclear.scene.file_curves import files_named, with_values
 from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import flatten
@@ -20,6 +20,7 @@ from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import DEEPEST, dotted, scene_of
 
 LARGEST_FILE = 1_000_000  # bytes; the paper's own study needs three thousand
+_SHORTER = "Scenes have a few thousand bytes"
 # tomllib takes quadratic time over one key with very many dots, so such a key is refused before it
 # is parsed.
 _DOTTED = re.compile(
@@ -158,31 +159,11 @@ def _beside(folder: Path, module: str) -> str | None:
 def _read(
     path: Path, what: str = "scene file", remedy: str = "Give the path of a TOML scene file"
 ) -> str:
-    name = str(path)
     try:
-        if not path.is_file():
-            reason = "is not a regular file" if path.exists() else "there is no such file"
-            raise InputError(what, name, reason, remedy)
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(what, name, f"cannot be read ({reason})", remedy) from None
-    if len(data) > LARGEST_FILE:
-        raise InputError(
-            what,
-            name,
-            f"is larger than {LARGEST_FILE} bytes",
-            "Scenes have a few thousand bytes",
-        )
-    try:
-        return data.decode("utf-8-sig")
+        return content_of(path, what, LARGEST_FILE, remedy, _SHORTER).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(
-            what, name, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8"
-        ) from None
+        reason = f"is not UTF-8 text (byte {error.start})"
+        raise InputError(what, str(path), reason, "Save it as UTF-8") from None
 
 
 def parse(text: str, name: str) -> dict[str, object]:
@@ -195,12 +176,7 @@ def parse(text: str, name: str) -> dict[str, object]:
     """
     remedy = "Correct the TOML syntax there"
     if len(text) > LARGEST_FILE:
-        raise InputError(
-            "scene file",
-            name,
-            f"is larger than {LARGEST_FILE} bytes",
-            "Scenes have a few thousand bytes",
-        )
+        raise InputError("scene file", name, f"is larger than {LARGEST_FILE} bytes", _SHORTER)
     if _DOTTED.search(text):
         raise InputError(
             "scene file", name, "a key has too many dots", f"Nest at most {DEEPEST} tables"

@@ -2,10 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from hpcclear.base.outcome import MAX_BANDS
-from hpcclear.base.remarks import remark
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene.cases import ObjectiveName
 from hpcclear.scene.fields import Count, PositiveLength, Quantity, Table
@@ -70,18 +69,6 @@ class Numerics(Table):
     """Frequencies, Hz. Each sample records the force levels of the third-octave bands that contain them, with
     half-widths, and half-widths of the measures of impact. Enabled automatically if the study needs a level. Samples
     then take ten times as long or more."""
-
-    @field_validator("method", mode="before")
-    @classmethod
-    def _method_that_was(cls, value: object) -> object:
-        """One version long: collocation has gone, and what stands in its place is as tight."""
-        if value != "lobatto":
-            return value
-        remark(
-            'Note: numerics.method = "lobatto" is replaced by "prince-dormand", the explicit pair of order 8. '
-            "The next version refuses the old word"
-        )
-        return "prince-dormand"
 
     @property
     def absolute_tolerance(self) -> float:

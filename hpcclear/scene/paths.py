@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene.curves import Pairs
+from hpcclear.scene.curves import MOST_ROWS, Pairs
 from hpcclear.scene.effects import Effects
 from hpcclear.scene.fields import NamedRows, Quantity
 from hpcclear.scene.laws import ENTRIES, law_entries
@@ -75,25 +75,31 @@ def _kinds_of(model: type[BaseModel]) -> tuple[str, ...]:
     return () if field is None else tuple(map(str, get_args(field.annotation)))
 
 
-def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, Quantity]]:
-    for path, quantity, _ in _entries_of_kinds(annotation, prefix):
-        yield path, quantity
-
-
-def _entries_of_kinds(
-    annotation: object, prefix: str
-) -> Iterator[tuple[str, Quantity, tuple[str, ...]]]:
-    """Paths, quantities, and the kinds of table that have them."""
+def _entries(annotation: object, prefix: str) -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:
+    """Paths and declarations of entries that are no tables, and the kinds of table that have them."""
     for model in _parts(annotation):
         if not (isinstance(model, type) and issubclass(model, BaseModel)):
             continue
         for name, field in model.model_fields.items():
-            path, quantity = f"{prefix}.{name}", _quantity(field)
-            if quantity is not None:
-                yield path, quantity, _kinds_of(model)
-            else:
-                inner = f"{path}.*" if _named(field) else path
-                yield from _entries_of_kinds(field.annotation, inner)
+            path = f"{prefix}.{name}"
+            inner = f"{path}.*" if _named(field) else path
+            yield from [*_entries(field.annotation, inner)] or [(path, field, _kinds_of(model))]
+
+
+def _all_entries() -> Iterator[tuple[str, FieldInfo, tuple[str, ...]]]:
+    for top, model in (*PHYSICAL.items(), ("mechanism", Planar)):
+        yield from _entries(model, top)
+
+
+@lru_cache(maxsize=1)
+def curves() -> Mapping[str, Pairs]:
+    """Tables of pairs that may come from a file, by path, such as "mechanism.drives.*.torque"."""
+    return {
+        path: part
+        for path, field, _ in _all_entries()
+        for part in (*field.metadata, *_parts(field.annotation))
+        if isinstance(part, Pairs) and part.most > MOST_ROWS
+    }
 
 
 class Quantities(dict[str, Quantity]):
@@ -149,10 +155,9 @@ _NAMED = ("bodies", "joints", "drives", "loads", "points")
 @lru_cache(maxsize=1)
 def quantities() -> Mapping[str, Quantity]:
     """Every path of a physical number that some scene may have, with its unit and bounds."""
-    tables = [*PHYSICAL.items(), ("mechanism", Planar)]
     found, of_kind = Quantities(), dict[str, dict[str, Quantity]]()
-    for top, model in tables:
-        for path, quantity, kinds in _entries_of_kinds(model, top):
+    for path, field, kinds in _all_entries():
+        if (quantity := _quantity(field)) is not None:
             found[path] = quantity
             of_kind.setdefault(path, {}).update(dict.fromkeys(kinds, quantity))
     found.of_kind = {path: rows for path, rows in of_kind.items() if len(set(rows.values())) > 1}

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.base.units import (
     UnitError,
     check_thousands,
@@ -141,10 +141,8 @@ class Sheet:
             return np.array(clock.seconds(column.cells, lambda row: self.place(column, row)))
         own, size = plain_unit(column.unit or default, unit), _ONE
         if own not in ("", unit):
-            try:
+            with at(key, column.heading):
                 size = factor(own, unit)
-            except UnitError as error:
-                raise InputError(key, column.heading, error.reason, error.remedy) from None
             note_turns(f"1 {own} in {column.heading}", "1", own, unit)
         if not self.comma and all(map(_PLAIN.issuperset, column.cells)):
             try:
@@ -170,12 +168,8 @@ class Sheet:
             ]
         made = list[float | str]()
         for row, cell in enumerate(column.cells):
-            try:
+            with at(self.place(column, row), cell):
                 number, unit = quantity(self._pointed(cell), "", decided=self.comma)
-            except UnitError as error:
-                raise InputError(
-                    self.place(column, row), cell, error.reason, error.remedy
-                ) from None
             made.append(written(float(number), unit))
         return made
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from hpcclear.base.errors import InputError
-from hpcclear.base.units import UnitError, to_si
+from hpcclear.base.errors import at, content_of
+from hpcclear.base.units import to_si
 from hpcclear.scene.importers import dxf, linkage2, pmks, table
 from hpcclear.scene.importers.file import File
 from hpcclear.scene.importers.points import Drawing, scene_of, summary, text_of
@@ -66,21 +66,10 @@ def drawing_of(path: Path, unit: str = "") -> Drawing:
         If no format fits the file, or the file has parts that a scene cannot have.
     """
     if unit:
-        try:
+        with at("--unit", unit):
             to_si(f"1 {unit}", "m")
-        except UnitError as error:
-            raise InputError("--unit", unit, error.reason, error.remedy) from None
-    data = b""
-    try:
-        if path.is_file():
-            if path.stat().st_size > LARGEST_FILE:
-                reason = f"is larger than {LARGEST_FILE} bytes"
-                raise InputError("file", str(path), reason, "Save the mechanism alone")
-            data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            "file", str(path), f"cannot be read ({error.strerror})", "Check the file"
-        ) from None
+    remedies = "Check the file", "Save the mechanism alone"
+    data = content_of(path, "file", LARGEST_FILE, *remedies) if path.is_file() else b""
     found = next(one for one in FORMATS if one.begins(data[:4096]))
     return found.drawing_of(File(path, data, unit, found.again))
 

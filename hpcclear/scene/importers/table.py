@@ -4,8 +4,8 @@ import itertools
 import re
 from collections.abc import Sequence
 
-from hpcclear.base.errors import InputError, nearest
-from hpcclear.base.units import UnitError, factor, to_si
+from hpcclear.base.errors import InputError, at, nearest
+from hpcclear.base.units import factor, to_si
 from hpcclear.scene.delimited import Column
 from hpcclear.scene.importers.file import GROUND, File, Names
 from hpcclear.scene.importers.points import Drawing, Point
@@ -115,8 +115,6 @@ def _bodies(
 def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
     if column is None or column.cells[row].strip() in ("", "-"):
         return None
-    try:
+    with at(sheet.path, column.heading):
         size = factor(column.unit or "deg", "rad")
-    except UnitError as error:
-        raise InputError(sheet.path, column.heading, error.reason, error.remedy) from None
     return sheet.number(column, row, "rad", size)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args
 
 from pydantic import Field
 
-from hpcclear.scene.loads.declared import Load, SizedLoad
+from hpcclear.scene.loads.declared import Load
 
 
 def _found() -> dict[str, type[Load]]:
@@ -21,9 +21,6 @@ def _found() -> dict[str, type[Load]]:
 
 KINDS: dict[str, type[Load]] = _found()
 """Tables of loads by their kinds."""
-SIZED = [one for one in KINDS.values() if issubclass(one, SizedLoad)]
-"""Those whose size may be a curve."""
-
 if TYPE_CHECKING:
     AnyLoad = Any
 else:
