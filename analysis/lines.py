@@ -37,7 +37,7 @@ FEATURES = {
         "study/worst.py ensemble/corners.py cli/corners.py",
     "curves, tables and workbooks in; tables out":
         "scene/sheets.py scene/delimited.py "
-        "scene/workbook.py scene/clock.py scene/file_curves.py scene/table.py "
+        "scene/workbook.py scene/clock.py scene/file_curves.py scene/points.py "
         "report/tables.py report/export.py cli/commands/export.py",
     "comparison with measurements":
         "report/compare.py report/merit.py report/beside.py report/alike.py report/figures/compared.py "
@@ -70,7 +70,7 @@ FEATURES = {
         "study/launched.py base/host.py",
     "statistics of millions of samples, parts of arrays":
         "statistics/streams/* ensemble/statistics.py ensemble/raw.py ensemble/split.py ensemble/parts.py "
-        "scene/pages.py",
+        "scene/sampling.py",
     "killed runs, lost ranks, damaged files":
         "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py "
         "results/places.py",
@@ -81,7 +81,7 @@ FEATURES = {
     "sensitivities":
         "statistics/sensitivity/* study/sensitivities.py study/contributions.py",
     "distributions of random inputs":
-        "scene/distributions.py scene/correlation.py scene/random_inputs.py base/quantiles.py statistics/random/rules.py",
+        "scene/random_inputs.py scene/correlation.py scene/random_inputs.py base/quantiles.py statistics/random/rules.py",
     "a front searched by simulations, judged with intervals":
         "statistics/search/improvement.py statistics/search/infill.py statistics/search/certainty.py study/refinement.py "
         "study/truth.py study/verification.py",

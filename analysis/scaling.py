@@ -105,7 +105,7 @@ def handed_cost() -> float:
     from scenes import scene
 
     from hpcclear.scene import load_scene
-    from hpcclear.scene.pages import MonteCarloPoints
+    from hpcclear.scene.sampling import MonteCarloPoints
 
     content = scene("lankarani-nikravesh", 1e-6, 5, 5).resolved()
     content["study"]["method"] = "monte-carlo"

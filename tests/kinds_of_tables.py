@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import load_scene
-from hpcclear.scene.table import read_points
+from hpcclear.scene.points import read_points
 
 JOBS = Path(__file__).parents[1] / "jobs"
 DESIGNS = [["210", "0.3", "5000"], ["180", "0.25", "4000"]]

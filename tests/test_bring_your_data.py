@@ -15,8 +15,7 @@ from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import netcdf
 from hpcclear.scene import load_scene
 from hpcclear.scene.loading import scene_of_text
-from hpcclear.scene.points import Points
-from hpcclear.scene.table import read_points
+from hpcclear.scene.points import Points, read_points
 
 JOBS = Path(__file__).parents[1] / "jobs"
 ALL = kinds_of_tables.kinds()

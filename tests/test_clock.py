@@ -10,8 +10,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.identify.measured import read_measured
 from hpcclear.scene import load_scene
 from hpcclear.scene.clock import is_clock, seconds
+from hpcclear.scene.points import read_points
 from hpcclear.scene.sheets import read_series
-from hpcclear.scene.table import read_points
 
 START = datetime.datetime(2026, 3, 14, 23, 59, 58, 250_000)
 STEPS = [0.0, 0.5, 1.25, 2.0, 3.5, 61.0]

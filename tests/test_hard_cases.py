@@ -20,8 +20,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 
 CASES = sorted((Path(__file__).parent / "hard_cases").glob("*.toml"))
 # one open joint is a kernel of its own each, which takes long to compile

@@ -33,7 +33,7 @@ from hpcclear.report.html import guard
 from hpcclear.report.html.page import write_report
 from hpcclear.results import files, netcdf
 from hpcclear.scene import load_scene
-from hpcclear.scene.table import read_points
+from hpcclear.scene.points import read_points
 
 pytestmark = pytest.mark.timeout(600)
 

@@ -19,8 +19,7 @@ from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, p
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.laws.friction import lugre
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.switches import Off, switches
 
 LUGRE = {

@@ -11,8 +11,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.units import to_si
 from hpcclear.scene import load_scene
 from hpcclear.scene.importers import drawing_of
+from hpcclear.scene.points import read_points
 from hpcclear.scene.sheets import read, read_series
-from hpcclear.scene.table import read_points
 
 NUMBERS = ["0.3", "0.34", "0.7", "0.9", "0.45"]
 SECONDS = ["0.0", "0.1", "0.2", "0.3", "0.4"]

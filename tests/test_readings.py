@@ -17,7 +17,7 @@ from hpcclear.scene import load_scene
 from hpcclear.scene.curves import Pairs, by_angle, by_time
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.paths import _all_entries, _quantity, of_kinds, quantities
-from hpcclear.scene.table import read_points
+from hpcclear.scene.points import read_points
 from hpcclear.scene.variables import Variable
 
 JOBS = Path(__file__).parents[1] / "jobs"

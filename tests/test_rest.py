@@ -14,8 +14,7 @@ from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.scene import load_scene
 from hpcclear.scene.describing import effects_on
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.switches import Off, switches
 
 REST = {"kind": "torque", "torque": 5.0, "initial_speed": 0.0, "expected_speed": "1000 rpm"}

@@ -15,7 +15,7 @@ from hpcclear.ensemble.maps import axis
 from hpcclear.scene import load_scene
 from hpcclear.scene.numerics import Numerics
 from hpcclear.scene.paths import _entries, _quantity, quantities
-from hpcclear.scene.table import read_points
+from hpcclear.scene.points import read_points
 
 JOBS = Path(__file__).parent.parent / "jobs"
 TURN = 2.0 * math.pi

@@ -16,8 +16,7 @@ from hpcclear.ensemble.samples import samples_of
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.named import SHORT_NAMES
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,8 +10,7 @@ from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.planar.problem import poses_at_start, refused_of, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
-from hpcclear.scene.points import Points, expanded, snapped
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points, expanded, snapped
 from hpcclear.scene.streams import generator
 
 MOST = 64

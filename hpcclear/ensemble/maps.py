@@ -18,8 +18,7 @@ from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.grids import SHAPE, grid
 from hpcclear.scene import Scene, load_scene
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
 

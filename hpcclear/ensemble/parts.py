@@ -136,7 +136,7 @@ class Summariser:
 def make_summariser(payload: Mapping[str, Any], ranks: "Ranks") -> Summariser:
     """A rank's worker: what `payload["make"]` makes of `payload["samples"]`, summed up where it is simulated."""
     from hpcclear.scene import load_scene
-    from hpcclear.scene.pages import MonteCarloPoints
+    from hpcclear.scene.sampling import MonteCarloPoints
     from hpcclear.scene.scene import record_of
 
     worker = payload["make"](payload["samples"], ranks)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import collection, dataset
-from hpcclear.scene.pages import MonteCarloPoints
+from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.summary import BLOCK
 
 if TYPE_CHECKING:

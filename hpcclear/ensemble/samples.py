@@ -26,10 +26,9 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.keys import check_key
 from hpcclear.scene import Scene
-from hpcclear.scene.points import Points, expanded
+from hpcclear.scene.points import Points, expanded, read_points
 from hpcclear.scene.sampling import sampled
 from hpcclear.scene.scene import record_of
-from hpcclear.scene.table import read_points
 
 MEMORY = 2.3e-6
 """GB that root takes for a sample (`analysis/many_ranks.py`)."""

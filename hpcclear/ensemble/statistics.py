@@ -29,7 +29,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
-from hpcclear.scene.pages import MonteCarloPoints
+from hpcclear.scene.sampling import MonteCarloPoints
 from hpcclear.statistics.streams.accumulator import Accumulator
 from hpcclear.statistics.streams.summary import BLOCK, QUANTITIES, Summary, rows_of
 

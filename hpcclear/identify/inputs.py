@@ -15,8 +15,7 @@ from hpcclear.identify.signals import Sensor
 from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
 from hpcclear.scene.paths import quantities
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.streams import generator, sobol
 
 

@@ -1,14 +1,24 @@
-"""Designs to simulate: an array with a name and scene entries for each column."""
+"""Designs to simulate: arrays with a name and scene entries for each column, their check, and users' tables of them."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
+from hpcclear.scene.delimited import Column
+from hpcclear.scene.domain import entries
+from hpcclear.scene.fields import nearest
+from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import described, quantities
+from hpcclear.scene.scene import Scene
+from hpcclear.scene.sheets import Sheet, read
+from hpcclear.scene.slider_crank import Mechanism
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
 
@@ -137,3 +147,180 @@ def expanded(study: Study | None, points: Points) -> Points:
             columns.append(table[numbers])
     values = np.column_stack(columns) if len(points) else np.empty((0, len(names)))
     return Points(tuple(names), values, tuple(paths), points.labels, points.sampling)
+
+
+def check_points(
+    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
+) -> None:
+    """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
+        radius, friction at rest is less than sliding, or a rod is not longer than its crank.
+    """
+    points = expanded(scene.study, points)
+    for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
+        for path in paths:
+            bounds = quantities()[path].bounds()
+            reason = f"must be finite and {bounds}" if bounds else "must be finite"
+            _refuse(~quantities()[path].holds(column), column, name, reason, label)
+            if path.endswith("initial_speed"):
+                usual = path.replace("initial_speed", "expected_speed")
+                reason = f"starts from rest, and {usual} is not given"
+                if usual not in scene.numeric_paths():
+                    _refuse(column == 0.0, column, name, reason, label)
+    pairs = []
+    if isinstance(scene.mechanism, Mechanism):
+        reason = "the rod no longer than the crank"
+        pairs.append(("mechanism.crank.length", "mechanism.rod.length", 1.0, reason))
+    for joint in scene.clearance_joints():
+        for small, large, times, reason in scene.clearance_joint(joint).ordered:
+            key = scene.joint_key(joint)
+            pairs.append((f"{key}.{small}", f"{key}.{large}", times, reason))
+    for small, large, times, reason in pairs:
+        lower, upper = (
+            entries(scene, points.paths, points.values, path) for path in (small, large)
+        )
+        word = "" if times == 1.0 else f"{times:g} "
+        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
+        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
+    _check_laws(scene, points, label)
+
+
+def _check_laws(scene: Scene, points: Points, label: Callable[[int], str]) -> None:
+    """Refuse values that a law does not take together."""
+    for kind in ("contact", "friction"):
+        table = getattr(scene.effects, kind)
+        driven = {path for paths in points.paths for path in paths}
+        if table is None or table.declared.check is None:
+            continue
+        names = [name for name in table.values() if f"effects.{kind}.{name}" in driven]
+        if not names:
+            continue
+        columns = {
+            name: np.broadcast_to(
+                entries(scene, points.paths, points.values, f"effects.{kind}.{name}"), len(points)
+            )
+            for name in names
+        }
+        for row in range(len(points)):
+            own = {name: float(column[row]) for name, column in columns.items()}
+            wrong = table.declared.check({**table.values(), **own})
+            if wrong is not None:
+                reason, remedy, name = wrong
+                raise InputError(
+                    f"{label(row)}, {name}", own.get(name, table.value(name)), reason, remedy
+                )
+
+
+def _refuse(
+    bad: Booleans, values: Array, name: str, reason: str, label: Callable[[int], str]
+) -> None:
+    if bad.any():
+        row = int(np.argmax(bad))
+        key = f"{label(row)}, {name}"
+        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
+
+
+LABELS = (
+    "design", "name", "label", "part", "id", "no", "no.", "nr", "nr.", "number", "index", "run", "#",
+)  # fmt: skip
+"""Headings, in small letters, of columns that name the rows."""
+
+
+def read_points(path: str | Path, scene: Scene) -> Points:
+    """A user's table of designs: a CSV file of any spreadsheet program, or an Excel workbook.
+
+    The first row names the columns: study variables, short names (m2, C, ...), or dotted
+    scene paths, each with an optional unit, as in ``C [mm]`` or in a row below. Every further row is a design; lines
+    that are empty or begin with # are left out. A column of text names the rows.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    scene : Scene
+        What the columns change; a study is not needed.
+
+    Returns
+    -------
+    Points
+        In SI.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a cell is no number; it names row (line of the file) and
+        column.
+    """
+    key, sheet = str(path), read(Path(path))
+    labels, columns = [], []
+    for column in sheet.columns:
+        found = _driven(column, scene, key, sheet)
+        if found is None:
+            labels.append(column)
+        else:
+            columns.append(found)
+    if not columns:
+        raise InputError(
+            key,
+            ", ".join(sheet.names),
+            "no column has numbers of this scene",
+            "Name one such as m2 [g]",
+        )
+    names, paths = tuple(c.column.name for c in columns), tuple(c.paths for c in columns)
+    driven = [path for column in paths for path in column]
+    for path_ in driven:
+        if driven.count(path_) > 1:
+            raise InputError(
+                key, ", ".join(names), f"two columns drive {path_}", "Remove one of them"
+            )
+    values = np.column_stack([column.read(sheet) for column in columns])
+    named = tuple(" ".join(cells) for cells in zip(*(one.cells for one in labels), strict=True))
+    points = Points(names, values, paths, named if labels else ())
+    check_points(scene, points, lambda row: f"{key}, line {sheet.lines[row]}")
+    return points
+
+
+class _Driven(NamedTuple):
+    """A column of numbers of the scene, and the entries that it drives."""
+
+    paths: tuple[str, ...]
+    column: Column
+
+    def read(self, sheet: Sheet) -> Array:
+        """Its cells in SI, shape (n,), within the bounds of every entry it drives."""
+        every = [quantities()[path] for path in self.paths]
+        values = sheet.si(self.column, every[0].unit, sheet.path)
+        for quantity in every:
+            for row in np.flatnonzero(~np.asarray(quantity.holds(values)))[:1]:
+                raise InputError(
+                    sheet.place(self.column, row), self.column.cells[row], f"must be {quantity.bounds()}",
+                    "Correct the value or the unit of its column",
+                )  # fmt: skip
+        return values
+
+
+def _driven(column: Column, scene: Scene, key: str, sheet: Sheet) -> _Driven | None:
+    """What a column such as ``C [mm]`` drives, None if it names the rows."""
+    numbers = scene.numeric_paths()
+    of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}
+    named = {**SHORT_NAMES, **of_study}
+    paths = tuple(path for path in named.get(column.name, (column.name,)) if path in numbers)
+    if not paths:
+        if column.name.lower() in LABELS or sheet.is_text(column):
+            return None
+        if re.search(r"[\s\[\]]", column.name):
+            raise InputError(
+                key,
+                column.heading,
+                "is not a column name",
+                'Write a name, and its unit as in "C [mm]"',
+            )
+        remedy = nearest(column.name, (*named, *numbers))
+        raise InputError(
+            key, column.name, "is neither a variable nor a number of this scene", remedy
+        )
+    return _Driven(paths, column)

@@ -1,24 +1,23 @@
-"""Points to simulate: Latin hypercubes, Monte Carlo samples, scrambled Sobol sequences; what every design must satisfy.
+"""Points to simulate: Latin hypercubes, Monte Carlo samples, scrambled Sobol sequences.
 
 Every number follows from the study's seed, a purpose ("train", "test", ...) and, for Monte Carlo,
 the index of the sample, so that nothing depends on how many points are drawn at a time, or by whom.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Booleans
+from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
-from hpcclear.scene import Scene
 from hpcclear.scene.correlation import Correlation
-from hpcclear.scene.domain import box, entries, slender_inertias, to_physical
-from hpcclear.scene.paths import quantities
-from hpcclear.scene.points import Points, expanded
+from hpcclear.scene.domain import box, slender_inertias, to_physical
+from hpcclear.scene.points import Points, check_points
 from hpcclear.scene.random_inputs import RandomInput
-from hpcclear.scene.slider_crank import Mechanism
+from hpcclear.scene.scene import Scene
 from hpcclear.scene.streams import generator, sobol, uniform
 from hpcclear.scene.study import Study
 
@@ -41,81 +40,6 @@ def unit_lhs(samples: int, dimensions: int, rng: np.random.Generator) -> Array:
     from scipy.stats import qmc  # most of a second to import; a single response needs none of it
 
     return qmc.LatinHypercube(dimensions, rng=rng).random(samples)
-
-
-def check_points(
-    scene: Scene, points: Points, label: Callable[[int], str] = "sample {}".format
-) -> None:
-    """Refuse points that make no mechanism; errors name the row, by `label`, and the column.
-
-    Raises
-    ------
-    InputError
-        If a value is not finite, out of the bounds of its entry, a clearance reaches its bearing's
-        radius, friction at rest is less than sliding, or a rod is not longer than its crank.
-    """
-    points = expanded(scene.study, points)
-    for name, column, paths in zip(points.names, points.values.T, points.paths, strict=True):
-        for path in paths:
-            bounds = quantities()[path].bounds()
-            reason = f"must be finite and {bounds}" if bounds else "must be finite"
-            _refuse(~quantities()[path].holds(column), column, name, reason, label)
-            if path.endswith("initial_speed"):
-                usual = path.replace("initial_speed", "expected_speed")
-                reason = f"starts from rest, and {usual} is not given"
-                if usual not in scene.numeric_paths():
-                    _refuse(column == 0.0, column, name, reason, label)
-    pairs = []
-    if isinstance(scene.mechanism, Mechanism):
-        reason = "the rod no longer than the crank"
-        pairs.append(("mechanism.crank.length", "mechanism.rod.length", 1.0, reason))
-    for joint in scene.clearance_joints():
-        for small, large, times, reason in scene.clearance_joint(joint).ordered:
-            key = scene.joint_key(joint)
-            pairs.append((f"{key}.{small}", f"{key}.{large}", times, reason))
-    for small, large, times, reason in pairs:
-        lower, upper = (
-            entries(scene, points.paths, points.values, path) for path in (small, large)
-        )
-        word = "" if times == 1.0 else f"{times:g} "
-        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
-        _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
-    _check_laws(scene, points, label)
-
-
-def _check_laws(scene: Scene, points: Points, label: Callable[[int], str]) -> None:
-    """Refuse values that a law does not take together."""
-    for kind in ("contact", "friction"):
-        table = getattr(scene.effects, kind)
-        driven = {path for paths in points.paths for path in paths}
-        if table is None or table.declared.check is None:
-            continue
-        names = [name for name in table.values() if f"effects.{kind}.{name}" in driven]
-        if not names:
-            continue
-        columns = {
-            name: np.broadcast_to(
-                entries(scene, points.paths, points.values, f"effects.{kind}.{name}"), len(points)
-            )
-            for name in names
-        }
-        for row in range(len(points)):
-            own = {name: float(column[row]) for name, column in columns.items()}
-            wrong = table.declared.check({**table.values(), **own})
-            if wrong is not None:
-                reason, remedy, name = wrong
-                raise InputError(
-                    f"{label(row)}, {name}", own.get(name, table.value(name)), reason, remedy
-                )
-
-
-def _refuse(
-    bad: Booleans, values: Array, name: str, reason: str, label: Callable[[int], str]
-) -> None:
-    if bad.any():
-        row = int(np.argmax(bad))
-        key = f"{label(row)}, {name}"
-        raise InputError(key, float(values[row]), reason, "Narrow its range, or correct that row")
 
 
 def latin_hypercube(
@@ -369,3 +293,46 @@ def sampled(scene: Scene) -> Points:
         case _:
             points = monte_carlo(scene)
     return replace(points, sampling=method)
+
+
+_PAGE = 4096  # points made at a time
+_PAGES = 8  # pages kept, since neighbouring ranks ask for neighbouring points
+
+
+class MonteCarloPoints:
+    """The study's Monte Carlo points by index, generated on request and not stored.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a study.
+    total : int
+        Number of points.
+    """
+
+    def __init__(self, scene: Scene, total: int) -> None:
+        self._scene, self._total = scene, total
+        self._pages: OrderedDict[int, Points] = OrderedDict()
+
+    def __len__(self) -> int:
+        return self._total
+
+    def page(self, number: int) -> Points:
+        """Points `number` * 4096 and on, at most 4096 of them."""
+        if number not in self._pages:
+            first = number * _PAGE
+            count = min(_PAGE, self._total - first)
+            self._pages[number] = monte_carlo(self._scene, count, first=first)
+            if len(self._pages) > _PAGES:
+                self._pages.popitem(last=False)
+        self._pages.move_to_end(number)
+        return self._pages[number]
+
+    def __getitem__(self, index: Integers) -> Array:
+        index = np.asarray(index, np.int64)
+        values = np.empty((index.size, len(self.page(0).names)))
+        numbers = index // _PAGE
+        for number in np.unique(numbers).tolist():
+            here = numbers == number
+            values[here] = self.page(number).values[index[here] - number * _PAGE]
+        return values

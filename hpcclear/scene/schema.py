@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.base.objectives import ENDS
-from hpcclear.scene.distributions import OURS
 from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Table
 from hpcclear.scene.file_curves import FileCurve
 from hpcclear.scene.joints import Guide
+from hpcclear.scene.random_inputs import OURS
 from hpcclear.scene.scene import Scene
 
 _NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}

@@ -13,8 +13,7 @@ from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import to_physical
-from hpcclear.scene.points import Points
-from hpcclear.scene.sampling import check_points
+from hpcclear.scene.points import Points, check_points
 from hpcclear.study import loads as loading
 
 SHOWN = {
