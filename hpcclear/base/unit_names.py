@@ -1,11 +1,15 @@
-"""Names of units as engineers write them: one table of those that are read, one of those that are refused with a remedy.
+"""Units as engineers write them: a table of names that are read, one of those that are refused, and their products.
 
 Every factor stands here: registries of units differ by version in what a furlong, a drachm or a quarter is.
 
 Sources: BIPM, "The International System of Units" (9th edition, 2019); NIST SP 811 (2008), appendix B, for others.
 """
 
+import re
+import unicodedata
+from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import lru_cache
 from math import pi
 
 Dimensions = dict[str, Fraction]
@@ -170,3 +174,127 @@ REFUSED = {
     ),
 }  # fmt: skip
 """Names that are read in more than one way, and what to write."""
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[A-Za-zμ%‰°\"]{1,20})\.?(?![A-Za-z])"
+    r"(?:(?:\^|\*\*)(?:\((?P<ratio>-?\d{1,3}/[1-9]\d{0,2})\)|\(?(?P<decimal>-?\d\.\d{1,6})\)?)(?!\d)"
+    r"|(?:\^|\*\*)?\(?(?P<power>-?\d)\)?(?!\d))?|(?P<sign>\*\*?|[/()]))\s*"
+)
+_CRANK_ANGLE = re.compile(r"(deg|°)\s*(CA|KW|crank|[ab][TB]DC|[AB]TDC)\b")
+_FOREIGN = str.maketrans(
+    {**dict.fromkeys("·⋅∙•‧・×", "*"), **dict.fromkeys("−–‐‑", "-"), "º": "°", "″": '"', "⁻": "-"}
+    | dict.fromkeys("\u200b\u2060\ufeff")
+)
+"""Signs that word processors put in place of those of a keyboard; of no width: dropped."""
+LONGEST = 80
+"""Characters of a quantity or unit, so that nothing takes long over it."""
+
+
+class UnitError(ValueError):
+    """A string that is no quantity of the expected unit; `remedy` says what to write."""
+
+    def __init__(self, reason: str, remedy: str) -> None:
+        self.reason = reason
+        self.remedy = remedy
+        super().__init__(reason, remedy)
+
+
+class NoUnit(ValueError):
+    """A text that is not made of names, powers and signs."""
+
+
+def _named(name: str) -> list[tuple[str, Unit]]:
+    """Units that a name stands for, two of "Nm"; raises ValueError."""
+    name = SPELLINGS.get(name, name)
+    if name in REFUSED:
+        raise UnitError(f"{name!r} may mean more than one unit", REFUSED[name])
+    for known in (UNITS, OTHERS):
+        if name in known:
+            return [(name, known[name])]
+    for cut in range(1, len(name)):
+        if name[:cut] in HEADS and name[cut:] in TAILS:
+            return [(part, UNITS[part]) for part in (name[:cut], name[cut:])]
+    raise ValueError(f"{name!r} is not a known unit")
+
+
+def tidy(text: str) -> str:
+    """A unit in the characters of a keyboard: "N·m²" as "N*m2"; raises NoUnit where it is too long for one."""
+    if len(text) > LONGEST:
+        raise NoUnit
+    plain = unicodedata.normalize("NFKC", text.translate(_FOREIGN)).translate(_FOREIGN)
+    plain = re.sub(r"(?<=\w)\s+per\s+(?=\w)", "/", plain.strip().replace("''", '"'))
+    plain = _CRANK_ANGLE.sub(
+        "deg", plain if plain in TURNS_BY_TIME else SPELLINGS.get(plain, plain)
+    )
+    # a dot or hyphen between two names is a product: "N.m", "ft-lbf"
+    return re.sub(r"(?<=[A-Za-z\d])[.-](?=[A-Za-z])", "*", plain)
+
+
+def factors_of(text: str) -> list[tuple[str, Fraction, int]]:
+    """Names, powers, and 1 or -1 for above or below the line, of a unit in the characters of a keyboard; raises NoUnit."""
+    tokens, at = list[re.Match[str]](), 0
+    text = re.sub(r"^1\s*(?=/)", "", text)
+    while at < len(text):
+        found = _TOKEN.match(text, at)
+        if found is None:
+            raise NoUnit
+        tokens.append(found)
+        at = found.end()
+    factors, sides, side, awaited = list[tuple[str, Fraction, int]](), [1], 1, True
+    for token in tokens:
+        sign = token["sign"]
+        if sign is None:
+            power = Fraction(token["ratio"] or token["decimal"] or token["power"] or 1)
+            factors.append((token["name"], power, sides[-1] * side))
+            side, awaited = 1, False
+        elif sign == "(":
+            sides.append(sides[-1] * side)
+            side, awaited = 1, True
+        elif sign == ")" and len(sides) > 1 and not awaited:
+            sides.pop()
+        elif sign in ("*", "/") and (not awaited or (sign == "/" and token is tokens[0])):
+            side, awaited = (-1 if sign == "/" else 1), True
+        else:
+            raise NoUnit
+    if awaited or len(sides) > 1:
+        raise NoUnit
+    return factors
+
+
+def _raised(size: Fraction, power: Fraction) -> Fraction:
+    """A size to a power: exact of whole ones, else to so many digits that the nearest float is the same."""
+    if power.denominator == 1:
+        return size ** int(power)
+    with localcontext(prec=50):
+        base, exponent = (Decimal(one.numerator) / one.denominator for one in (size, power))
+        return Fraction(base**exponent)
+
+
+def dimensions(unit: str) -> tuple[Fraction, Dimensions]:
+    """Factor of a unit to metre, gram, second and radian, and its exponents of these; raises ValueError."""
+    return parsed(unit)[:2] if unit else (Fraction(1), {})
+
+
+def parts(unit: str) -> list[tuple[str, Unit, Fraction]]:
+    """Names, units and powers of which a unit is the product; raises ValueError."""
+    factors, found = factors_of(tidy(unit)), []
+    for name, power, side in factors:
+        *before, last = _named(name)
+        found += [(part, one, Fraction(side)) for part, one in before]
+        found.append((*last, power * side))
+    seconds = sum(own.get("second", 0) * power for _, (_, own), power in found)
+    if any(name in TURNS_BY_TIME for name, _, _ in factors) and seconds >= 0:
+        raise ValueError(f"{unit!r} is not a known unit")
+    return found
+
+
+@lru_cache(maxsize=256)
+def parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
+    """Factor to base units, dimensions, and those of each unit named; ValueError says why there are none."""
+    scale, powers, names = Fraction(1), dict[str, Fraction](), dict[str, Dimensions]()
+    for name, (size, own), power in parts(unit):
+        scale *= _raised(size, power)
+        names[name] = own
+        for base, exponent in own.items():
+            powers[base] = powers.get(base, Fraction(0)) + exponent * power
+    return scale, {base: power for base, power in powers.items() if power}, names

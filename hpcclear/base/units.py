@@ -2,7 +2,7 @@
 
 The grammar is deliberately small: a decimal number, then unit names with powers (whole, or as in N/mm^1.4 and N/m^(7/5)),
 products, quotients and brackets. Scene files come from anywhere, and a general expression parser would evaluate whatever
-stands in them. `unit_names` has the names.
+stands in them. `unit_names` reads units without numbers.
 
 An angle is a dimension of its own here; plain dimensional analysis takes a turn a second for 6.28 Hz. Three quantities have a
 unit of 1/s, and each entry declares its own: "rad/s" an angular speed, "Hz" a frequency in cycles, "1/s" a rate that counts
@@ -16,36 +16,27 @@ import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from decimal import Decimal, localcontext
+from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
 from math import isfinite, pi
 
 from hpcclear.base.unit_names import (
     HEADS,
-    OTHERS,
-    REFUSED,
+    LONGEST,
     SPELLINGS,
     TAILS,
-    TURNS_BY_TIME,
     UNITS,
-    Dimensions,
-    Unit,
+    NoUnit,
+    dimensions,
+    factors_of,
+    parsed,
+    tidy,
 )
+from hpcclear.base.unit_names import UnitError as UnitError
 
 _NUMBER = r"[+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:[eE][+-]?\d{1,3})?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
-_TOKEN = re.compile(
-    r"\s*(?:(?P<name>[A-Za-zμ%‰°\"]{1,20})\.?(?![A-Za-z])"
-    r"(?:(?:\^|\*\*)(?:\((?P<ratio>-?\d{1,3}/[1-9]\d{0,2})\)|\(?(?P<decimal>-?\d\.\d{1,6})\)?)(?!\d)"
-    r"|(?:\^|\*\*)?\(?(?P<power>-?\d)\)?(?!\d))?|(?P<sign>\*\*?|[/()]))\s*"
-)
-_CRANK_ANGLE = re.compile(r"(deg|°)\s*(CA|KW|crank|[ab][TB]DC|[AB]TDC)\b")
-_FOREIGN = str.maketrans(
-    {**dict.fromkeys("·⋅∙•‧・×", "*"), **dict.fromkeys("−–‐‑", "-"), "º": "°", "″": '"', "⁻": "-"}
-    | dict.fromkeys("\u200b\u2060\ufeff")
-)
-"""Signs that word processors put in place of those of a keyboard; of no width: dropped."""
 _DIGITS = re.compile(r"[+-]?[.,]?[0-9](?:[0-9.,'\u2019_\s]*[0-9])?")
 _GROUPS = re.compile(
     r"([+-]?[1-9][0-9]{0,2}(?:([.,'\u2019_\s])[0-9]{3})(?:\2[0-9]{3})*)(?:(?!\2)[.,]([0-9]+))?"
@@ -54,127 +45,15 @@ _POWER_OF_TEN = re.compile(
     r"\s*[xX*·×⋅]\s*10(?:(?:\^|\*\*)\s*\(?\s*([+-]?\d{1,3})\)?|([⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3}))"
 )
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
-_LONGEST = 80
-"""Characters of a quantity or unit, so that nothing takes long over it."""
 _TURN = Fraction(2 * pi)
 _MINUTES = {"min", "minute", "minutes"}
-
-
-class UnitError(ValueError):
-    """A string that is no quantity of the expected unit; `remedy` says what to write."""
-
-    def __init__(self, reason: str, remedy: str) -> None:
-        self.reason = reason
-        self.remedy = remedy
-        super().__init__(reason, remedy)
-
-
-class _NoUnit(ValueError):
-    """A text that is not made of names, powers and signs."""
-
-
-def _named(name: str) -> list[tuple[str, Unit]]:
-    """Units that a name stands for, two of "Nm"; raises ValueError."""
-    name = SPELLINGS.get(name, name)
-    if name in REFUSED:
-        raise UnitError(f"{name!r} may mean more than one unit", REFUSED[name])
-    for known in (UNITS, OTHERS):
-        if name in known:
-            return [(name, known[name])]
-    for cut in range(1, len(name)):
-        if name[:cut] in HEADS and name[cut:] in TAILS:
-            return [(part, UNITS[part]) for part in (name[:cut], name[cut:])]
-    raise ValueError(f"{name!r} is not a known unit")
-
-
-def _tidy(text: str) -> str:
-    """A unit in the characters of a keyboard: "N·m²" as "N*m2"; raises _NoUnit where it is too long for one."""
-    if len(text) > _LONGEST:
-        raise _NoUnit
-    plain = unicodedata.normalize("NFKC", text.translate(_FOREIGN)).translate(_FOREIGN)
-    plain = re.sub(r"(?<=\w)\s+per\s+(?=\w)", "/", plain.strip().replace("''", '"'))
-    plain = _CRANK_ANGLE.sub(
-        "deg", plain if plain in TURNS_BY_TIME else SPELLINGS.get(plain, plain)
-    )
-    # a dot or hyphen between two names is a product: "N.m", "ft-lbf"
-    return re.sub(r"(?<=[A-Za-z\d])[.-](?=[A-Za-z])", "*", plain)
-
-
-def _factors(text: str) -> list[tuple[str, Fraction, int]]:
-    """Names, powers, and 1 or -1 for above or below the line, of a unit in the characters of a keyboard; raises _NoUnit."""
-    tokens, at = list[re.Match[str]](), 0
-    text = re.sub(r"^1\s*(?=/)", "", text)
-    while at < len(text):
-        found = _TOKEN.match(text, at)
-        if found is None:
-            raise _NoUnit
-        tokens.append(found)
-        at = found.end()
-    factors, sides, side, awaited = list[tuple[str, Fraction, int]](), [1], 1, True
-    for token in tokens:
-        sign = token["sign"]
-        if sign is None:
-            power = Fraction(token["ratio"] or token["decimal"] or token["power"] or 1)
-            factors.append((token["name"], power, sides[-1] * side))
-            side, awaited = 1, False
-        elif sign == "(":
-            sides.append(sides[-1] * side)
-            side, awaited = 1, True
-        elif sign == ")" and len(sides) > 1 and not awaited:
-            sides.pop()
-        elif sign in ("*", "/") and (not awaited or (sign == "/" and token is tokens[0])):
-            side, awaited = (-1 if sign == "/" else 1), True
-        else:
-            raise _NoUnit
-    if awaited or len(sides) > 1:
-        raise _NoUnit
-    return factors
-
-
-def _raised(size: Fraction, power: Fraction) -> Fraction:
-    """A size to a power: exact of whole ones, else to so many digits that the nearest float is the same."""
-    if power.denominator == 1:
-        return size ** int(power)
-    with localcontext(prec=50):
-        base, exponent = (Decimal(one.numerator) / one.denominator for one in (size, power))
-        return Fraction(base**exponent)
-
-
-def dimensions(unit: str) -> tuple[Fraction, Dimensions]:
-    """Factor of a unit to metre, gram, second and radian, and its exponents of these; raises ValueError."""
-    return _parsed(unit)[:2] if unit else (Fraction(1), {})
-
-
-def parts(unit: str) -> list[tuple[str, Unit, Fraction]]:
-    """Names, units and powers of which a unit is the product; raises ValueError."""
-    factors, found = _factors(_tidy(unit)), []
-    for name, power, side in factors:
-        *before, last = _named(name)
-        found += [(part, one, Fraction(side)) for part, one in before]
-        found.append((*last, power * side))
-    seconds = sum(own.get("second", 0) * power for _, (_, own), power in found)
-    if any(name in TURNS_BY_TIME for name, _, _ in factors) and seconds >= 0:
-        raise ValueError(f"{unit!r} is not a known unit")
-    return found
-
-
-@lru_cache(maxsize=256)
-def _parsed(unit: str) -> tuple[Fraction, Dimensions, dict[str, Dimensions]]:
-    """Factor to base units, dimensions, and those of each unit named; ValueError says why there are none."""
-    scale, powers, names = Fraction(1), dict[str, Fraction](), dict[str, Dimensions]()
-    for name, (size, own), power in parts(unit):
-        scale *= _raised(size, power)
-        names[name] = own
-        for base, exponent in own.items():
-            powers[base] = powers.get(base, Fraction(0)) + exponent * power
-    return scale, {base: power for base, power in powers.items() if power}, names
 
 
 def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
     """The unit with the letters of its names small or capital as in units that are known: those that fit."""
     try:
-        factors = _factors(_tidy(unit))
-    except _NoUnit:
+        factors = factors_of(tidy(unit))
+    except NoUnit:
         return []
     known = {name: name for name in UNITS}
     known |= {head + tail: f"{head}*{tail}" for head, tail in itertools.product(HEADS, TAILS)}
@@ -200,7 +79,7 @@ def _respelled(unit: str, fits: Callable[[str], bool]) -> list[str]:
 @lru_cache(maxsize=256)
 def _fitting(unit: str, target: str) -> Fraction | None:
     """What one `unit` is in `target`; None where they are of different quantities. Raises ValueError."""
-    scale, base, names = _parsed(unit)
+    scale, base, names = parsed(unit)
     own, wanted = dimensions(target)
     angle, expected_angle = (one.get("radian", 0) for one in (base, wanted))
     alike = {**base, "radian": 0} == {**wanted, "radian": 0}
@@ -234,7 +113,7 @@ def factor(unit: str, target: str) -> Fraction:
             return found
     except UnitError:
         raise
-    except _NoUnit:
+    except NoUnit:
         reason = f"{unit!r} cannot be read as a unit"
     except ValueError as error:
         reason = str(error)
@@ -278,7 +157,7 @@ def note(text: str, read: str) -> None:
 
 def note_turns(text: str, number: str, unit: str, target: str) -> None:
     """Note how `text` is read, where `number` of `unit`, which fits the target, is an angular speed in turns by time alone."""
-    if target == "rad/s" and "radian" not in _parsed(unit)[1]:
+    if target == "rad/s" and "radian" not in parsed(unit)[1]:
         turns = float(60 * Fraction(number) * factor(unit, target) / _TURN)
         note(text, f"{turns:.6g} rpm, revolutions per minute; for radians write rad/s")
 
@@ -318,7 +197,7 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
 def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
     """Number and unit of a text, as `to_si` reads it."""
     shown = target or "1"
-    found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= _LONGEST else None
+    found = _QUANTITY.fullmatch(text.replace("\u2212", "-")) if len(text) <= LONGEST else None
     number, unit = found.groups() if found else ("", "")
     if not decided:
         check_thousands(text)
@@ -375,7 +254,7 @@ def written(value: float, unit: str) -> float | str:
 
 def _digits(text: str) -> tuple[str, str]:
     """The number that a text begins with, with whatever stands between its digits, and the rest of the text."""
-    text = text.strip()[:_LONGEST].replace("\u2212", "-")
+    text = text.strip()[:LONGEST].replace("\u2212", "-")
     found = _DIGITS.match(text)
     return (found[0], text[found.end() :]) if found else ("", text)
 
@@ -404,7 +283,7 @@ def check_thousands(text: str) -> None:
 def is_unit(text: str) -> bool:
     """Whether a text is a unit, of whatever quantity."""
     try:
-        return bool(_parsed(text))
+        return bool(parsed(text))
     except ValueError:
         return False
 
@@ -414,8 +293,8 @@ def _is_written(text: str, unit: str) -> bool:
     if unit.startswith("1") and not text[: text.rindex(unit)][-1:].isspace():
         return False
     try:
-        return bool(_factors(_tidy(unit)))
-    except _NoUnit:
+        return bool(factors_of(tidy(unit)))
+    except NoUnit:
         return False
 
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.unit_names import UNITS
-from hpcclear.base.units import parts
+from hpcclear.base.unit_names import UNITS, parts
 from hpcclear.laws.declared import (
     JOINT,
     LAW_NUMBERS,

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from hpcclear.base.arithmetic import WORDS, read
-from hpcclear.base.units import dimensions
+from hpcclear.base.unit_names import dimensions
 from hpcclear.laws.declared import JOINT, VARYING, ContactLaw, FrictionLaw, Law, Parameter
 from hpcclear.laws.translate import LawError
 

@@ -1,11 +1,12 @@
-"""Clock times and dates of tables: cells such as "12:03:05.2", "2026-03-01 12:03:05" or "1.3.2026 0:05", as seconds.
+"""Clock times and dates of tables: cells such as "12:03:05.2", "2026-03-01 12:03:05" or "1.3.2026 0:05", as seconds; and
+numbers of workbooks that are such times by their formats.
 
 What can be read in two ways, such as 03/04/2026, is refused with both readings.
 """
 
 import datetime
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 from hpcclear.base.errors import InputError
@@ -184,3 +185,44 @@ def _order(cells: Sequence[str], where: Callable[[int], str]) -> str:
             where(row), cells[row], f"may be {' or '.join(named)}", f"Write dates as {readings[0]}"
         )
     return (fits or orders)[0]
+
+
+_BUILT_IN = {
+    **dict.fromkeys((*range(14, 18), *range(27, 32), 34, 35, 36, *range(50, 55), 57, 58), "date"),
+    **dict.fromkeys((*range(18, 23), 32, 33, 45, 47, 55, 56), "time"),
+    46: "elapsed", 9: "percent", 10: "percent",
+}  # fmt: skip
+"""What numbers of built-in formats are (ECMA-376, 18.8.30)."""
+
+
+def kind_of_format(number: str, own: Mapping[str, str]) -> str:
+    """What numbers of a format are."""
+    code = own.get(number)
+    if code is None:
+        return _BUILT_IN.get(int(number) if number.isdecimal() else 0, "")
+    plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
+    if re.search(r"\[(h+|m+|s+)\]", plain):
+        return "elapsed"
+    plain = re.sub(r"\[[^\]]*\]", "", plain)
+    if plain in ("general", "@", ""):
+        return ""
+    if re.search("[hs]", plain):
+        return "time"
+    return "date" if re.search("[dmy]", plain) else "percent" if "%" in plain else ""
+
+
+def moment_of(days: float, style: str, epoch: datetime.datetime) -> str:
+    """A date or time as text, by ISO 8601; hours may be more than 24 where they are counted on."""
+    if not 0 <= days < 2_958_466:  # the year 10000
+        raise ValueError(f"{days!r} is no date")
+    micros = round(days * 86_400_000_000)
+    if style == "elapsed" or days < 1:
+        seconds, rest = divmod(micros, 1_000_000)
+        text = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+        return f"{text}.{rest:06d}" if rest else text
+    if days < 60 and epoch.year < 1904:
+        micros += 86_400_000_000  # Excel has a 29 February 1900
+    moment = epoch + datetime.timedelta(microseconds=micros)
+    if style == "date" and days == int(days):
+        return moment.date().isoformat()
+    return moment.isoformat(sep=" ")

@@ -72,12 +72,8 @@ class SceneTables(Table):
             If it has none.
         """
         if self.study is None:
-            raise InputError(
-                "study",
-                None,
-                "the scene has no study",
-                "Add [study] and [study.variables], as in jobs/quickstart.toml",
-            )
+            remedy = "Add [study] and [study.variables], as in jobs/quickstart.toml"
+            raise InputError("study", None, "the scene has no study", remedy)
         return self.study
 
     @property

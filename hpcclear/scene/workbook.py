@@ -11,13 +11,14 @@ import re
 import zipfile
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 from xml.parsers import expat
 
 from hpcclear.base.errors import InputError
-from hpcclear.scene import delimited
+from hpcclear.scene import clock, delimited
 from hpcclear.scene.delimited import LARGEST_FILE, LONGEST_CELL, Rows
 
 LARGEST = LARGEST_FILE // 4
@@ -30,12 +31,6 @@ MOST_ROWS, MOST_COLUMNS = 2**20, 2**14
 """Of a sheet, as Excel has them."""
 MOST_PARTS, MOST_SHEETS = 10_000, 1000
 
-_BUILT_IN = {
-    **dict.fromkeys((*range(14, 18), *range(27, 32), 34, 35, 36, *range(50, 55), 57, 58), "date"),
-    **dict.fromkeys((*range(18, 23), 32, 33, 45, 47, 55, 56), "time"),
-    46: "elapsed", 9: "percent", 10: "percent",
-}  # fmt: skip
-"""What numbers of built-in formats are (ECMA-376, 18.8.30)."""
 _UNREADABLE = (
     zipfile.BadZipFile, zlib.error, expat.ExpatError, EOFError, LookupError, NotImplementedError, RuntimeError, ValueError,
     OSError,
@@ -90,35 +85,32 @@ class _Book:
         if data.count(b"PK\x01\x02") > MOST_PARTS:
             self.refuse(f"has more than {MOST_PARTS} parts")
         self.archive = zipfile.ZipFile(io.BytesIO(data))
-        root = self._related("").get("/officeDocument", ["xl/workbook.xml"])[0]
-        related, ids = self._related(root), self._ids(root)
+        books = [target for _, kind, target in self._relations("") if kind == "officeDocument"]
+        root = (*books, "xl/workbook.xml")[0]
+        relations = self._relations(root)
+        ids = {id_: target for id_, _, target in relations}
         sheets, since_1904 = list[tuple[str, str]](), False
 
         def start(tag: str, attributes: dict[str, str]) -> None:
             nonlocal since_1904
             if _local(tag) == "sheet":
-                id_ = next(
-                    (v for k, v in attributes.items() if k.endswith("id") and k != "sheetId"), ""
-                )
-                sheets.append((attributes.get("name", ""), ids.get(id_, "")))
-            since_1904 |= _local(tag) == "workbookPr" and attributes.get("date1904") in (
-                "1",
-                "true",
-            )
+                own = (v for k, v in attributes.items() if k.endswith("id") and k != "sheetId")
+                sheets.append((attributes.get("name", ""), ids.get(next(own, ""), "")))
+            elif _local(tag) == "workbookPr":
+                since_1904 = attributes.get("date1904") in ("1", "true")
 
         self.parse(root, start)
         if len(sheets) > MOST_SHEETS:
             self.refuse(f"has more than {MOST_SHEETS} sheets")
-        known = set(related.get("/worksheet", []))
+        known = {target for _, kind, target in relations if kind == "worksheet"}
         self.sheets = {name: part for name, part in sheets if part in known}
-        self.epoch = (
-            datetime.datetime(1904, 1, 1) if since_1904 else datetime.datetime(1899, 12, 30)
-        )
+        self.epoch = datetime.datetime(*(1904, 1, 1) if since_1904 else (1899, 12, 30))
         self.texts, self.formats = list[str](), list[str]()
-        for part in related.get("/sharedStrings", [])[:1]:
-            self._read_texts(part)
-        for part in related.get("/styles", [])[:1]:
-            self._read_formats(part)
+        others = {kind: target for _, kind, target in reversed(relations)}  # the first of each
+        if "sharedStrings" in others:
+            self._read_texts(others["sharedStrings"])
+        if "styles" in others:
+            self._read_formats(others["styles"])
 
     def refuse(self, reason: str) -> NoReturn:
         raise InputError(self.what, str(self.path), reason, "Save the table alone, as CSV")
@@ -158,33 +150,22 @@ class _Book:
             pass
 
     def _relations(self, part: str) -> list[tuple[str, str, str]]:
-        """Id, kind and target of the relationships of a part; "" for the workbook itself."""
+        """Id, last word of the kind and target of the relationships of a part; "" for the workbook itself."""
         place = PurePosixPath(part)
         name = str(place.parent / "_rels" / f"{place.name}.rels") if part else "_rels/.rels"
         found = list[tuple[str, str, str]]()
 
         def start(tag: str, attributes: dict[str, str]) -> None:
             if _local(tag) == "Relationship":
-                target = attributes.get("Target", "")
-                whole = posixpath.normpath(
-                    target[1:] if target.startswith("/") else place.parent / target
-                )
+                target = posixpath.join("/", place.parent, attributes.get("Target", ""))
+                whole = posixpath.normpath(target)[1:]
                 if whole in self.archive.NameToInfo:
-                    found.append((attributes.get("Id", ""), attributes.get("Type", ""), whole))
+                    kind = attributes.get("Type", "").rpartition("/")[2]
+                    found.append((attributes.get("Id", ""), kind, whole))
 
         if name in self.archive.NameToInfo:
             self.parse(name, start)
         return found
-
-    def _related(self, part: str) -> dict[str, list[str]]:
-        """Targets by the last word of their kind."""
-        made: dict[str, list[str]] = {}
-        for _, kind, target in self._relations(part):
-            made.setdefault(f"/{kind.rpartition('/')[2]}", []).append(target)
-        return made
-
-    def _ids(self, part: str) -> dict[str, str]:
-        return {id_: target for id_, _, target in self._relations(part)}
 
     def _read_texts(self, part: str) -> None:
         """Shared texts, of which no more is kept than of a cell."""
@@ -208,13 +189,12 @@ class _Book:
         def start(tag: str, attributes: dict[str, str]) -> None:
             tag = _local(tag)
             if tag == "numFmt":
-                own[attributes.get("numFmtId", "")] = attributes.get("formatCode", "")[
-                    :LONGEST_CELL
-                ]
+                code = attributes.get("formatCode", "")
+                own[attributes.get("numFmtId", "")] = code[:LONGEST_CELL]
             elif tag in ("cellXfs", "cellStyleXfs"):
                 within[0] = tag
             elif tag == "xf" and within[0] == "cellXfs" and len(self.formats) < MOST_CELLS:
-                self.formats.append(_kind(attributes.get("numFmtId", "0"), own))
+                self.formats.append(clock.kind_of_format(attributes.get("numFmtId", "0"), own))
 
         self.parse(part, start)
 
@@ -230,9 +210,8 @@ class _Book:
         if len(filled) != 1:
             listed = f": {', '.join(filled)}"[:1000] if filled else ""
             remedy = f'Name one as in "{self.path.name}#{filled[0]}"' if filled else "Fill one"
-            raise InputError(
-                self.what, place, f"has {len(filled)} sheets that hold something{listed}", remedy
-            )
+            reason = f"has {len(filled)} sheets that hold something{listed}"
+            raise InputError(self.what, place, reason, remedy)
         return self.sheets[filled[0]]
 
     def _is_filled(self, part: str) -> bool:
@@ -242,13 +221,12 @@ class _Book:
         def start(tag: str, _: object) -> None:
             nonlocal seen, rows
             rows += (tag := _local(tag)) == "row"
-            seen = tag in ("v", "t", "f")
-            if seen or rows > MOST_ROWS:
+            if rows > MOST_ROWS:
+                self.refuse(f"has more than {MOST_ROWS} rows")
+            if seen := tag in ("v", "t", "f"):
                 raise _Enough
 
         self.parse(part, start)
-        if rows > MOST_ROWS:
-            self.refuse(f"has more than {MOST_ROWS} rows")
         return seen
 
 
@@ -300,7 +278,6 @@ class _Page:
         self.book = book
         self.rows: dict[int, list[str]] = {}
         self.merged = list[tuple[str, int]]()
-        self.columns: dict[str, int] = {}  # by letters
         self.row = self.column = self.elements = self.kept = 0
         self.kind = self.style = ""
         self.value: str | None = None
@@ -314,10 +291,7 @@ class _Page:
             tag = _local(tag)
         if tag == "c":
             letters = attributes.get("r", "").rstrip("0123456789")
-            if letters:
-                self.column = self.columns.get(letters) or self._column(letters)
-            else:
-                self.column += 1
+            self.column = _column(letters) if letters else self.column + 1
             self.elements += 1
             if self.column > MOST_COLUMNS or self.elements > 2 * MOST_CELLS:
                 self.book.refuse(f"has more than {MOST_CELLS} cells or {MOST_COLUMNS} columns")
@@ -332,10 +306,6 @@ class _Page:
             self._merge(attributes.get("ref", ""))
         else:
             self.text.start(tag)
-
-    def _column(self, letters: str) -> int:
-        self.columns[letters] = _place(f"{letters}1")[1]
-        return self.columns[letters]
 
     def _end(self, tag: str) -> None:
         if ":" in tag:
@@ -357,18 +327,14 @@ class _Page:
         text = self._plain()
         if not text:
             return
-        row = self.rows.get(self.row)
-        missing = self.column - (0 if row is None else len(row))
+        row = self.rows.setdefault(self.row, [])
+        missing = self.column - len(row)
         self.kept += missing
         if self.kept > MOST_CELLS:
             self.book.refuse(f"has more than {MOST_CELLS} cells")
         if missing <= 0:
             raise ValueError(f"row {self.row} has cells in disorder")
-        if row is None:
-            row = self.rows[self.row] = []
-        if missing > 1:
-            row.extend([""] * (missing - 1))
-        row.append(text)
+        row += [*[""] * (missing - 1), text]
 
     def _plain(self) -> str:
         """What the cell says."""
@@ -390,7 +356,9 @@ class _Page:
             return raw if len(raw) < 16 else repr(float(raw))
         number = float(raw)
         return (
-            f"{100 * number!r} %" if style == "percent" else _moment(number, style, self.book.epoch)
+            f"{100 * number!r} %"
+            if style == "percent"
+            else clock.moment_of(number, style, self.book.epoch)
         )
 
     def _merge(self, reference: str) -> None:
@@ -427,42 +395,14 @@ def _place(reference: str) -> tuple[int, int]:
     return int(found[2]), column
 
 
+@lru_cache(MOST_COLUMNS)
+def _column(letters: str) -> int:
+    return _place(f"{letters}1")[1]
+
+
 def _letters(column: int) -> str:
     made = ""
     while column:
         column, rest = divmod(column - 1, 26)
         made = chr(65 + rest) + made
     return made
-
-
-def _kind(number: str, own: Mapping[str, str]) -> str:
-    """What numbers of a format are."""
-    code = own.get(number)
-    if code is None:
-        return _BUILT_IN.get(int(number) if number.isdecimal() else 0, "")
-    plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
-    if re.search(r"\[(h+|m+|s+)\]", plain):
-        return "elapsed"
-    plain = re.sub(r"\[[^\]]*\]", "", plain)
-    if plain in ("general", "@", ""):
-        return ""
-    if re.search("[hs]", plain):
-        return "time"
-    return "date" if re.search("[dmy]", plain) else "percent" if "%" in plain else ""
-
-
-def _moment(days: float, style: str, epoch: datetime.datetime) -> str:
-    """A date or time as text, by ISO 8601; hours may be more than 24 where they are counted on."""
-    if not 0 <= days < 2_958_466:  # the year 10000
-        raise ValueError(f"{days!r} is no date")
-    micros = round(days * 86_400_000_000)
-    if style == "elapsed" or days < 1:
-        seconds, rest = divmod(micros, 1_000_000)
-        text = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
-        return f"{text}.{rest:06d}" if rest else text
-    if days < 60 and epoch.year < 1904:
-        micros += 86_400_000_000  # Excel has a 29 February 1900
-    moment = epoch + datetime.timedelta(microseconds=micros)
-    if style == "date" and days == int(days):
-        return moment.date().isoformat()
-    return moment.isoformat(sep=" ")
