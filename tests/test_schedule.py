@@ -6,8 +6,8 @@ from collections import deque
 import numpy as np
 import pytest
 
-from hpcclear.ranks.leading import WorkQueue
 from hpcclear.ranks.schedule import QUANTUM, HandOut
+from hpcclear.ranks.work_queue import WorkQueue
 
 
 class SimulatedWorker:
