@@ -7,9 +7,11 @@ import sys
 import tarfile
 import venv
 import zipfile
+from email import message_from_bytes
 from pathlib import Path
 
 import pytest
+from markdown_it import MarkdownIt
 from patience import crowded
 
 pytestmark = pytest.mark.nightly
@@ -98,6 +100,26 @@ def test_wheel_and_source_hold_every_module_and_the_data(built):
     with tarfile.open(next(built.glob("*.tar.gz"))) as source:
         kept = {name.partition("/")[2] for name in source.getnames()}
     assert modules | DATA | {"LICENSE", "README.md", "pyproject.toml"} <= kept
+
+
+def test_the_page_of_the_index_stands_alone(built):
+    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
+        name = next(one for one in wheel.namelist() if one.endswith(".dist-info/METADATA"))
+        found = message_from_bytes(wheel.read(name))
+    page = MarkdownIt("commonmark").enable("table").parse(str(found.get_payload()))
+    links = [
+        str(child.attrs.get("href") or child.attrs.get("src"))
+        for token in page
+        for child in token.children or ()
+        if {"href", "src"} & child.attrs.keys()
+    ]
+    assert len(links) > 20
+    repository, *_ = (one.split(", ")[1] for one in found.get_all("Project-URL") or ())
+    for link in links:
+        assert link.startswith("https://"), link
+        if link.startswith(f"{repository}/blob/main/"):
+            file = link.removeprefix(f"{repository}/blob/main/").partition("#")[0]
+            assert (ROOT / file).exists(), link
 
 
 def test_a_job_runs_from_the_wheel_alone(installed, tmp_path):
