@@ -8,6 +8,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from hpcclear import load_scene, simulate
+from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks, level, mean_of, periodic
 from hpcclear.dynamics import layout
 from hpcclear.dynamics.layout import curves as packing
@@ -327,7 +328,7 @@ def test_a_pulse_over_a_distance_does_the_work_of_its_area(method):
 def test_a_dip_over_the_speed_takes_its_time():
     """Of a wheel the time from one speed to another is the integral of inertia over torque.
 
-    At rtol 1e-6 speeds are known to 4e-4 rad/s, which the narrower dips are too narrow for.
+    At rtol 1e-6 speeds are known to 4e-4 rad/s: narrow dips are passed in parts.
     """
     for number, width in enumerate((10.0, 1.0, 0.1, 0.01)):
         begin = (335.0, 333.3, 361.0, 340.01)[number]
@@ -336,7 +337,7 @@ def test_a_dip_over_the_speed_takes_its_time():
         scene = wheel(
             {"kind": "torque", "body": "wheel", "torque": 0.0}, motor=drive, revolutions=4
         )
-        for rtol, off in ((1e-6, 1e-2), (1e-10, 1e-4))[width <= 0.1 :]:
+        for rtol, off in ((1e-6, 1e-3), (1e-10, 1e-4)):
             found = simulate(scene.with_({"numerics.rtol": rtol}))
             speed, time = found["crank_speed"].to_numpy(), found["time"].to_numpy()
             right = 1e-2 * straight(rows, speed[0], speed[-1])[1]
@@ -346,6 +347,59 @@ def test_a_dip_over_the_speed_takes_its_time():
                 width,
                 rtol,
             )
+
+
+@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+def test_a_jump_is_one_however_near_its_rows_stand(interpolation):
+    """A load that is switched on and off again, drawn by two rows each: over the angle, over the time, in a long table."""
+    for number, width in enumerate((1e-4, 1e-8, 1e-10, 1e-11, 1e-12, 1e-14)):
+        for on, off in (((0.2, 0.5), (1.0, 1.3), (3.7, 5.2))[number % 3], (0.0, 1.0)):
+            rows = [[on, 3000.0], [off, 3000.0], [off + width, 0.0], [6.0, 0.0]]
+            rows = [[0.0, 0.0], [on, 0.0], [on + width, 3000.0], *rows[1:]] if on else rows
+            found = simulate(engine(gas(rows), interpolation=interpolation, rtol=1e-8))
+            angle = found["crank_angle"].to_numpy()
+            near = max(width, 1e-9)  # what PCHIP can be given
+            drawn = [[0, 0], [on, 0], [on + near, 3e3], [off, 3e3], [off + near, 0], [6, 0]]
+            linear = interpolation == "linear"
+            right = integral(drawn[2 * (on == 0.0) :], angle[0], angle[-1], TURN, lever, linear)
+            assert float(found["load_work"][-1]) == pytest.approx(right, rel=1e-4), (width, on)
+        for length in (0.02, 6.0, 3600.0):
+            rows = [
+                [0.0, 0.0],
+                [0.003, 0.0],
+                [0.003 + width, -40.0],
+                [0.013, -40.0],
+                [0.013 + width, 0.0],
+                [length, 0.0],
+            ]
+            load = {"kind": "torque", "body": "wheel", "torque_by_time": rows}
+            speed = simulate(wheel(load, interpolation, 3))["crank_speed"].to_numpy()
+            assert speed[-1] - speed[0] == pytest.approx(-40.0, rel=1e-4), (width, length)
+
+
+def test_rows_too_near_for_steps_to_end_between_them_are_refused():
+    """Of tables over a speed or distance, whose places are the motion's and rounded."""
+    for kind, unit in (("torque_by_speed", 1.0), ("force", 0.1)):
+        for near, refused in ((1e-6, False), (1e-12, True)):
+            rows = [
+                [unit, 8.0],
+                [1.5 * unit, 8.0],
+                [1.5 * unit + near * unit, 2.0],
+                [2.0 * unit, 2.0],
+            ]
+            drive = {
+                "kind": "torque",
+                "body": "crank",
+                "initial_speed": 9.0,
+                "torque_by_speed": rows,
+            }
+            load = {"kind": "cylinder", "first": "slider.pin", "second": "ground.o", "force": rows}
+            made = (gas(5.0), drive) if kind == "torque_by_speed" else (load,)
+            if refused:
+                with pytest.raises(InputError, match="nearer to each other"):
+                    engine(*made)
+            else:
+                engine(*made)
 
 
 @pytest.mark.nightly

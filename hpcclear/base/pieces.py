@@ -142,6 +142,9 @@ _INSIDE = np.linspace(0.0, 1.0, 5)  # of each piece: what is compared with a cub
 _CHEBYSHEV = 0.5 - 0.5 * np.cos(np.arange(5) * np.pi / 4)  # on [0, 1]; differences there are
 _WEIGHTS = np.array([1.0, -2.0, 2.0, -2.0, 1.0]) / 8.0  # what no cubic can follow
 
+_APPROACH = 1e6
+"""Times the width of a jump: length of steps before and behind it (they end within 1e-7 of it, `control.ROW_REACH`)."""
+
 
 def breaks(curve: Pieces, tolerance: float) -> Array:
     """Rows, as shares of the length, between which a cubic follows the curve within a part of its range.
@@ -168,8 +171,19 @@ def breaks(curve: Pieces, tolerance: float) -> Array:
     if curve.repeats:
         third = np.arange(3) / 3.0  # no step is longer than half of the length
         extra = [one for one in third[1:] if not any(abs(one - b) < 0.1 for b in found)]
-        return np.array(sorted([*found, *extra]))
-    return np.array([*found, 1.0])
+        found = sorted([*found, *extra])
+        return np.unique(_approached(found, found[-1] - 1.0, found[0] + 1.0) % 1.0)
+    return _approached([*found, 1.0], 0.0, 2.0)
+
+
+def _approached(found: list[float], first: float, last: float) -> Array:
+    """Rows between two others, and further ones around jumps, which make steps to them short: long ones end too far off."""
+    wide = np.array([first, *found, last])
+    gaps = np.diff(wide)
+    rising = np.flatnonzero(_APPROACH * gaps[1:-1] < gaps[:-2]) + 1
+    falling = np.flatnonzero(_APPROACH * gaps[1:-1] < gaps[2:]) + 1
+    around = wide[rising] - _APPROACH * gaps[rising], wide[falling + 1] + _APPROACH * gaps[falling]
+    return np.sort(np.concatenate([found, *around]))
 
 
 def _values(cubics: Array, s: Array) -> Array:

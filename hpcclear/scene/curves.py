@@ -17,6 +17,8 @@ Curve = float | Rows
 """A constant, or pairs (crank angle in rad, value), repeated every revolution. Between two rows lies a monotone cubic."""
 MOST_ROWS = 16
 """Rows of a table whose corners count in each step of the integration."""
+NEAREST = 1e-9
+"""Of the range of such a table: distance of two rows between which steps can end."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,10 @@ class Pairs(Converted):
         if any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
             reason = f"the {self.words[0]}s must rise from row to row"
             raise invalid(reason, f"Sort the rows, each {self.words[0]} once")
+        least = NEAREST * (rows[-1][0] - rows[0][0])
+        if self.most == MOST_ROWS and any(b[0] - a[0] < least for a, b in itertools.pairwise(rows)):
+            reason = f"two rows are nearer to each other than {NEAREST:g} of the table's range"
+            raise invalid(reason, f"Write them {least:.1g} {self.x} or more apart")
         if self.least is not None and rows[0][0] < self.least:
             raise invalid(f"the first number is below {self.least:g}", remedy)
         return rows

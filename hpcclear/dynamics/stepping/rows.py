@@ -22,6 +22,12 @@ from hpcclear.dynamics.stepping.stops import cut
 
 FAR = 1e300
 
+NARROW = 0.02
+"""Of the range of a table over a speed or distance: segments below it are passed in parts."""
+PARTS = 4.0
+"""Their number. A load that follows the motion is no polynomial of the time, and the error that is allowed in a speed may be a
+good part of a narrow dip."""
+
 
 @lane_event
 def moved_on(lane, W, work, c):
@@ -110,5 +116,11 @@ def next_rows(lane, W, work, par, tables, c):
             k = count
         behind = row_at(lane, W, par, tables, c, k)
         ahead = row_at(lane, W, par, tables, c, k + 1)
+        if tables[HEAD * c + IN_PARAMETERS] == 1.0 and 0 <= k < count - 1:
+            part = (ahead - behind) / PARTS
+            last = row_of(lane, W, par, tables, c, count - 1)
+            if ahead - behind < NARROW * (last - row_of(lane, W, par, tables, c, 0)):
+                behind += part * math.floor((place - behind) / part)
+                ahead = behind + part
     work[(at.NEXT_ROW + c) * W + lane] = ahead
     work[(at.LAST_ROW + c) * W + lane] = behind

@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 from hpcclear.base.errors import InputError, at, nearest
@@ -38,6 +39,7 @@ def drawing_of(file: File) -> Drawing:
     names = [_name(sheet, columns["name"], row, points) for row in rows]
     belonging = _bodies(columns.get("bodies"), names, file, bodies)
     slides = [_slide(sheet, columns.get("slide"), row) for row in rows]
+    _check_apart([own for own, slide in zip(belonging, slides, strict=True) if slide is None], file)
     notes = [*points.notes(), *bodies.notes()]
     if "remark" in columns:
         notes.append(f"Column {columns['remark'].heading!r} is not taken over")
@@ -110,6 +112,15 @@ def _bodies(
                 known[word] = given.given(word)
         found.append(tuple(dict.fromkeys(known[word] for word in words)))
     return found
+
+
+def _check_apart(pins: Sequence[tuple[str, ...]], file: File) -> None:
+    """InputError where two bodies share two pins, as the two words of "rocker arm" do."""
+    pairs = Counter(pair for own in pins for pair in itertools.combinations(sorted(own), 2))
+    for (first, second), count in pairs.items():
+        if count > 1:
+            reason = f"and {second} share {count} points, so neither moves against the other"
+            file.refuse(first, reason, "Write one name for one body, such as rocker_arm")
 
 
 def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
