@@ -85,6 +85,14 @@ def test_tables_that_make_no_linkage(text, words, tmp_path):
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize("body", ["crank", "coupler", "rocker", "ground"])
+@pytest.mark.parametrize("sign", " -/+")
+def test_a_name_of_two_words_is_no_pair_of_bodies(body, sign, tmp_path):
+    """Signs between bodies may stand within a name: "rocker-arm" at each of its points would be two bodies in one place."""
+    with pytest.raises(InputError, match="neither moves against the other"):
+        made(tmp_path, FOUR_BAR.replace(body, f"{body}{sign}arm"))
+
+
 def test_the_command_writes_a_scene_and_a_sketch(tmp_path):
     (tmp_path / "points.csv").write_text(FOUR_BAR)
     words = [str(tmp_path / name) for name in ("points.csv", "linkage.toml")]
