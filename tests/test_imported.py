@@ -183,6 +183,27 @@ def test_names_that_a_scene_cannot_have_are_replaced_and_listed(name, tmp_path):
     assert code == 0, output
 
 
+def test_layers_of_one_name_are_one_body_and_heights_are_said(tmp_path):
+    """Drawing programs do not tell layers apart by capital letters; a linkage has no height."""
+    made = files.machine(np.random.default_rng(5), 2, 1)
+    text = files.drawing(made).decode()
+    plain, mixed, high = (tmp_path / f"{name}.dxf" for name in ("plain", "mixed", "high"))
+    plain.write_text(text)
+    parts = text.split("  8\n")
+    mixed.write_text(
+        "  8\n".join(
+            one.replace(one.partition("\n")[0], one.partition("\n")[0].upper(), 1) if k % 2 else one
+            for k, one in enumerate(parts)
+        )
+    )
+    high.write_text(text.replace(" 20\n", " 30\n5.5\n 20\n", 1))
+    assert mixed.read_text() != text
+    expected = [(one[1:3], len(one.bodies)) for one in drawing_of(plain).points]
+    assert [(one[1:3], len(one.bodies)) for one in drawing_of(mixed).points] == expected
+    assert drawing_of(plain).notes == []
+    assert "heights of 0 to 5.5 along z" in drawing_of(high).notes[0]
+
+
 @pytest.mark.parametrize(
     ("speeds", "turns", "words"),
     [

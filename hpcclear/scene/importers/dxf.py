@@ -210,9 +210,10 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
         if layer.lower() in _STILL or (not by_layer and one.kind == "POINT"):
             name = GROUND
         elif by_layer:
-            if layer not in names:
-                names[layer] = given.given(layer)
-            name = names[layer]
+            same = layer.casefold()  # drawing programs know one layer of this name
+            if same not in names:
+                names[same] = given.given(layer)
+            name = names[same]
         elif one.kind == "CIRCLE":
             left["CIRCLE, taken for one that is drawn around a pin"] += 1
             continue
@@ -227,7 +228,11 @@ def _bodies(entities: Sequence[_Entity], file: File) -> tuple[dict[str, _Body], 
             "nothing says what stands still",
             "Put it on a layer called ground, or draw a POINT at each pin of it",
         )
+    drawn = [one for one in entities if one.kind in _READ]
+    heights = {file.number(one.text(code, "0"), "a height") for one in drawn for code in (30, 31)}
     notes = []
+    if len(heights) > 1:
+        notes.append(f"Left out: heights of {min(heights):g} to {max(heights):g} along z")
     for words, texts in (("Not read", False), ("Left out", True)):
         counted = [
             f"{count} {kind}" for kind, count in left.items() if count and (kind in _TEXTS) == texts
