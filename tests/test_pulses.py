@@ -9,6 +9,9 @@ from scipy.interpolate import PchipInterpolator
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
+from hpcclear.base.jit import FASTMATH
+from hpcclear.base.lowering.compiled import Compiled
+from hpcclear.base.lowering.values import kind_of
 from hpcclear.base.pieces import breaks, level, mean_of, periodic
 from hpcclear.dynamics import layout
 from hpcclear.dynamics.layout import curves as packing
@@ -205,9 +208,13 @@ def looked_up(table, curve, shares):
     """What the kernel reads at places (n,), shares of a curve's length."""
     lanes, head = np.zeros(layout.BANK), table[packing.HEAD * curve :][: packing.HEAD]
     found = []
+    repeats, intervals = head[packing.REPEATS], head[packing.INTERVALS]
+    row, real, whole = kind_of((lanes, 1.0, 1)).parts
+    enter = Compiled(enter_table, [row, whole, *[real] * 4, whole, whole], FASTMATH)
+    look = Compiled(look_up, [row, row, whole, whole], FASTMATH)
     for share in shares:
-        enter_table(lanes, curve, share, 0.0, head[packing.REPEATS], head[packing.INTERVALS], 0, 1)
-        look_up(lanes, table, curve, 1)
+        enter(lanes, curve, share, 0.0, repeats, intervals, 0, 1)
+        look(lanes, table, curve, 1)
         found.append(lanes[layout.CURVES + curve])
     return np.array(found)
 

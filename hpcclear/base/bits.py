@@ -1,5 +1,8 @@
 """What is vectorised though no operator says it: bounds without a branch; from the bits of a double a cheap base-2 logarithm
-and exponential, enough for a step-size factor, and a falling exponential that is good to the last digits."""
+and exponential, enough for a step-size factor, and a falling exponential that is good to the last digits.
+
+The lowering (`hpcclear.base.lowering.arithmetic`) has instructions of its own for what is no lane function here.
+"""
 
 from llvmlite import ir
 from numba import types
@@ -28,25 +31,14 @@ def double_of(typingctx, n):
     return types.float64(types.int64), codegen
 
 
-def _chosen(predicate):
-    """Code that takes a limit where it compares so with a number, and else the number."""
-
-    def codegen(context, builder, signature, args):
-        return builder.select(builder.fcmp_ordered(predicate, args[1], args[0]), args[1], args[0])
-
-    return codegen
-
-
-@emitted
-def no_less(typingctx, x, least):
+def no_less(x, least):
     """x, or `least` where that is more: one instruction without a branch. NaN stays NaN."""
-    return types.float64(types.float64, types.float64), _chosen(">")
+    return least if least > x else x
 
 
-@emitted
-def no_more(typingctx, x, most):
+def no_more(x, most):
     """x, or `most` where that is less. NaN stays NaN."""
-    return types.float64(types.float64, types.float64), _chosen("<")
+    return most if most < x else x
 
 
 @lane_function
@@ -94,48 +86,9 @@ def falling(x, most=700.0):
     return p * double_of((bits_of(shifted) + 1023) << 52)
 
 
-def _view(context, builder, kind, value, offset):
-    """Array structure over the same numbers from `offset` on, without a count of references."""
-    whole = context.make_array(kind)(context, builder, value)
-    part = context.make_array(kind)(context, builder)
-    context.populate_array(
-        part,
-        data=builder.gep(whole.data, [ir.Constant(ir.IntType(64), offset)]),
-        shape=whole.shape,
-        strides=whole.strides,
-        itemsize=whole.itemsize,
-        meminfo=None,
-    )
-    return part._getvalue()
-
-
-@emitted(prefer_literal=True)
-def beyond(typingctx, array, offset):
-    """View of a flat array from a constant offset on, at a distance the compiler knows (a slice's would be clamped first).
-
-    It does not keep the array alive.
-    """
-
-    def codegen(context, builder, signature, args):
-        return _view(context, builder, signature.args[0], args[0], offset.literal_value)
-
-    return array(array, offset), codegen
-
-
-@emitted
-def borrowed(typingctx, array):
-    """The same array without its count of references; None stays None.
-
-    Every function that is not inlined counts each array up and down with atomic instructions, which took a fifth of an
-    implicit step. The caller keeps the array alive.
-    """
-
-    def codegen(context, builder, signature, args):
-        if isinstance(array, types.NoneType):
-            return args[0]
-        return _view(context, builder, signature.args[0], args[0], 0)
-
-    return array(array), codegen
+def beyond(array, offset):
+    """View of a flat array from an offset on, at a distance that the compiler knows where the offset is known."""
+    return array[offset:]
 
 
 @emitted

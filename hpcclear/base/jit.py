@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding
-from numba import njit, types
+from numba import njit
 from numba.core.extending import intrinsic
 
 from hpcclear.base.cached import cached, features_in_use
@@ -14,12 +14,9 @@ FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
 
 
-def emitted(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """What compiled code calls by the name of a function that emits it, of any arguments for a checker of types.
-
-    `options`: Numba's, of an intrinsic.
-    """
-    return intrinsic(function) if function else intrinsic(**options)
+def emitted(function: Callable[..., Any]) -> Any:
+    """What compiled code calls by the name of a function that emits it for Numba, of any arguments for a checker of types."""
+    return intrinsic(function)
 
 
 def doubles_in_a_vector() -> int:
@@ -52,20 +49,12 @@ def interleaved(lanes: int) -> Iterator[None]:
         llvmlite.binding.set_option("", option.format(0))  # as LLVM finds best
 
 
-@emitted
-def narrow_vectors(typingctx):
+def narrow_vectors() -> None:
     """Have the function that calls this use vectors of 256 bits at most, whatever the processor.
 
     For loops over coordinates, of which there are four as a rule: with 512 bits they do not fill one vector, and a single
     response by the pair took 1.4 times as long.
     """
-
-    def codegen(context, builder, signature, args):
-        # llvmlite's own `add` lets only those pass that it knows
-        set.add(builder.function.attributes, '"prefer-vector-width"="256"')
-        return context.get_dummy_value()
-
-    return types.none(), codegen
 
 
 _written: dict[Any, str] = {}

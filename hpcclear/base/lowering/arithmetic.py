@@ -203,9 +203,6 @@ class Arithmetic:
     def _call_beyond(self, array: Array, offset: Any) -> Any:
         return Array(self.builder.gep(array.data, [offset]), array.shape)
 
-    def _call_borrowed(self, array: Any) -> Any:
-        return array
-
     def _call_call_at(self, address: Any, arrays: tuple[Array, ...]) -> None:
         places = [one.data for one in arrays]
         function = ir.FunctionType(ir.VoidType(), [place.type for place in places])

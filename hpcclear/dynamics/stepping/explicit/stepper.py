@@ -8,14 +8,13 @@ import ctypes
 from functools import cache
 from typing import NamedTuple
 
-from hpcclear.base.bits import call_at
+from hpcclear.base.bits import beyond, call_at
 from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import Kind
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.settings import GAP_TOLERANCE, PROFILE
 from hpcclear.dynamics.linkage.rhs import run_motion
-from hpcclear.dynamics.stepping.borrowing import borrowed_all
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
 from hpcclear.dynamics.stepping.explicit.switching import settle_methods
 from hpcclear.dynamics.stepping.implicit.batch import ask_implicit
@@ -74,8 +73,9 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
     """Take at most `budget` block steps. Returns whether lanes are running."""
     if W == 1:
         narrow_vectors()
-    block, queue, method = borrowed_all(block, queue, method, W)
     settings, numbers, work = method.settings, method.numbers, block.work
+    behind = beyond(work, at.STAGES * W), beyond(work, at.WORK * W)  # at known distances
+    block = at.Block(work, behind[0], behind[1], block.book)
     running = load_lanes(codes.special, numbers, block, queue, method, W)
     while budget > 0 and running > 0.0:
         budget -= 1
