@@ -95,14 +95,14 @@ class Books:
     def open(self) -> None:
         """Watch from now on."""
         from hpcclear.ensemble.raw import RawFiles
-        from hpcclear.ranks.leading import RootLead
+        from hpcclear.ranks.leading import Lead
         from hpcclear.ranks.mailbox import Mail
         from hpcclear.ranks.schedule import HandOut
         from hpcclear.results.checkpoint import Checkpoint
 
         self._wrap(Mail, "poll", self._polled)
         self._wrap(HandOut, "grant", self._granted)
-        self._wrap(RootLead, "_answer", self._answered)
+        self._wrap(Lead, "_answer", self._answered)
         self._wrap(RawFiles, "write", self._wrote)
         self._wrap(Checkpoint, "save_stage", self._wrote)
 

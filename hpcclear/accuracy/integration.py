@@ -89,7 +89,8 @@ def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> 
     reference = reference_of(scene, profile.designs)
     methods = methods_of(scene, profile.designs, profile.more_methods)
     shape = (len(methods), len(profile.tolerances))
-    seconds, evaluations, setting = (np.full(shape, np.nan) for _ in range(3))
+    seconds, evaluations = (np.full(shape, np.nan) for _ in range(2))
+    setting = np.tile(profile.tolerances, (len(methods), 1))
     error = np.full((*shape, len(QUANTITIES)), np.nan)
     for m, method in enumerate(methods):
         notify(f"integration: {method.name}")
@@ -99,7 +100,6 @@ def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> 
             outcome, total = timed(run, repeats)
             seconds[m, r] = total * share
             evaluations[m, r] = outcome.evaluations.mean()
-            setting[m, r] = method.setting(rtol)
             # a method may be better than the reference: no error is stated that the reference cannot show
             off = rms((outcome.values - reference.values) / reference.scale)
             lost = not off[0] < LOST  # nor a number

@@ -1,4 +1,4 @@
-"""Every way to integrate one revolution: the kernel's methods, and three that are not the kernel's."""
+"""Every way to integrate one revolution: the kernel's methods, and two that are not the kernel's."""
 
 import time
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from hpcclear.accuracy.equations import FORCE, OPEN, RATE, Equations
+from hpcclear.accuracy.equations import Equations
 from hpcclear.accuracy.looked_at import QUANTITIES, end_of, neighbours
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
@@ -17,15 +17,13 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.layout import views
+from hpcclear.dynamics.linkage.observe import FORCE, OPEN, RATE
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.stepping.problem import Problem
 from hpcclear.scene import Scene
-
-LARGEST_STEP = 1.0 / 64.0
-"""Of the classical method, over the period; the tolerance ladder is turned into steps from here."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +48,6 @@ class Method:
     when it returns."""
     compiled: bool = True
     """Whether it runs without Python inside, so that repeating it is cheap."""
-    setting: Callable[[float], float] = lambda rtol: rtol
-    """Convert a tolerance level into the setting of the method: the same, or a step over the period."""
 
 
 def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Scene:
@@ -119,28 +115,6 @@ def systems(scene: Scene, designs: int) -> list[Equations]:
     par = parameters(here, neighbours(here, designs))
     start = start_states(here, par)
     return [Equations(problem, own, start[k]) for k, own in enumerate(par)]
-
-
-def classical_method(scene: Scene, designs: int) -> Method:
-    """Classical Runge-Kutta steps of one length; contacts are noticed between steps, as simple codes do."""
-    made = systems(scene, designs)
-    step_of = lambda rtol: LARGEST_STEP * (rtol / 1e-3) ** 0.25 / 4.0  # noqa: E731
-
-    def run(steps: int) -> Outcome:
-        values = np.full((designs, len(QUANTITIES)), np.nan)
-        counts = np.zeros(designs)
-        for k, one in enumerate(made):
-            y, duration, peak, counts[k] = one.classical(steps)
-            if np.isfinite(y).all():
-                values[k] = _values(scene, one, y, duration, peak)
-        return Outcome(values, counts)
-
-    def prepare(rtol: float) -> tuple[Run, float]:
-        made[0].classical(1)
-        steps = round(1.0 / step_of(rtol))
-        return (lambda: run(steps)), 1.0 / designs
-
-    return Method("RK4, fixed steps", prepare, setting=step_of)
 
 
 def outside_method(scene: Scene, designs: int, name: str) -> Method:
@@ -260,28 +234,21 @@ def _largest_force(one: Equations, piece: object) -> float:
 
 def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
     """Every method that can integrate this scene, the kernel's first."""
-    wanted: list[tuple[str, int, dict[str, object]]] = [
-        ("tsitouras", 1, {"formulation": "minimal", "method": "tsitouras"}),
-        (
-            f"tsitouras, {DEFAULT_LANES} lanes",
-            DEFAULT_LANES,
-            {"formulation": "minimal", "method": "tsitouras"},
-        ),
-        ("fehlberg", 1, {"formulation": "minimal", "method": "fehlberg"}),
-        ("prince-dormand", 1, {"formulation": "minimal", "method": "prince-dormand"}),
+    wanted = [
+        ("tsitouras", 1, "minimal", "tsitouras"),
+        (f"tsitouras, {DEFAULT_LANES} lanes", DEFAULT_LANES, "minimal", "tsitouras"),
+        ("fehlberg", 1, "minimal", "fehlberg"),
+        ("prince-dormand", 1, "minimal", "prince-dormand"),
     ]
     if more:
-        wanted += [
-            ("radau", 1, {"formulation": "minimal", "method": "radau"}),
-            ("baumgarte", 1, {"formulation": "baumgarte", "method": "tsitouras"}),
-        ]
+        wanted += [("radau", 1, "minimal", "radau"), ("baumgarte", 1, "baumgarte", "tsitouras")]
     found = []
-    for name, width, numerics in wanted:
+    for name, width, formulation, method in wanted:
+        numerics = {"formulation": formulation, "method": method}
         try:
             found.append(kernel_method(name, scene, designs, width, **numerics))
         except InputError:
             continue  # not for this scene
-    found.append(classical_method(scene, designs))
     return found + [outside_method(scene, designs, name) for name in ("DOP853", "LSODA")]
 
 

@@ -43,7 +43,7 @@ def describe(found: Results, files: dict[str, Path]) -> None:
 
 def _integration(found: Results) -> Table:
     made = _grid("One revolution: error of f, force evaluations, time")
-    for name in ("integrator", "order", "rtol or step", "error of f", "evaluations", "ms"):
+    for name in ("integrator", "order", "rtol", "error of f", "evaluations", "ms"):
         made.add_column(name, no_wrap=True, justify="left" if name == "integrator" else "right")
     for method in found["integrator"].to_numpy():
         row = found.sel(integrator=method, quantity="objective")

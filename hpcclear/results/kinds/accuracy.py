@@ -10,7 +10,7 @@ KIND = kind_of(
         "rung": count(("rung",), "number of the tolerance, from the loosest"),
         "quantity": text(("quantity",), "quantity of the error"),
         "setting": number(("integrator", "rung"), "1",
-            "relative tolerance, or step over period for fixed steps", required=True),
+            "relative tolerance", required=True),
         "error": number(("integrator", "rung", "quantity"), "1",
             "relative error after one revolution, RMS over designs", required=True),
         "seconds": number(("integrator", "rung"), "s", "wall time of one design over one revolution", required=True),
