@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ensemble.session import command_line
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS
 from hpcclear.results.provenance import provenance
@@ -28,27 +29,6 @@ GLANCE = 1e-2
 
 Values = Mapping[str, Any]
 Notify = Callable[[str], object]
-
-
-class Store(Protocol):
-    """Where arrays of finished work are kept by name; a `hpcclear.results.checkpoint.Checkpoint` is one."""
-
-    def save_stage(self, name: str, data: Values) -> None:
-        """Keep it."""
-
-    def load_stage(self, name: str) -> dict[str, Any] | None:
-        """What was kept, or None."""
-
-
-class Nowhere:
-    """Keeps nothing."""
-
-    def save_stage(self, name: str, data: Values) -> None:
-        """Forget it."""
-
-    def load_stage(self, name: str) -> dict[str, Any] | None:
-        """None."""
-        return None
 
 
 class Panels:
@@ -68,7 +48,7 @@ class Panels:
         ranks: Ranks,
         profile: Profile,
         notify: Notify,
-        store: Store,
+        store: Checkpoint | None,
         show: Callable[[Results], object],
     ) -> None:
         self.scene, self.ranks, self.profile = scene, ranks, profile
@@ -92,12 +72,19 @@ class Panels:
 
     def kept(self, name: str, work: Callable[[], Values]) -> Values:
         """What `work` gives, or gave before."""
-        found = self._store.load_stage(name)
+        found = self._stored(name)
         if found is None:
             self.notify(name.replace("-", " "))
             found = dict(work())
-            self._store.save_stage(name, found)
+            self._save(name, found)
         return found
+
+    def _stored(self, name: str) -> dict[str, Any] | None:
+        return None if self._store is None else self._store.load_stage(name)
+
+    def _save(self, name: str, data: Values) -> None:
+        if self._store is not None:
+            self._store.save_stage(name, data)
 
     def panel(self, name: str, work: Callable[[], Values]) -> None:
         """Add the variables of a panel."""
@@ -143,7 +130,7 @@ class Panels:
 
     def add_spending(self) -> None:
         """Error of a steady mean against time; goes on from the copies that were kept, a doubling at a time."""
-        found = self._store.load_stage("copies")
+        found = self._stored("copies")
         run = spending.Run.of(self.scene) if found is None else spending.Run(**found)
         if found is None:
             self.notify("tolerance and revolutions")
@@ -152,7 +139,7 @@ class Panels:
         with self.ranks.stage("spending"):
             until, check = self.profile.segments, self.ranks.raise_if_stopped
             for longer in spending.measure(self.scene, run, until, check):
-                self._store.save_stage("copies", vars(longer))
+                self._save("copies", vars(longer))
                 self._shown(longer)
 
     def _shown(self, run: spending.Run) -> None:

@@ -16,7 +16,7 @@ from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.sampling import monte_carlo
 from hpcclear.scene.streams import generator
 from hpcclear.statistics.random.moments import sample_moments
-from hpcclear.statistics.surrogate.leaf import Leaf
+from hpcclear.statistics.surrogate.piecewise import Leaf
 from hpcclear.study.problem import problem_of
 
 ESTIMATES = ("surrogate", "simulation")

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hpcclear.accuracy import surrogate
-from hpcclear.accuracy.panels import Notify, Nowhere, Panels, Store
+from hpcclear.accuracy.panels import Notify, Panels
 from hpcclear.accuracy.profile import Profile
 from hpcclear.accuracy.standin import with_case
 from hpcclear.base.errors import InputError
@@ -12,6 +12,7 @@ from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Options, Place, Session
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
+from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 
@@ -23,7 +24,7 @@ def measure(
     ranks: Ranks,
     profile: Profile,
     notify: Notify = lambda text: None,
-    store: Store | None = None,
+    store: Checkpoint | None = None,
     show: Callable[[Results], object] = lambda content: None,
 ) -> Results:
     """Measure what accuracy costs for a scene; on root.
@@ -34,7 +35,7 @@ def measure(
         With a clearance joint at least.
     notify : callable
         Gets what is going on, a line at a time.
-    store : Store, optional
+    store : Checkpoint, optional
         Where finished work is kept, and found again.
     show : callable
         Gets the dataset of all that is there whenever there is more of it.
@@ -59,7 +60,7 @@ def measure(
         raise InputError(
             "joints", "ideal", "the objective is 0 without clearance", "Give a joint clearance"
         )
-    panels = Panels(scene, ranks, profile, notify, Nowhere() if store is None else store, show)
+    panels = Panels(scene, ranks, profile, notify, store, show)
     notify("compilation")
     studied, case, _ = with_case(scene)
     surrogate.simulated_middle(studied, case, ranks)  # first of all, so that its time is seen

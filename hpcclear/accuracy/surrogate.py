@@ -17,8 +17,8 @@ from hpcclear.scene.points import Points
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.streams import generator
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
-from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.piecewise import Leaf, Method
 from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
 from hpcclear.study.surrogates import coordinate, method_of

@@ -13,7 +13,9 @@ import os
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Protocol, Self
+from typing import Self
+
+from hpcclear.ranks.mailbox import Mail
 
 SILENCE = 120.0
 """Seconds without a pulse after which a rank is given up by default, also if nothing else says that it is lost.
@@ -82,26 +84,6 @@ class Neighbour:
         return self._lost
 
 
-class Pulses(Protocol):
-    """Transport of pulses; it never blocks, and any thread may call it."""
-
-    @property
-    def neighbours(self) -> list[int]:
-        """Ranks to exchange pulses with."""
-
-    def pulse(self, to: int, tag: int) -> None:
-        """Send one."""
-
-    def pulses(self) -> list[tuple[int, int]]:
-        """Rank and tag of each that came since the last call."""
-
-    def connect(self) -> None:
-        """Be connected with neighbours on other nodes; called once, and may take some seconds."""
-
-    def lives(self, rank: int) -> bool | None:
-        """What the system says of a neighbour: it computes (True), it has ended (False), or nothing."""
-
-
 class Watch:
     """The thread of one rank that knows who lives.
 
@@ -117,7 +99,7 @@ class Watch:
 
     def __init__(
         self,
-        mail: Pulses,
+        mail: Mail,
         seconds: float,
         on_loss: Callable[[int], object],
         on_orphan: Callable[[], object],

@@ -15,9 +15,8 @@ from hpcclear.scene.study import Study
 from hpcclear.scene.variables import Variable
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
-from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Piecewise, beginning
+from hpcclear.statistics.surrogate.piecewise import Leaf, Method, Piecewise, beginning
 from hpcclear.statistics.surrogate.regression import RegressionMethod, made
 from hpcclear.statistics.surrogate.stored import rows_of
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals

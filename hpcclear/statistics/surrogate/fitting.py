@@ -21,7 +21,7 @@ NOISE_BOUNDS = (1e-8, 1e1)
 
 @dataclass(frozen=True)
 class KrigingMethod:
-    """Kriging as a `hpcclear.statistics.surrogate.leaf.Method`; the settings are those of `fit_kriging`."""
+    """Kriging as a kind of surrogate; the settings are those of `fit_kriging`."""
 
     restarts: int = 3
     kernel: Kernel = SQUARED_EXPONENTIAL

@@ -11,7 +11,15 @@ from functools import cached_property
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.leaf import Leaf, Method, inside
+from hpcclear.statistics.surrogate.fitting import KrigingMethod
+from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.leaf import inside
+from hpcclear.statistics.surrogate.regression import Regression, RegressionMethod
+
+Leaf = Kriging | Regression
+"""A model fitted to points in a box."""
+Method = KrigingMethod | RegressionMethod
+"""A kind of surrogate with its settings: it is fitted, and restored from stored arrays."""
 
 JUDGED = ("r2", "rmae", "accepted")
 

@@ -45,7 +45,7 @@ COLUMNS: Columns = {
 
 @dataclass(frozen=True)
 class RegressionMethod:
-    """A regressor as a `hpcclear.statistics.surrogate.leaf.Method`.
+    """A regressor as a kind of surrogate.
 
     Attributes
     ----------
@@ -104,12 +104,13 @@ class RegressionMethod:
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """A regressor fitted in a box (`hpcclear.statistics.surrogate.leaf.Leaf`); without a source it only knows what was stored.
+    """A regressor fitted in a box; without a source it only knows what was stored.
 
     Attributes
     ----------
     names, lower, upper, inputs, values, dropped, label
-        As every leaf has them.
+        Of the inputs (d,), the corners of the box (d,), the training points (n, d) and their values (n,), failed samples that
+        were left out, and what it is called.
     seed : int
         Of the regressor's own random numbers.
     source : object
@@ -129,7 +130,7 @@ class Regression:
     source: object = None
     stored: Mapping[str, Array] = field(default_factory=dict)
 
-    separable = False
+    separable = False  # moments are averages over draws
     columns = COLUMNS
 
     @cached_property

@@ -9,8 +9,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate import kriging, regression
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.kriging import Kriging
-from hpcclear.statistics.surrogate.leaf import Leaf
-from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
 
 
 def rows_of(leaves: Sequence[Leaf], parameters: Sequence[str]) -> dict[str, np.ndarray]:

@@ -11,9 +11,8 @@ from itertools import product
 import numpy as np
 
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
-from hpcclear.statistics.surrogate.leaf import Leaf, Method
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.piecewise import Piecewise
+from hpcclear.statistics.surrogate.piecewise import Leaf, Method, Piecewise
 from hpcclear.statistics.surrogate.response_surface import Evaluate, Sampler, latin_hypercube
 
 KRIGING = KrigingMethod()
