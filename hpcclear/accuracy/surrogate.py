@@ -18,9 +18,10 @@ from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.streams import generator
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Leaf, Method
+from hpcclear.statistics.surrogate.piecewise import Leaf
 from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
+from hpcclear.statistics.surrogate.subintervals import Method
 from hpcclear.study.surrogates import coordinate, method_of
 
 

@@ -16,10 +16,14 @@ from hpcclear.scene.variables import Variable
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Leaf, Method, Piecewise, beginning
+from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise, beginning
 from hpcclear.statistics.surrogate.regression import RegressionMethod, made
 from hpcclear.statistics.surrogate.stored import rows_of
-from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
+from hpcclear.statistics.surrogate.subintervals import (
+    Method,
+    SubintervalSettings,
+    fit_subintervals,
+)
 from hpcclear.study.run import Result, StudyRun
 
 STAGE = "kriging"
@@ -107,7 +111,7 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
     found: list[Piecewise] = []
     method = method_of(scene)
     while arrays := beginning(result, f"model{len(found)}_"):
-        found.append(Piecewise.from_arrays(arrays, method))
+        found.append(Piecewise.from_arrays(arrays, method.restored))
     return found
 
 

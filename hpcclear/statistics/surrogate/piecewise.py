@@ -4,22 +4,19 @@ The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's int
 its subintervals). A query uses the model of the box it is in. A single model is the case of one box.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
-from hpcclear.statistics.surrogate.regression import Regression, RegressionMethod
+from hpcclear.statistics.surrogate.regression import Regression
 
 Leaf = Kriging | Regression
 """A model fitted to points in a box."""
-Method = KrigingMethod | RegressionMethod
-"""A kind of surrogate with its settings: it is fitted, and restored from stored arrays."""
 
 JUDGED = ("r2", "rmae", "accepted")
 
@@ -120,11 +117,13 @@ class Piecewise:
         return arrays
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray], method: Method) -> "Piecewise":
-        """The models that `to_arrays` stored; they predict the same to the last bit; errors as `Method.restored`."""
-        leaves = [
-            method.restored(beginning(arrays, f"leaf{k}_")) for k in range(len(arrays["accepted"]))
-        ]
+    def from_arrays(
+        cls,
+        arrays: Mapping[str, np.ndarray],
+        restored: Callable[[Mapping[str, np.ndarray]], Leaf],
+    ) -> "Piecewise":
+        """The models that `to_arrays` stored; they predict the same to the last bit; raises as `restored`, of the method."""
+        leaves = [restored(beginning(arrays, f"leaf{k}_")) for k in range(len(arrays["accepted"]))]
         judged = {name: np.asarray(arrays[name]) for name in JUDGED}
         return cls(tuple(leaves), **judged)
 

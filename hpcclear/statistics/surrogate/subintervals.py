@@ -12,8 +12,12 @@ import numpy as np
 
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.metrics import Accuracy, accuracy
-from hpcclear.statistics.surrogate.piecewise import Leaf, Method, Piecewise
+from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
+from hpcclear.statistics.surrogate.regression import RegressionMethod
 from hpcclear.statistics.surrogate.response_surface import Evaluate, Sampler, latin_hypercube
+
+Method = KrigingMethod | RegressionMethod
+"""A kind of surrogate with its settings: it is fitted, and restored from stored arrays."""
 
 KRIGING = KrigingMethod()
 
