@@ -76,6 +76,12 @@ def test_a_damaged_file_of_any_sort_is_made_again_and_that_is_said(tmp_path, com
             assert len(said()) == 1, (path, kind)
         assert compiled() == ([2.0, 3.0], 2)
         assert not said()
+    one, other = (path.read_bytes() for path in files)
+    files[0].write_bytes(other)  # whole files, each under the name of another function
+    files[1].write_bytes(one)
+    kept._said.clear()
+    assert compiled() == ([2.0, 3.0], 0)
+    assert len(said()) == 1
 
 
 def test_a_damaged_note_of_the_sources_changes_no_key(tmp_path, monkeypatch):

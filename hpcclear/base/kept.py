@@ -1,7 +1,8 @@
 """Files of the compile cache: each is whole or is made again, by one process while others wait.
 
 A file may be cut off or hold anything after a full disk, a fault of the storage or a power failure, and machine code that is
-damaged ends a process, or computes something else. So each has a digest of its content.
+damaged ends a process, or computes something else. So each has a digest of its name and content: code that came to stand
+under another name, as files that a repaired disk gives back may, is of another function.
 """
 
 import contextlib
@@ -39,7 +40,7 @@ def read(path: Path) -> bytes | None:
     except OSError:
         return None
     content = stored[32:]
-    if digest(content) == stored[:32]:
+    if digest(path.name.encode() + content) == stored[:32]:
         return content
     drop(path)
     return None
@@ -48,7 +49,7 @@ def read(path: Path) -> bytes | None:
 def write(path: Path, content: bytes) -> None:
     """Write a file whole or not at all; where none can be written, nothing is kept, and that is said."""
     try:
-        replace(path, digest(content) + content)
+        replace(path, digest(path.name.encode() + content) + content)
     except OSError as error:
         remark(f"Warning: compiled code is not kept: {path.parent}: {error.strerror or error}")
 
