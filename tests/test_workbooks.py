@@ -7,6 +7,7 @@ import zipfile
 import pytest
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import factor
 from hpcclear.scene import workbook
 from hpcclear.scene.sheets import read
 
@@ -161,7 +162,7 @@ def test_cells_are_text_numbers_and_dates(prefix, tmp_path):
     (number, found), *_ = workbook.cells_of(tmp_path / "b.xlsx", data, "table", None)
     assert number == 1
     assert found == [
-        "a", "10.0 %", "2026-03-01", "12:03:05", "2026-03-01 12:03:05.000112", "30:00:00", "1.25", "true", "#DIV/0!",
+        "a", "10.0 %", "2026-03-01", "12:03:05", "2026-03-01 12:03:05.000112", "30:00:00", "1.25 hours", "true", "#DIV/0!",
         "0.30000000000000004", "two runs",
     ]  # fmt: skip
 
@@ -178,3 +179,61 @@ def test_what_is_written_by_another_program_is_read(tmp_path):
     made.save(stream)
     rows = workbook.cells_of(tmp_path / "b.xlsx", stream.getvalue(), "table", None)
     assert rows == [(1, ["", "x [mm]"]), (3, ["1.5", "2", "text"]), (4, ["true", "-1e-07", "7"])]
+
+
+FORMATS = {
+    '0.00" mm"': "mm", '0.000\\ "µm"': "µm", "0.0\\m\\m": "mm", '#,##0.00_ "cm";[Red]-0.00" cm"': "cm", '0.00 "in"': "in",
+    "0.00": "", '0.00" pieces"': "", '"about "0.00': "", "#,##0.00": "", "0.00E+00": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("heading", ["C", "C [mm]"])
+def test_a_number_shown_with_a_unit_has_this_unit(heading, tmp_path):
+    """A cell that shows "0.30 mm" holds 0.3: it was 0.3 m. Beside the same unit in the heading it says nothing more."""
+    from openpyxl import Workbook
+
+    for code, unit in FORMATS.items():
+        made = Workbook()
+        for row in ([heading], [1.125], [2.5]):
+            made.active.append(row)
+        for row in (2, 3):
+            made.active.cell(row, 1).number_format = code
+        made.save(tmp_path / "b.xlsx")
+        sheet = read(tmp_path / "b.xlsx")
+        (column,) = sheet.columns
+        if column.unit and unit not in ("", column.unit):
+            with pytest.raises(InputError, match="line 2, column C"):
+                sheet.si(column, "m", "key")
+        else:
+            size = float(factor(unit or column.unit or "m", "m"))
+            assert sheet.si(column, "m", "key") == pytest.approx([1.125 * size, 2.5 * size]), code
+
+
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        (["5.000", "6.000"], None), (["5,000", "6,000"], None), (["5.000,5", "6,5"], [5000.5, 6.5]),
+        (["0,25", "1,125"], [0.25, 1.125]),
+        (["0.25", "1.125"], [0.25, 1.125]), (["0.25", "1,5"], None),
+    ],
+)  # fmt: skip
+def test_numbers_of_a_workbook_say_nothing_of_the_signs_in_its_texts(texts, expected, tmp_path):
+    """Numbers have a point in the file, whatever the country; what was typed as text may have either sign."""
+    from openpyxl import Workbook
+
+    made = Workbook()
+    for row in (["a", "b"], [1.125, texts[0]], [0.5, texts[1]]):
+        made.active.append(row)
+    made.save(tmp_path / "b.xlsx")
+
+    def values():
+        sheet = read(tmp_path / "b.xlsx")
+        return [sheet.si(one, "", "key") for one in sheet.columns]
+
+    if expected is None:
+        with pytest.raises(InputError, match=r"thousands|decimal points"):
+            values()
+    else:
+        first, second = values()
+        assert list(first) == [1.125, 0.5]
+        assert list(second) == expected

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 from hpcclear.base.errors import InputError
+from hpcclear.base.units import is_unit
 
 DAY = 86_400
 _MONTHS = {
@@ -195,12 +196,17 @@ _BUILT_IN = {
 """What numbers of built-in formats are (ECMA-376, 18.8.30)."""
 
 
+_LITERAL = re.compile(r'"([^"]*)"|\\(.)|_.|\*.')
+"""Of a number's format: a text, a sign, a space as wide as a sign, a sign that fills the cell."""
+
+
 def kind_of_format(number: str, own: Mapping[str, str]) -> str:
-    """What numbers of a format are."""
+    """What numbers of a format are; of those that are shown with a unit, a space and the unit."""
     code = own.get(number)
     if code is None:
         return _BUILT_IN.get(int(number) if number.isdecimal() else 0, "")
-    plain = re.sub(r'"[^"]*"|\\.|_.|\*.', "", code.partition(";")[0]).lower()
+    code = code.partition(";")[0]
+    plain = _LITERAL.sub("", code).lower()
     if re.search(r"\[(h+|m+|s+)\]", plain):
         return "elapsed"
     plain = re.sub(r"\[[^\]]*\]", "", plain)
@@ -208,7 +214,9 @@ def kind_of_format(number: str, own: Mapping[str, str]) -> str:
         return ""
     if re.search("[hs]", plain):
         return "time"
-    return "date" if re.search("[dmy]", plain) else "percent" if "%" in plain else ""
+    shown = "".join(one[1] or one[2] or "" for one in _LITERAL.finditer(code)).strip()
+    unit = f" {shown}" if is_unit(shown) else ""
+    return "date" if re.search("[dmy]", plain) else "percent" if "%" in plain else unit
 
 
 def moment_of(days: float, style: str, epoch: datetime.datetime) -> str:

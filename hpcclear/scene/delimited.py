@@ -46,6 +46,12 @@ _NAMED = {
     "\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", "  ": "spaces", " ": "spaces", "": "one column",
 }  # fmt: skip
 _COMMENT = re.compile(r"\s*(?:#|%|//|!)\s*(.*)")
+
+
+class Stored(str):
+    """A number as a workbook stores it, and the unit with which it is shown: its point says nothing of those in texts."""
+
+
 Rows = list[tuple[int, list[str]]]
 """Line numbers and cells."""
 Lines = list[tuple[int, str]]
@@ -343,7 +349,7 @@ def _has_commas(path: Path, columns: list[Column], lines: list[int], separator: 
     doubtful = ""
     for column in columns:
         for line, cell in zip(lines, column.cells, strict=True):
-            if "," not in cell and (False in seen or "." not in cell):
+            if isinstance(cell, Stored) or ("," not in cell and (False in seen or "." not in cell)):
                 continue  # neither a decimal comma nor the first point
             text, behind = cut_unit(cell)
             text = cell.strip().replace("\u2212", "-") if behind and not is_unit(behind) else text

@@ -29,7 +29,7 @@ from hpcclear.base.units import (
     written,
 )
 from hpcclear.scene import clock, delimited
-from hpcclear.scene.delimited import NOTHING, Column, columns_of, decimal_of
+from hpcclear.scene.delimited import NOTHING, Column, Stored, columns_of, decimal_of
 from hpcclear.scene.workbook import cells_of
 
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
@@ -89,10 +89,11 @@ class Sheet:
         """
         cell = column.cells[row]
         text = cell.strip()
-        if column.unit == "%" and text.endswith("%"):
-            text = text[:-1].rstrip()
+        comma, stored = self._signs(cell)
+        if column.unit and (stored or column.unit == "%"):  # shown with the unit of the heading
+            text = text.removesuffix(column.unit).rstrip()
         try:
-            number: float | None = decimal_of(text, self.comma)
+            number: float | None = decimal_of(text, comma)
         except ValueError:
             number = None
         reason, remedy = "is not a finite decimal number", "Write a number such as 0.21"
@@ -100,7 +101,7 @@ class Sheet:
             if number is not None:
                 return scaled(number, size)
             if not column.unit and self._has_unit(text):
-                return to_si(self._pointed(text), unit, self.comma)
+                return to_si(text.replace(",", ".") if comma else text, unit, comma or stored)
             if text.lower() in NOTHING:
                 reason, remedy = f"the cell is empty: it {reason}", "Give each column a value"
             elif text.startswith("#"):
@@ -115,8 +116,10 @@ class Sheet:
             reason, remedy = error.reason, error.remedy
         raise InputError(self.place(column, row), cell, reason, remedy)
 
-    def _pointed(self, cell: str) -> str:
-        return cell.replace(",", ".") if self.comma else cell
+    def _signs(self, cell: str) -> tuple[bool, bool]:
+        """Whether decimals of a cell have a comma, and whether it is a number of a workbook."""
+        stored = isinstance(cell, Stored)
+        return self.comma and not stored, stored
 
     @staticmethod
     def _has_unit(text: str) -> bool:
@@ -168,8 +171,10 @@ class Sheet:
             ]
         made = list[float | str]()
         for row, cell in enumerate(column.cells):
+            comma, stored = self._signs(cell)
+            pointed = cell.replace(",", ".") if comma else cell
             with at(self.place(column, row), cell):
-                number, unit = quantity(self._pointed(cell), "", decided=self.comma)
+                number, unit = quantity(pointed, "", decided=comma or stored)
             made.append(written(float(number), unit))
         return made
 

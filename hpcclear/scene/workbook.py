@@ -19,7 +19,7 @@ from xml.parsers import expat
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene import clock, delimited
-from hpcclear.scene.delimited import LARGEST_FILE, LONGEST_CELL, Rows
+from hpcclear.scene.delimited import LARGEST_FILE, LONGEST_CELL, Rows, Stored
 
 LARGEST = LARGEST_FILE // 4
 """Bytes of a workbook, which is packed."""
@@ -75,7 +75,7 @@ class _Book:
     texts : list of str
         Shared texts.
     formats : list of str
-        What the numbers of each style are: "" for plain ones, "percent", "date", "time", "elapsed".
+        What the numbers of each style are: "" for plain ones, "percent", "date", "time", "elapsed", " mm".
     epoch : datetime.datetime
         The day 0.
     """
@@ -352,14 +352,12 @@ class _Page:
         if self.kind != "n" or not raw:
             return raw[:LONGEST_CELL]
         style = formats[abs(int(self.style))] if formats else ""
-        if not style:
-            return raw if len(raw) < 16 else repr(float(raw))
+        if not style or style[0] == " ":  # a unit
+            return Stored((raw if len(raw) < 16 else repr(float(raw))) + style)
         number = float(raw)
-        return (
-            f"{100 * number!r} %"
-            if style == "percent"
-            else clock.moment_of(number, style, self.book.epoch)
-        )
+        if style == "percent":
+            return Stored(f"{100 * number!r} %")
+        return clock.moment_of(number, style, self.book.epoch)
 
     def _merge(self, reference: str) -> None:
         first, _, last = reference.partition(":")
