@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, WithJsonSchema
 
 from hpcclear.base.arithmetic import names_in, value_of
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
 from hpcclear.base.objectives import ENDS, Objective, Usual
 from hpcclear.plugins import OBJECTIVES
-from hpcclear.scene.fields import Quantity, Table, invalid
+from hpcclear.scene.fields import NUMBER, Number, Quantity, Table, invalid
 from hpcclear.scene.named import NAME
 from hpcclear.scene.plugged import PluginName, as_invalid
 
@@ -48,7 +48,7 @@ class Goal(Table):
     """Instead of a statistic: a formula of numbers and nominal design variables (SI) with + - * / **, such as "m2 + m3"."""
     level: Level | None = None
     """For "quantile": fraction of machines below the value; default 0.95."""
-    limit: float | None = None
+    limit: Number = None
     """For "exceedance": threshold of f, SI."""
 
     def _check(self) -> None:
@@ -145,7 +145,7 @@ class Goal(Table):
 class Constraint(Goal):
     """A constraint on the designs of a case."""
 
-    most: float
+    most: Annotated[float, WithJsonSchema(NUMBER)]
     """Largest allowed value, SI; for "exceedance" a probability."""
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import model_validator
 
 from hpcclear.base.errors import at, nearest
-from hpcclear.scene.fields import Quantity, Table, invalid
+from hpcclear.scene.fields import Number, Quantity, Table, invalid
 from hpcclear.scene.fits import fit_of
 from hpcclear.scene.paths import quantities
 
@@ -132,7 +132,7 @@ class Cost(Table):
 
     law: Literal["reciprocal", "exponential"] | None = None
     """"reciprocal": fixed + cost (at / value)^power; "exponential": fixed + cost exp((at - value) / scale)."""
-    at: float | None = None
+    at: Number = None
     """Reference value, SI, at which the cost is `cost`."""
     cost: Annotated[float, _COST] | None = None
     """Cost at the reference value `at`, in addition to `fixed`."""
@@ -140,7 +140,7 @@ class Cost(Table):
     """Cost that does not depend on the value."""
     power: Annotated[float, Quantity("", above=0, most=10)] = 1.0
     """Exponent of the law "reciprocal"."""
-    scale: float | None = None
+    scale: Number = None
     """For the law "exponential": increase of the value that reduces the cost to 1/e, SI."""
     options: tuple[float, ...] | None = None
     """Cost of each option of the variable, in their order."""

@@ -11,6 +11,7 @@ from pydantic import (
     ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    WithJsonSchema,
     model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
@@ -312,6 +313,14 @@ class NamedRows:
         return {"type": "object", "additionalProperties": handler(schema)["items"]}
 
 
+NUMBER: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+_LIST = {"type": "array", "items": NUMBER, "minItems": 2}
+Number = Annotated[float | None, WithJsonSchema(NUMBER)]
+"""A number that its table converts to SI, because its unit depends on other entries."""
+Bounds = Annotated[tuple[float, float] | None, WithJsonSchema({**_LIST, "maxItems": 2})]
+"""Such a pair."""
+Numbers = Annotated[tuple[float, ...] | None, WithJsonSchema({**_LIST, "maxItems": LONGEST_CURVE})]
+"""Several such numbers."""
 Length = Annotated[float, Quantity("m")]
 PositiveLength = Annotated[float, Quantity("m", above=0)]
 Mass = Annotated[float, Quantity("kg", above=0)]

@@ -15,7 +15,7 @@ from pydantic import model_validator
 from hpcclear.base import tolerances
 from hpcclear.base.errors import at
 from hpcclear.base.units import note
-from hpcclear.scene.fields import Quantity, Table, invalid
+from hpcclear.scene.fields import Bounds, Quantity, Table, invalid
 
 SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 """Largest size of each range, mm."""
@@ -169,7 +169,7 @@ INSTEAD = {
 class Tolerance(Table):
     """Diameters of a bore or a pin: limits of size, and the distribution within them."""
 
-    range: tuple[float, float] | None = None
+    range: Bounds = None
     """Smallest and largest diameter, m; default: those of the fit."""
     distribution: Literal["normal", "uniform"] = "normal"
     """Distribution of the diameters."""

@@ -8,26 +8,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from hpcclear.base.objectives import ENDS
-from hpcclear.scene.fields import LONGEST_CURVE, OF_FILE, Table
+from hpcclear.scene.fields import NUMBER, OF_FILE, Table
 from hpcclear.scene.file_curves import FileCurve
 from hpcclear.scene.joints import Guide
 from hpcclear.scene.random_inputs import OURS
 from hpcclear.scene.scene import Scene
-
-_NUMBER = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-_BOUNDS = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
-_LIST = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": LONGEST_CURVE}
-_CONVERTED = {
-    "range",
-    "ratio",
-    "mean",
-    "half_width",
-    "deviation",
-    "scale",
-    "location",
-    "values",
-    "step",
-}
 
 
 def _tables(kind: type[Table] = Table) -> Iterator[type[Table]]:
@@ -106,9 +91,6 @@ def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     row = definitions["Row"]
     row["properties"]["name"] = {"type": "string", "description": "name of the row"}
     row["required"], row["additionalProperties"] = ["name"], True  # entries by their paths
-    cost = definitions["Cost"]["properties"]
-    for key in ("at", "scale"):
-        cost[key] = {**_NUMBER, "description": cost[key]["description"]}
     entry = definitions["Variable"]["properties"]["cost"]
     number = {"type": "number"}
     each = {"type": "array", "items": number}
@@ -162,14 +144,8 @@ def _inputs(definitions: dict[str, Any]) -> None:
     """Variables and random inputs of a study."""
     for name in ("Variable", "RandomInput"):
         entries = definitions[name]["properties"]
-        # Entries whose unit depends on the path are converted before their fields see them.
-        for key in _CONVERTED & entries.keys():
-            kind = _BOUNDS if key in ("range", "ratio") else _LIST if key == "values" else _NUMBER
-            entries[key] = {**kind, "description": entries[key].get("description", "bounds, SI")}
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1
-    entries = definitions["Tolerance"]["properties"]
-    entries["range"] = {**_BOUNDS, "description": entries["range"]["description"]}
     definitions["RandomInput"]["additionalProperties"] = (
         True  # parameters of a distribution from elsewhere
     )
@@ -183,10 +159,6 @@ def _inputs(definitions: dict[str, Any]) -> None:
 
 def _cases(definitions: dict[str, Any]) -> None:
     """Cases of a study with their objectives and constraints, and its accuracy."""
-    for name in ("Goal", "Constraint"):
-        entries = definitions[name]["properties"]
-        for key in {"limit", "most"} & entries.keys():
-            entries[key] = {**_NUMBER, "description": entries[key]["description"]}
     one_word = {"enum": ["mean", "deviation", "quantile", "cost"]}  # an exceedance needs a limit
     goals = {
         "type": "array",
@@ -198,5 +170,5 @@ def _cases(definitions: dict[str, Any]) -> None:
     entries["objectives"] = {**goals, "description": entries["objectives"]["description"]}
     case = {"anyOf": [{"$ref": "#/$defs/Case"}, definitions["Case"]["properties"]["random"]]}
     study = definitions["Study"]["properties"]
-    study["accuracy"]["anyOf"] = [*_NUMBER["anyOf"], *study["accuracy"]["anyOf"]]
+    study["accuracy"]["anyOf"] = [*NUMBER["anyOf"], *study["accuracy"]["anyOf"]]
     study["cases"]["additionalProperties"] = case

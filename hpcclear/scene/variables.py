@@ -10,7 +10,7 @@ from pydantic import PrivateAttr, model_validator
 from hpcclear.base.errors import at
 from hpcclear.scene import choices
 from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Cost, Row
-from hpcclear.scene.fields import Quantity, invalid
+from hpcclear.scene.fields import Bounds, Number, Numbers, Quantity, invalid
 from hpcclear.scene.named import NamedInput, Range, texts_in, with_paths
 from hpcclear.scene.paths import described, quantities
 
@@ -20,13 +20,13 @@ LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
 class Variable(NamedInput):
     """A study variable: its name, the scene entries that it sets, and its bounds in SI or its allowed values."""
 
-    range: Range | None = None
+    range: Bounds = None
     """Lower and upper bound, SI."""
-    ratio: Range | None = None
+    ratio: Bounds = None
     """For an inertia: bounds of r = I / (m L^2 / 12), which is sampled instead of I."""
-    step: float | None = None
+    step: Number = None
     """With `range`: designs have the lower bound plus whole multiples of this step, SI."""
-    values: tuple[float, ...] | None = None
+    values: Numbers = None
     """Instead of a range: the allowed values, SI."""
     fits: tuple[str, ...] | None = None
     """Instead of a range: ISO 286 fits, such as "20 H7/f7", for the joints in `path` and for random inputs with the
