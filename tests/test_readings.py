@@ -18,7 +18,7 @@ from hpcclear.scene.curves import Pairs, by_angle, by_time
 from hpcclear.scene.fields import Quantity
 from hpcclear.scene.paths import _all_entries, _quantity, of_kinds, quantities
 from hpcclear.scene.points import read_points
-from hpcclear.scene.variables import Variable
+from hpcclear.scene.variables import StudyVariable
 
 JOBS = Path(__file__).parents[1] / "jobs"
 
@@ -206,7 +206,7 @@ def test_an_entry_has_the_unit_of_its_own_kind_as_a_study_variable(path):
             unit = quantity.unit or "%"
             scale = 100.0 if not quantity.unit else 1.0
             ends = [f"{scale * low:.3} {unit}", f"{scale * (low + 0.05):.3} {unit}"]
-            variable = Variable.model_validate({**row, "range": ends})
+            variable = StudyVariable.model_validate({**row, "range": ends})
             assert variable.unit == quantity.unit
             assert variable.range == pytest.approx((low, low + 0.05))
             for other in TARGETS:
@@ -215,7 +215,7 @@ def test_an_entry_has_the_unit_of_its_own_kind_as_a_study_variable(path):
                 if {other, quantity.unit} <= {"N*m", "J"}:
                     continue
                 with pytest.raises(ValueError, match="does not fit"):
-                    Variable.model_validate({**row, "range": [f"1 {other}", f"2 {other}"]})
+                    StudyVariable.model_validate({**row, "range": [f"1 {other}", f"2 {other}"]})
         assert quantities()[concrete].unit == quantity.unit  # of the scene read last
 
 

@@ -12,7 +12,7 @@ from scipy import stats
 
 import hpcclear
 from hpcclear.base.errors import InputError
-from hpcclear.base.quantiles import Samples
+from hpcclear.base.quantiles import Empirical
 from hpcclear.ensemble.samples import design
 from hpcclear.scene import load_scene
 from hpcclear.scene.sampling import monte_carlo
@@ -36,7 +36,7 @@ SMALL = (
 
 @pytest.fixture
 def values():
-    return Samples(tuple(np.sort(np.random.default_rng(2).weibull(2.0, 60)).tolist()))
+    return Empirical(tuple(np.sort(np.random.default_rng(2).weibull(2.0, 60)).tolist()))
 
 
 def test_a_gauss_rule_of_samples_is_exact_for_polynomials(values):

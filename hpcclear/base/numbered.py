@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 
-class Row(NamedTuple):
+class NumberedRow(NamedTuple):
     """What was declared: so many rows from the first on."""
 
     first: int
@@ -15,16 +15,16 @@ class Row(NamedTuple):
     """The effect that has a rate integrated; "" for none."""
 
 
-class Rows:
+class RowNumbers:
     """Numbers rows: each call declares some and returns the first of them."""
 
     def __init__(self) -> None:
         self.end = 0
-        self.declared: list[Row] = []
+        self.declared: list[NumberedRow] = []
 
     def __call__(self, words: str, unit: str = "", size: int = 1, asked_by: str = "") -> int:
         """Declare `size` rows behind those that there are."""
-        row = Row(self.end, size, unit, words, asked_by)
+        row = NumberedRow(self.end, size, unit, words, asked_by)
         self.declared.append(row)
         self.end += size
         return row.first

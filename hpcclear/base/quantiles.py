@@ -99,7 +99,7 @@ class Normal:
 
 
 @dataclass(frozen=True)
-class Samples:
+class Empirical:
     """Each of some values with equal chance, shape (n,), in rising order: the empirical quantile function."""
 
     values: tuple[float, ...]

@@ -18,7 +18,7 @@ POINTS = 1025
 
 
 @dataclass(frozen=True)
-class Part:
+class PartSize:
     """Diameters of a part: normal, cut off at both ends; with an infinite `deviation` uniform."""
 
     lower: float
@@ -47,7 +47,9 @@ class Part:
         return np.clip(found, 0.0, 1.0)
 
 
-def part(limits: tuple[float, float], cp: float, cpk: float, towards: str, inspected: bool) -> Part:
+def part(
+    limits: tuple[float, float], cp: float, cpk: float, towards: str, inspected: bool
+) -> PartSize:
     """A normally distributed part by its capability.
 
     Parameters
@@ -67,15 +69,15 @@ def part(limits: tuple[float, float], cp: float, cpk: float, towards: str, inspe
     mean = (lower + upper) / 2.0 + shift
     if not inspected:
         lower, upper = mean - TAIL * deviation, mean + TAIL * deviation
-    return Part(lower, upper, mean, deviation)
+    return PartSize(lower, upper, mean, deviation)
 
 
 @dataclass(frozen=True)
-class Clearance:
+class FitClearance:
     """Radial clearances of any bore with any pin; where `lower` and `upper` lie within what is met, cut off there."""
 
-    bore: Part
-    pin: Part
+    bore: PartSize
+    pin: PartSize
     lower: float = -np.inf
     upper: float = np.inf
 

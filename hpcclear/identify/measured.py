@@ -11,7 +11,7 @@ from hpcclear.ensemble.maps import number_of
 from hpcclear.identify.signals import ORDERS, Spectrum, harmonics
 from hpcclear.results.signals import is_counted
 from hpcclear.scene import Scene
-from hpcclear.scene.delimited import Column
+from hpcclear.scene.delimited import SheetColumn
 from hpcclear.scene.planar import turns_of
 from hpcclear.scene.sheets import Sheet, read_series
 
@@ -144,7 +144,7 @@ def loaded(scene: Scene, path: Path, words: str) -> Scene:
     return scene.with_({"effects.slider_load": pairs})
 
 
-def _column(sheet: Sheet, name: str) -> Column:
+def _column(sheet: Sheet, name: str) -> SheetColumn:
     """The column of a signal; a table of one signal may call it as it likes."""
     found = [one for one in sheet.signals if one.name.strip() == name] or sheet.signals
     if len(found) == 1:

@@ -17,7 +17,7 @@ from hpcclear.report import bearings
 from hpcclear.report.figures import motion
 from hpcclear.results.content import Results
 from hpcclear.results.signals import Signal, signals_in
-from hpcclear.scene.delimited import Column
+from hpcclear.scene.delimited import SheetColumn
 from hpcclear.scene.sheets import AXES, Sheet, plain_name, read_series
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def _measured_axis(response: Results, axis: str, given: Array, at: Array, every:
     return x
 
 
-def _check_names(names: Mapping[str, str], columns: list[Column]) -> None:
+def _check_names(names: Mapping[str, str], columns: list[SheetColumn]) -> None:
     """InputError unless each named column is one of the table's, by its heading or without its unit."""
     known = [name for one in columns for name in dict.fromkeys((one.name, one.heading))]
     for name, quantity in names.items():
@@ -226,7 +226,7 @@ def _check_names(names: Mapping[str, str], columns: list[Column]) -> None:
             raise InputError("--name", f"{name}={quantity}", reason, nearest(name, known))
 
 
-def _axis(sheet: Sheet) -> tuple[str, Column]:
+def _axis(sheet: Sheet) -> tuple[str, SheetColumn]:
     """Kind and column of what a table runs along: the first, where it has time and angle."""
     for axis in sheet.axes.items():
         return axis
@@ -246,7 +246,7 @@ def _places(response: Results, axis: str) -> tuple[Array, Callable[[Array], Arra
     return angle - angle[0], lambda given: np.unwrap(sense * (given - first))
 
 
-def _signal(response: Results, column: Column, names: Mapping[str, str]) -> Signal:
+def _signal(response: Results, column: SheetColumn, names: Mapping[str, str]) -> Signal:
     """The signal that a column measures."""
     wanted = names.get(column.heading, names.get(column.name, column.name))
     found = signals_in(response)

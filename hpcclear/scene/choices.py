@@ -34,7 +34,7 @@ OF_INPUT = {
 """Entries of random inputs that a variable may drive, and whether they have the unit of the input."""
 
 
-class Row(Table):
+class CatalogueRow(Table):
     """A row of a catalogue: the values of all entries if it is chosen."""
 
     name: str
@@ -88,7 +88,7 @@ def input_entry(path: str) -> tuple[str, str]:
     return name, entry
 
 
-def rows_of_fits(fits: Sequence[str], follows: Sequence[str]) -> tuple[Row, ...]:
+def rows_of_fits(fits: Sequence[str], follows: Sequence[str]) -> tuple[CatalogueRow, ...]:
     """Fits as rows: clearance and bearing radius of the joints that have them, and what random inputs follow them."""
     rows = []
     for text in fits:
@@ -100,7 +100,7 @@ def rows_of_fits(fits: Sequence[str], follows: Sequence[str]) -> tuple[Row, ...]
             else:
                 entries[f"{owner}.clearance"] = fit.clearance
                 entries[f"{owner}.bearing_radius"] = fit.bearing_radius
-        rows.append(Row(name=text, entries=entries))
+        rows.append(CatalogueRow(name=text, entries=entries))
     return tuple(rows)
 
 

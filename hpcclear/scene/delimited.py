@@ -223,7 +223,7 @@ NOTHING = ("", "-", "–", "—", "na", "n/a", "nan", "null", "none")
 """Cells in which nothing stands, in small letters."""
 
 
-class Column(NamedTuple):
+class SheetColumn(NamedTuple):
     """One column: its heading, its unit as written, "" for none, and its cells."""
 
     name: str
@@ -234,7 +234,7 @@ class Column(NamedTuple):
 
 def columns_of(
     path: Path, what: str, rows: Rows, found: str, separator: str, headed: bool
-) -> tuple[tuple[Column, ...], tuple[int, ...], bool]:
+) -> tuple[tuple[SheetColumn, ...], tuple[int, ...], bool]:
     """Columns of rows, the lines of the cells, and whether decimals have a comma.
 
     Headings stand above the first number, units in them or in a row below; InputError says what is amiss.
@@ -281,7 +281,7 @@ def columns_of(
         name, unit = parsed_heading(heading)
         if place < len(units) and units[place] is not None:
             unit = units[place] or unit
-        column = Column(name, unit, heading, tuple(row[place] for row in cells))
+        column = SheetColumn(name, unit, heading, tuple(row[place] for row in cells))
         if not heading and any(column.cells):
             reason = "a column has no heading"
             raise InputError(f"{path}, line {line}", "", reason, "Name it, or remove the column")
@@ -343,7 +343,7 @@ def _are_units(cells: list[str]) -> bool:
     return bool(filled) and all(is_unit(cell) for cell in filled)
 
 
-def _has_commas(path: Path, columns: list[Column], lines: list[int], separator: str) -> bool:
+def _has_commas(path: Path, columns: list[SheetColumn], lines: list[int], separator: str) -> bool:
     """Whether decimals have a comma; InputError where some have a comma and some a point."""
     seen: dict[bool, str] = {}
     doubtful = ""

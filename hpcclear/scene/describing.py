@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from hpcclear.plugins.sources import digest
-from hpcclear.scene.driving import TorqueDrive, speed_entry
+from hpcclear.scene.driving import CrankTorque, speed_entry
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.planar import Planar, slender_inertia
-from hpcclear.scene.slider_crank import Mechanism
+from hpcclear.scene.slider_crank import SliderCrank
 from hpcclear.scene.tables import SceneTables
 
 FASTEST = 30.0
@@ -29,7 +29,7 @@ STEEL = 7850.0
 
 def implausible(scene: SceneTables) -> Iterator[str]:
     """A sentence for each number that is likely a slip of units."""
-    if isinstance(scene.mechanism, Mechanism):
+    if isinstance(scene.mechanism, SliderCrank):
         yield from _drive(scene)
         yield from _rod(scene)
     yield from _bodies(scene)
@@ -212,7 +212,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         coefficient = effects.friction.value("coefficient")
         size = "" if coefficient is None else f", coefficient {coefficient:g}"
         yield f"friction {effects.friction.law}{size}"
-    if isinstance(scene.drive, TorqueDrive):
+    if isinstance(scene.drive, CrankTorque):
         falls = "" if scene.drive.no_load_speed is None else ", torque falling with speed"
         rest = ", from rest" if scene.drive.initial_speed == 0.0 else ""
         yield f"torque-driven crank{falls}{rest}"

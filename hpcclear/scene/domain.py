@@ -15,7 +15,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.scene.planar import slender_inertia
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
-from hpcclear.scene.variables import Variable
+from hpcclear.scene.variables import StudyVariable
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _reaches(study: Study, widen: Iterable[str]) -> dict[str, tuple[float, float
 
 def _bounds(
     scene: SceneTables,
-    variable: Variable,
+    variable: StudyVariable,
     names: tuple[str, ...],
     reach: dict[str, tuple[float, float]],
 ) -> tuple[float, float]:
@@ -148,18 +148,11 @@ def slender_inertias(
     `values` has shape ``(n, d)``, and column i drives the scene entries ``paths[i]``; mass and
     length come from the row where a column drives them, and from the scene where none does.
     """
+    columns = {path: column for column, driven in enumerate(paths) for path in driven}
     link = inertia.rpartition(".")[0]
-    mass, length = (entries(scene, paths, values, f"{link}.{part}") for part in ("mass", "length"))
+    mass, length = (
+        values[:, columns[path]] if path in columns else scene.number(path)
+        for path in (f"{link}.mass", f"{link}.length")
+    )
     found: Array | float = slender_inertia(mass, length)
     return found
-
-
-def entries(
-    scene: SceneTables, paths: Sequence[Sequence[str]], values: Array, path: str
-) -> Array | float:
-    """What stands at `path` in each row: the column that drives it, shape (n,), or the scene's
-    number."""
-    for column, driven in enumerate(paths):
-        if path in driven:
-            return values[:, column]
-    return scene.number(path)

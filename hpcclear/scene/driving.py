@@ -44,7 +44,7 @@ class Driving(Table):
     Default: true for the first drive if no drive has this entry."""
 
 
-class ConstantSpeed(Table):
+class CrankSpeed(Table):
     """The crank turns at a constant prescribed speed, independent of the torque that this requires."""
 
     kind: Literal["constant-speed"]
@@ -62,7 +62,7 @@ class ConstantSpeed(Table):
     )
 
 
-class PlanarSpeed(Driving, ConstantSpeed):
+class PlanarSpeed(Driving, CrankSpeed):
     """A body turns at a constant speed."""
 
 
@@ -102,7 +102,7 @@ class PlanarTable(Driving):
             )
 
 
-class TorqueDrive(Table):
+class CrankTorque(Table):
     """A torque acts on the free crank; its speed is a result of the simulation."""
 
     kind: Literal["torque"]
@@ -149,7 +149,7 @@ class TorqueDrive(Table):
             )  # fmt: skip
 
 
-class PlanarTorque(Driving, TorqueDrive):
+class PlanarTorque(Driving, CrankTorque):
     """A torque acts on a free body."""
 
     interval: Interval | None = None

@@ -8,11 +8,11 @@ from pydantic import field_validator, model_validator
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, Pairs, by_angle
 from hpcclear.scene.fields import Quantity, Speed, Table, invalid
-from hpcclear.scene.joints import Rubbing
+from hpcclear.scene.joints import JointFriction
 from hpcclear.scene.laws import SPHERE, LawTable, quantity_of
 
 
-class Contact(LawTable):
+class ContactTable(LawTable):
     """Normal contact force of every clearance joint."""
 
     kind: ClassVar[str] = "contact"
@@ -54,7 +54,7 @@ class Contact(LawTable):
         return bool(self.declared.latched)
 
 
-class Friction(LawTable):
+class FrictionTable(LawTable):
     """Tangential force of every clearance joint."""
 
     kind: ClassVar[str] = "friction"
@@ -72,19 +72,19 @@ class Friction(LawTable):
         return bool(self.declared.bristled)
 
 
-class Effects(Table):
+class EffectTables(Table):
     """Effects that act on the mechanism. Disabled effects are not computed."""
 
-    contact: Contact | None = None
+    contact: ContactTable | None = None
     """Law of the normal contact force. Required if any joint has clearance."""
-    friction: Friction = Friction()
+    friction: FrictionTable = FrictionTable()
     """Friction in the joints with clearance; default "none"."""
     gravity: Annotated[float, Quantity("m/s**2", least=0)] = 0.0
     """Acceleration of gravity towards -y, m/s2; 0: disabled."""
     slider_load: Annotated[Curve, by_angle("N")] | None = None
     """Force on the slider, positive along +x, N; constant or ``[[crank angle, force], ...]`` over the turns of a
     revolution; default "none"."""
-    guide_friction: Rubbing | None = None
+    guide_friction: JointFriction | None = None
     """Friction of the slider in its guide; default "none"."""
 
     def law_unit(self, path: str) -> str | None:

@@ -343,7 +343,7 @@ class PairTable(Table):
         return {"x": data[0], "y": data[1]}
 
 
-class Place(PairTable):
+class Position(PairTable):
     """A place or an offset; ``[x, y]`` is the same."""
 
     x: Length
@@ -352,7 +352,7 @@ class Place(PairTable):
     """y coordinate, m."""
 
 
-class NamedPlace(Place):
+class NamedPlace(Position):
     """A point of a body, in its own axes; ``[x, y]`` is the same."""
 
     name: str
@@ -377,4 +377,4 @@ class PlaceRows(NamedRows):
 
 
 NamedPlaces = Annotated[tuple[NamedPlace, ...], PlaceRows()]
-NOWHERE = Place(x=0.0, y=0.0)
+NOWHERE = Position(x=0.0, y=0.0)

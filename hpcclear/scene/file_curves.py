@@ -13,7 +13,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError, at
 from hpcclear.base.plain import plain
 from hpcclear.base.units import UnitError, factor, fits
-from hpcclear.scene.delimited import Column, parsed_heading
+from hpcclear.scene.delimited import SheetColumn, parsed_heading
 from hpcclear.scene.fields import LONGEST_CURVE, PositiveLength, Quantity, Table, invalid
 from hpcclear.scene.paths import curves, replace
 from hpcclear.scene.sheets import Sheet, place_of, plain_unit, read
@@ -162,7 +162,7 @@ def _kind(curve: FileCurve, unit: str, key: str) -> str:
     return kind
 
 
-def _span(values: Array, column: Column) -> str:
+def _span(values: Array, column: SheetColumn) -> str:
     try:
         size = float(factor(plain_unit(column.unit, "Pa"), "Pa"))
     except UnitError:
@@ -171,8 +171,8 @@ def _span(values: Array, column: Column) -> str:
 
 
 def _column(
-    sheet: Sheet, kind: str, given: str | None, target: str, key: str, taken: Sequence[Column] = (),
-) -> tuple[Column, Array]:  # fmt: skip
+    sheet: Sheet, kind: str, given: str | None, target: str, key: str, taken: Sequence[SheetColumn] = (),
+) -> tuple[SheetColumn, Array]:  # fmt: skip
     """The column of a kind, and its numbers in SI, shape (n,)."""
     key = f"{key}.{kind}"
     name, unit = ("", "") if given is None else _named(given, target)
@@ -199,7 +199,7 @@ def _named(given: str, target: str) -> tuple[str, str]:
     return ("", given) if fits(given, target) else parsed_heading(given)
 
 
-def _forces(curve: FileCurve, column: Column, values: Array, unit: str, key: str) -> Array:
+def _forces(curve: FileCurve, column: SheetColumn, values: Array, unit: str, key: str) -> Array:
     gauge = plain_unit(column.unit, "Pa") != column.unit
     if gauge and curve.ambient:
         raise InputError(

@@ -67,7 +67,7 @@ _FIT = re.compile(
 _EXAMPLE = 'Write size, hole and shaft as in "20 H7/f7"'
 
 
-class Limits(NamedTuple):
+class SizeLimits(NamedTuple):
     """Smallest and largest diameter of a part, or clearance, m."""
 
     least: float
@@ -84,15 +84,17 @@ class Fit(NamedTuple):
     shaft: tuple[float, float]
     """The same."""
 
-    def diameters(self, part: str) -> Limits:
+    def diameters(self, part: str) -> SizeLimits:
         """Smallest and largest diameter of "hole" or "shaft", m."""
         low, high = getattr(self, part)
-        return Limits((1e3 * self.size + low) / 1e6, (1e3 * self.size + high) / 1e6)
+        return SizeLimits((1e3 * self.size + low) / 1e6, (1e3 * self.size + high) / 1e6)
 
     @property
-    def clearances(self) -> Limits:
+    def clearances(self) -> SizeLimits:
         """Least and largest radial clearance, m; below 0 where both may be tight."""
-        return Limits((self.hole[0] - self.shaft[1]) / 2e6, (self.hole[1] - self.shaft[0]) / 2e6)
+        return SizeLimits(
+            (self.hole[0] - self.shaft[1]) / 2e6, (self.hole[1] - self.shaft[0]) / 2e6
+        )
 
     @property
     def clearance(self) -> float:
@@ -208,17 +210,17 @@ class Tolerance(Table):
                 'Add towards = "upper" or "lower"', "towards", None,
             )  # fmt: skip
 
-    def part(self, limits: Limits | None) -> tolerances.Part:
+    def part(self, limits: SizeLimits | None) -> tolerances.PartSize:
         """Its distribution; `limits` are those of the fit."""
         given = self.range or limits
         assert given is not None  # by validation
         if self.distribution == "uniform":
-            return tolerances.Part(*given, sum(given) / 2, float("inf"))
+            return tolerances.PartSize(*given, sum(given) / 2, float("inf"))
         cpk = self.cp if self.cpk is None else self.cpk
         return tolerances.part(given, self.cp, cpk, self.towards or "upper", self.inspected)
 
 
-def law_of(entries: Mapping[str, Any]) -> tolerances.Clearance:
+def law_of(entries: Mapping[str, Any]) -> tolerances.FitClearance:
     """The distribution of a radial clearance by the entries of a random input; raises an error for validators."""
     parts = []
     fit = None if entries.get("fit") is None else fit_of(entries["fit"])
@@ -235,7 +237,7 @@ def law_of(entries: Mapping[str, Any]) -> tolerances.Clearance:
             )  # fmt: skip
         parts.append(tolerance.part(limits))
     bore, pin = parts
-    law = tolerances.Clearance(bore, pin, *entries.get("range", (-float("inf"), float("inf"))))
+    law = tolerances.FitClearance(bore, pin, *entries.get("range", (-float("inf"), float("inf"))))
     low, high = law.span
     if not 1e-10 < low < high:  # of two diameters, with rounding
         shown = f"from {1e6 * low:.4g} to {1e6 * high:.4g} um"

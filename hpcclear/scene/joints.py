@@ -9,7 +9,7 @@ from hpcclear.scene.fields import (
     NOWHERE,
     Angle,
     Length,
-    Place,
+    Position,
     PositiveLength,
     Quantity,
     Speed,
@@ -36,7 +36,7 @@ class Materials(Table):
     journal: Material
 
 
-class Rubbing(Table):
+class JointFriction(Table):
     """Friction of a guide."""
 
     coefficient: Annotated[float, Quantity("", least=0)]
@@ -45,14 +45,14 @@ class Rubbing(Table):
     """Sliding speed below which the force decreases linearly to zero, m/s."""
 
 
-class RubbingPin(Rubbing):
+class IdealPinFriction(JointFriction):
     """Friction of a pin: a torque, equal to coefficient times radius times reaction force."""
 
     radius: PositiveLength
     """Radius of the pin, m."""
 
 
-class Bearing(Table):
+class PinInBearing(Table):
     """A pin with clearance: a journal that moves freely within a larger bearing."""
 
     geometry: ClassVar[str] = "pin_in_bearing"
@@ -74,7 +74,7 @@ class Bearing(Table):
     their tolerances."""
     diametral_clearance: Annotated[float, Quantity("m", above=0)] | None = None
     """Instead of `clearance`: difference of the diameters of bearing and journal, m. It is twice the radial clearance."""
-    start_eccentricity: Place = NOWHERE
+    start_eccentricity: Position = NOWHERE
     """Vector from the bearing centre to the journal centre at the start, m; default: centred."""
     wear: Wear | None = None
     """Wear of its surfaces. Without it they do not wear."""

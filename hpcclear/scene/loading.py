@@ -174,21 +174,17 @@ def parse(text: str, name: str) -> dict[str, object]:
     InputError
         If it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
     """
-    remedy = "Correct the TOML syntax there"
+    remedy, where = "Correct the TOML syntax there", ("scene file", name)
     if len(text) > LARGEST_FILE:
-        raise InputError("scene file", name, f"is larger than {LARGEST_FILE} bytes", _SHORTER)
+        raise InputError(*where, f"is larger than {LARGEST_FILE} bytes", _SHORTER)
     if _DOTTED.search(text):
-        raise InputError(
-            "scene file", name, "a key has too many dots", f"Nest at most {DEEPEST} tables"
-        )
+        raise InputError(*where, "a key has too many dots", f"Nest at most {DEEPEST} tables")
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
-        raise InputError(
-            "scene file", name, "is nested too deeply", f"Nest at most {DEEPEST} levels"
-        ) from None
+        raise InputError(*where, "is nested too deeply", f"Nest at most {DEEPEST} levels") from None
     except ValueError as error:
-        raise InputError("scene file", name, f"is not valid TOML: {error}", remedy) from None
+        raise InputError(*where, f"is not valid TOML: {error}", remedy) from None
 
 
 def _override(text: str) -> tuple[str, object]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hpcclear.base.outcome import JUDGED, ON_REQUEST
-from hpcclear.scene.fields import Table, invalid, nearest
+from hpcclear.scene.fields import Table, check_known, invalid
 from hpcclear.scene.paths import quantities
 
 SHORT_NAMES: Mapping[str, tuple[str, ...]] = {
@@ -65,27 +65,18 @@ def resolved_paths(data: Mapping[str, object]) -> tuple[str, ...]:
                 f'Add path = "drive.speed", say; known names are {", ".join(SHORT_NAMES)}',
             )
         return SHORT_NAMES[name]
-    paths = (given,) if isinstance(given, str) else given
-    if (
-        not isinstance(paths, (list, tuple))
-        or not paths
-        or any(not isinstance(p, str) for p in paths)
-    ):
+    paths = texts_in(given)
+    if not paths:
         raise invalid(
-            "a dotted path, or a list of them, is expected here", "Write it in quotes", key=key
+            "a dotted path, or a list of them, is expected here", "Write it in quotes", key
         )
     for path in paths:
-        if path not in quantities():
-            raise invalid(
-                f"{path!r} is not a physical number of a scene",
-                nearest(path, tuple(quantities())),
-                key=key,
-            )
+        check_known(path, quantities(), "is not a physical number of a scene", key)
     if len(set(paths)) < len(paths):
         raise invalid("a path stands there twice", "Remove one", key=key)
     if len({quantities()[path].unit for path in paths}) > 1:
         raise invalid("the paths have different units", "Use a variable for each unit", key=key)
-    return tuple(paths)
+    return paths
 
 
 class NamedInput(Table):

@@ -12,13 +12,18 @@ from pydantic.fields import FieldInfo
 
 from hpcclear.base.errors import InputError
 from hpcclear.scene.curves import MOST_ROWS, Pairs
-from hpcclear.scene.effects import Effects
+from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import NamedRows, Quantity
 from hpcclear.scene.laws import ENTRIES, law_entries
 from hpcclear.scene.planar import Planar
-from hpcclear.scene.slider_crank import Drive, Joints, Mechanism
+from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
 
-PHYSICAL = {"mechanism": Mechanism, "drive": Drive, "joints": Joints, "effects": Effects}
+PHYSICAL = {
+    "mechanism": SliderCrank,
+    "drive": Drive,
+    "joints": CrankJoints,
+    "effects": EffectTables,
+}
 """The tables whose numbers describe the mechanism and what acts on it."""
 
 

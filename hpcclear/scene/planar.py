@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from hpcclear.base.errors import InputError
+from hpcclear.base.errors import InputError, at
 from hpcclear.scene.curves import check_period
 from hpcclear.scene.driving import PlanarDrive
 from hpcclear.scene.fields import (
@@ -18,17 +18,24 @@ from hpcclear.scene.fields import (
     NamedPlace,
     NamedPlaces,
     NamedRows,
-    Place,
+    Position,
     Quantity,
     Table,
     invalid,
     nearest,
 )
-from hpcclear.scene.joints import Bearing, Guide, Materials, PlanarSlot, Rubbing, RubbingPin
+from hpcclear.scene.joints import (
+    Guide,
+    IdealPinFriction,
+    JointFriction,
+    Materials,
+    PinInBearing,
+    PlanarSlot,
+)
 from hpcclear.scene.loads import AnyLoad
 
 
-class Bending(Table):
+class BarBending(Table):
     """Bending of a bar between two pins, in modes of a beam that is held at both ends."""
 
     stiffness: Annotated[float, Quantity("N*m**2", above=0)]
@@ -43,33 +50,33 @@ def check_bars(planar: Any) -> None:
     """An error for validators unless every body of a linkage that bends is a bar that pins alone hold, at both its ends."""
     for body in planar.bodies:
         if body.bending is not None:
-            _check_bar(planar, body)
+            with at(f"bodies.{body.name}.bending", None):
+                _check_bar(planar, body)
 
 
 def _check_bar(planar: Any, body: Any) -> None:
-    key = f"bodies.{body.name}.bending"
     if body.length is None:
         raise invalid(
             "only a bar can bend, and this body has no length",
-            "Give its length, or leave bending out", key=key, value=None,
-        )  # fmt: skip
+            "Give its length, or leave bending out",
+        )
     if body.points:
         raise invalid(
             f"the bar has a further point, {body.points[0].name}, but bending is modelled for its two ends only",
-            "Leave out its points, or bending", key=key, value=None,
-        )  # fmt: skip
+            "Leave out its points, or bending",
+        )
     for row in planar.drives:
         if row.body == body.name:
             raise invalid(
                 f"{row.name} drives the bar and clamps it, but the modes are those of pinned ends",
-                "Leave bending out, or drive another body", key=key, value=None,
-            )  # fmt: skip
+                "Leave bending out, or drive another body",
+            )
     for row in planar.loads:
         if getattr(row, "body", None) == body.name:
             raise invalid(
                 f"the torque {row.name} has no point of application on the bar",
-                "Leave bending out, or replace it by two forces", key=key, value=None,
-            )  # fmt: skip
+                "Leave bending out, or replace it by two forces",
+            )
     held = set()
     for joint in planar.joints:
         places = [
@@ -80,22 +87,22 @@ def _check_bar(planar: Any, body: Any) -> None:
         if ends and joint.kind in ("slide", "fixed"):
             raise invalid(
                 f"{joint.name} guides the bar, but the modes are those of pinned ends",
-                "Leave bending out", key=key, value=None,
-            )  # fmt: skip
+                "Leave bending out",
+            )
         if ends and getattr(joint, "out_of_round", None) is not None:
             raise invalid(
                 f"surfaces of {joint.name} are out of round, which needs rigid bodies",
-                "Leave out bending, or out_of_round", key=key, value=None,
-            )  # fmt: skip
+                "Leave out bending, or out_of_round",
+            )
     for end in ("a", "b"):
         if end not in held:
             raise invalid(
                 f"its end {end} is free, but the modes are those of pinned ends",
-                "Leave bending out, or join both ends", key=key, value=None,
-            )  # fmt: skip
+                "Leave bending out, or join both ends",
+            )
 
 
-def check_scene(scene: Any, bending: Mapping[str, Bending]) -> None:
+def check_scene(scene: Any, bending: Mapping[str, BarBending]) -> None:
     """An error for validators where a scene has what does not go with bending; `bending`: tables by their bodies' paths."""
     if bending and scene.wear is not None and scene.wear.waves and scene.worn_joints():
         raise invalid(
@@ -126,7 +133,7 @@ class PlanarBody(Table):
     """Length of a bar, m. A bar has the points a at its origin and b at this distance along its x axis."""
     mass_center: Length | None = None
     """For a bar: distance of its mass centre from a towards b, m; default: the middle."""
-    center: Place = NOWHERE
+    center: Position = NOWHERE
     """Position of the mass centre in the body's own axes, m."""
     points: NamedPlaces = ()
     """Points at which joints and loads act, in the body's own axes, m."""
@@ -134,7 +141,7 @@ class PlanarBody(Table):
     """Approximate angle at the start, rad, from which the assembly is computed. For a driven body it is the exact angle
     at the start, unless the drive prescribes the angle (harmonic, table); with `turns` = 2 of its drive, 360 degrees or
     more begins in the second turn."""
-    bending: Bending | None = None
+    bending: BarBending | None = None
     """Bending of a bar between two pins. Without it the bar is rigid."""
 
     @property
@@ -194,11 +201,11 @@ class PlanarRevolute(Table):
     """``body.point``, or ``ground.point``."""
     bearing: str
     """``body.point``, or ``ground.point``."""
-    friction: RubbingPin | None = None
+    friction: IdealPinFriction | None = None
     """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
 
-class PlanarClearance(Bearing):
+class PlanarClearance(PinInBearing):
     """A pin with clearance: a journal within a larger bearing."""
 
     name: str
@@ -220,7 +227,7 @@ class PlanarSlide(Guide):
     """``body.point``, or ``ground.point``, on the line."""
     angle: Angle = 0.0
     """Direction of the line in the axes of the body that carries it, rad."""
-    friction: Rubbing | None = None
+    friction: JointFriction | None = None
     """Friction of a guide without clearance. Without it the guide is frictionless."""
     materials: Materials | None = None
     """Materials of channel (bearing) and slider (journal) of a guide with clearance."""

@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.scene.delimited import Column
-from hpcclear.scene.domain import entries
+from hpcclear.scene.delimited import SheetColumn
 from hpcclear.scene.fields import nearest
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.paths import described, quantities
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.sheets import Sheet, read
-from hpcclear.scene.slider_crank import Mechanism
+from hpcclear.scene.slider_crank import SliderCrank
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
 
@@ -171,8 +170,8 @@ def check_points(
                 reason = f"starts from rest, and {usual} is not given"
                 if usual not in scene.numeric_paths():
                     _refuse(column == 0.0, column, name, reason, label)
-    pairs = []
-    if isinstance(scene.mechanism, Mechanism):
+    pairs, get = [], Numbers(scene, points)
+    if isinstance(scene.mechanism, SliderCrank):
         reason = "the rod no longer than the crank"
         pairs.append(("mechanism.crank.length", "mechanism.rod.length", 1.0, reason))
     for joint in scene.clearance_joints():
@@ -180,32 +179,22 @@ def check_points(
             key = scene.joint_key(joint)
             pairs.append((f"{key}.{small}", f"{key}.{large}", times, reason))
     for small, large, times, reason in pairs:
-        lower, upper = (
-            entries(scene, points.paths, points.values, path) for path in (small, large)
-        )
         word = "" if times == 1.0 else f"{times:g} "
-        gap = np.broadcast_to(np.asarray(upper - times * lower), len(points))
+        gap = get(large) - times * get(small)
         _refuse(gap <= 0, gap, f"{large} - {word}{small}", f"makes {reason}", label)
-    _check_laws(scene, points, label)
+    _check_laws(get, points, label)
 
 
-def _check_laws(scene: Scene, points: Points, label: Callable[[int], str]) -> None:
+def _check_laws(get: Numbers, points: Points, label: Callable[[int], str]) -> None:
     """Refuse values that a law does not take together."""
+    driven = {path for paths in points.paths for path in paths}
     for kind in ("contact", "friction"):
-        table = getattr(scene.effects, kind)
-        driven = {path for paths in points.paths for path in paths}
+        table = getattr(get.scene.effects, kind)
         if table is None or table.declared.check is None:
             continue
-        names = [name for name in table.values() if f"effects.{kind}.{name}" in driven]
-        if not names:
-            continue
-        columns = {
-            name: np.broadcast_to(
-                entries(scene, points.paths, points.values, f"effects.{kind}.{name}"), len(points)
-            )
-            for name in names
-        }
-        for row in range(len(points)):
+        paths = {name: f"effects.{kind}.{name}" for name in table.values()}
+        columns = {name: get(path) for name, path in paths.items() if path in driven}
+        for row in range(len(points)) if columns else ():
             own = {name: float(column[row]) for name, column in columns.items()}
             wrong = table.declared.check({**table.values(), **own})
             if wrong is not None:
@@ -288,7 +277,7 @@ class _Driven(NamedTuple):
     """A column of numbers of the scene, and the entries that it drives."""
 
     paths: tuple[str, ...]
-    column: Column
+    column: SheetColumn
 
     def read(self, sheet: Sheet) -> Array:
         """Its cells in SI, shape (n,), within the bounds of every entry it drives."""
@@ -303,7 +292,7 @@ class _Driven(NamedTuple):
         return values
 
 
-def _driven(column: Column, scene: Scene, key: str, sheet: Sheet) -> _Driven | None:
+def _driven(column: SheetColumn, scene: Scene, key: str, sheet: Sheet) -> _Driven | None:
     """What a column such as ``C [mm]`` drives, None if it names the rows."""
     numbers = scene.numeric_paths()
     of_study = {} if scene.study is None else {v.name: v.paths for v in scene.study.variables}

@@ -82,7 +82,7 @@ def _ours() -> dict[str, Form]:
         "lognormal": ("mean deviation", "range about_design", _lognormal),
         "beta": ("shapes half_width", "mean", _beta),
         "weibull": ("scale shape", "location range about_design", _weibull),
-        "samples": ("values", "about_design", lambda e: quantiles.Samples(e["values"])),
+        "samples": ("values", "about_design", lambda e: quantiles.Empirical(e["values"])),
         "fit": ("", "fit bore pin range", law_of),
         "wear": ("cycles", "half_width", _worn),
     }

@@ -77,14 +77,7 @@ def latin_hypercube(
         If the scene has no study, a name is unknown, or a point makes no mechanism.
     """
     study = scene.required_study
-    count = study.samples if samples is None else samples
-    if count < 1:
-        raise InputError(
-            "samples",
-            count,
-            "a design of experiments needs at least one point",
-            "Request 1 or more",
-        )
+    count = _count(study, samples)
     region = box(scene, names, widen)
     rng = generator(study.seed, f"lhs {purpose}")
     unit = unit_lhs(count, len(region.names), rng)
@@ -171,10 +164,7 @@ def monte_carlo(
     Returns the `Points`, in SI; raises InputError as `latin_hypercube`.
     """
     study = scene.required_study
-    count = study.samples if samples is None else samples
-    if count < 1 or first < 0:
-        reason = "at least one sample, from index 0 on, is needed"
-        raise InputError("samples", count, reason, "Request 1 or more")
+    count = _count(study, samples, first)
     inputs = {row.name: row for row in study.random}
     chosen = _known("random", inputs if random is None else random, inputs)
     fixed = (
@@ -207,6 +197,14 @@ def monte_carlo(
     points = Points(names, values, paths)
     check_points(scene, points, lambda row: f"sample {first + row}")
     return points
+
+
+def _count(study: Study, samples: int | None, first: int = 0) -> int:
+    count = study.samples if samples is None else samples
+    if count < 1 or first < 0:
+        reason = "at least one sample, from index 0 on, is needed"
+        raise InputError("samples", count, reason, "Request 1 or more")
+    return count
 
 
 def _free(study: Study, name: str, place: Array) -> Array:

@@ -66,7 +66,7 @@ def _as_written(definitions: dict[str, Any]) -> None:
             row["required"] = [
                 key for key in row.get("required", []) if key not in ("name", "paths")
             ]
-    for place in ("Place", "NamedPlace", "Components"):
+    for place in ("Position", "NamedPlace", "Components"):
         row = definitions[place]
         number = row["properties"]["x"]
         pair = {"type": "array", "prefixItems": [number, number], "minItems": 2, "maxItems": 2}
@@ -88,10 +88,10 @@ def _as_written(definitions: dict[str, Any]) -> None:
 
 def _rows_of_catalogues(definitions: dict[str, Any]) -> None:
     """Rows of catalogues with paths beside their names, costs as lists and by IT grades."""
-    row = definitions["Row"]
+    row = definitions["CatalogueRow"]
     row["properties"]["name"] = {"type": "string", "description": "name of the row"}
     row["required"], row["additionalProperties"] = ["name"], True  # entries by their paths
-    entry = definitions["Variable"]["properties"]["cost"]
+    entry = definitions["StudyVariable"]["properties"]["cost"]
     number = {"type": "number"}
     each = {"type": "array", "items": number}
     entry["anyOf"] = [
@@ -127,7 +127,7 @@ def scene_schema() -> dict[str, Any]:
         row = definitions[name]
         row["required"] = [k for k in row["required"] if k not in ("clearance", "bearing_radius")]
     definitions["SliderGuide"]["required"] += Guide.needed  # it always has clearance
-    effects = definitions["Effects"]["properties"]
+    effects = definitions["EffectTables"]["properties"]
     for key in ("friction", "guide_friction"):  # one word switches them off
         entry = effects[key]
         choices = entry.get("anyOf", [{"$ref": entry.get("$ref")}])
@@ -142,7 +142,7 @@ def scene_schema() -> dict[str, Any]:
 
 def _inputs(definitions: dict[str, Any]) -> None:
     """Variables and random inputs of a study."""
-    for name in ("Variable", "RandomInput"):
+    for name in ("StudyVariable", "RandomInput"):
         entries = definitions[name]["properties"]
         entries["path"] = {"type": "string", "description": "a dotted path of the scene"}
         entries["paths"]["minItems"] = 1

@@ -29,7 +29,7 @@ from hpcclear.base.units import (
     written,
 )
 from hpcclear.scene import clock, delimited
-from hpcclear.scene.delimited import NOTHING, Column, Stored, columns_of, decimal_of
+from hpcclear.scene.delimited import NOTHING, SheetColumn, Stored, columns_of, decimal_of
 from hpcclear.scene.workbook import cells_of
 
 _GAUGE = re.compile(r"(m?bar|psi|[kM]?Pa)\s*\(?(?:gauge|g|ü)\)?", re.IGNORECASE)
@@ -71,7 +71,7 @@ class Sheet:
     """A table of named columns, all of one length."""
 
     path: str
-    columns: tuple[Column, ...]
+    columns: tuple[SheetColumn, ...]
     lines: tuple[int, ...]
     """Where each row stands in the file, counted from 1."""
     found: str
@@ -79,7 +79,7 @@ class Sheet:
     comma: bool
     """Whether decimals have a comma."""
 
-    def number(self, column: Column, row: int, unit: str = "", size: Fraction = _ONE) -> float:
+    def number(self, column: SheetColumn, row: int, unit: str = "", size: Fraction = _ONE) -> float:
         """A cell in SI: `size` times its number, or by the unit that stands with the number in the cell.
 
         Raises
@@ -125,11 +125,11 @@ class Sheet:
     def _has_unit(text: str) -> bool:
         return bool(_BEGINS.match(text)) and text[-1:] not in tuple("0123456789.")
 
-    def states_unit(self, column: Column) -> bool:
+    def states_unit(self, column: SheetColumn) -> bool:
         """Whether the heading of a column has a unit, each of its cells, or they are clock times."""
         return bool(column.unit) or self.is_clock(column) or all(map(self._has_unit, column.cells))
 
-    def si(self, column: Column, unit: str, key: str, default: str = "") -> Array:
+    def si(self, column: SheetColumn, unit: str, key: str, default: str = "") -> Array:
         """All cells of a column in the SI unit `unit`, shape (n,), each the nearest float of what is written.
 
         The unit of the heading counts, without the g of gauge pressures, else that of a cell, else `default`, "" for SI.
@@ -157,7 +157,7 @@ class Sheet:
                 pass
         return np.array([self.number(column, row, unit, size) for row in range(len(self.lines))])
 
-    def entries(self, column: Column) -> list[float | str]:
+    def entries(self, column: SheetColumn) -> list[float | str]:
         """The cells of a column as entries of a scene: numbers, or texts with the unit of its heading or their own.
 
         Raises
@@ -178,16 +178,16 @@ class Sheet:
             made.append(written(float(number), unit))
         return made
 
-    def place(self, column: Column, row: int) -> str:
+    def place(self, column: SheetColumn, row: int) -> str:
         """Where a cell stands, in errors."""
         return f"{self.path}, line {self.lines[row]}, column {column.name}"
 
-    def is_clock(self, column: Column) -> bool:
+    def is_clock(self, column: SheetColumn) -> bool:
         """Whether the column has clock times or dates, by its first cell that is not empty."""
         return clock.is_clock(next(filter(None, column.cells), ""))
 
     @cached_property
-    def axes(self) -> dict[str, Column]:
+    def axes(self) -> dict[str, SheetColumn]:
         """The columns of `AXES` by what they are: from their headings, in their order.
 
         Besides, clock times with the dates of a column beside them. Without any of these, the first column, if its
@@ -213,16 +213,16 @@ class Sheet:
         return found
 
     @property
-    def of_numbers(self) -> list[Column]:
+    def of_numbers(self) -> list[SheetColumn]:
         """Columns of numbers."""
         return [one for one in self.columns if not self.is_text(one)]
 
     @property
-    def signals(self) -> list[Column]:
+    def signals(self) -> list[SheetColumn]:
         """Columns of numbers that are no axis."""
         return [one for one in self.of_numbers if one not in self.axes.values()]
 
-    def likely(self, kind: str, unit: str, key: str, taken: Sequence[Column]) -> Column:
+    def likely(self, kind: str, unit: str, key: str, taken: Sequence[SheetColumn]) -> SheetColumn:
         """The column of a kind of quantity: the axis, else by its unit, its heading, or because no other is left.
 
         Raises
@@ -247,7 +247,7 @@ class Sheet:
             f'Name it, as in {kind} = "heading"',
         )  # fmt: skip
 
-    def column(self, name: str, key: str) -> Column:
+    def column(self, name: str, key: str) -> SheetColumn:
         """The column of that name or heading; InputError says which there are."""
         found = [one for one in self.columns if name in (one.name, one.heading)]
         if len(found) > 1:
@@ -256,7 +256,7 @@ class Sheet:
             return found[0]
         raise InputError(key, name, f"is no column of {self.path}", nearest(name, self.names))
 
-    def is_text(self, column: Column) -> bool:
+    def is_text(self, column: SheetColumn) -> bool:
         """Whether no cell of the column begins as a number does, or all are dates: names of parts, times, remarks."""
         return self.is_clock(column) or not any(map(_BEGINS.match, column.cells))
 

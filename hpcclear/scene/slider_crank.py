@@ -10,17 +10,24 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from hpcclear.scene.driving import (
-    ConstantSpeed,
+    CrankSpeed,
+    CrankTorque,
     PlanarDrive,
     PlanarSpeed,
     PlanarTorque,
-    TorqueDrive,
 )
 from hpcclear.scene.fields import Inertia, Length, Mass, NamedPlace, PositiveLength, Table, invalid
-from hpcclear.scene.joints import Bearing, Guide, Material, Materials, RubbingPin, SliderGuide
+from hpcclear.scene.joints import (
+    Guide,
+    IdealPinFriction,
+    Material,
+    Materials,
+    PinInBearing,
+    SliderGuide,
+)
 from hpcclear.scene.loads.force import ForceLoad
 from hpcclear.scene.planar import (
-    Bending,
+    BarBending,
     Ground,
     Planar,
     PlanarBody,
@@ -43,7 +50,7 @@ class Link(Table):
     mass_center: Length
     """Distance of the mass centre from its first joint along the link, m; may lie beyond either
     pin."""
-    bending: Bending | None = None
+    bending: BarBending | None = None
     """Bending of the rod. Without it the rod is rigid."""
 
 
@@ -56,7 +63,7 @@ class Slider(Table):
     """Moment of inertia about its pin, which is its mass centre, kg m2. Required if its guide has clearance."""
 
 
-class Mechanism(Table):
+class SliderCrank(Table):
     """Planar slider-crank: crank, connecting rod, slider (Tables 1 and 2 of the paper)."""
 
     kind: Literal["slider-crank"] = "slider-crank"
@@ -79,10 +86,10 @@ class Mechanism(Table):
             )
 
 
-Drive = Annotated[ConstantSpeed | TorqueDrive, Field(discriminator="kind")]
+Drive = Annotated[CrankSpeed | CrankTorque, Field(discriminator="kind")]
 
 
-class ClearanceJoint(Bearing):
+class ClearanceJoint(PinInBearing):
     """A pin with clearance: the journal moves freely within the bearing."""
 
     bearing: Material
@@ -93,7 +100,7 @@ class IdealJoint(Table):
     """A pin without clearance."""
 
     kind: Literal["ideal"]
-    friction: RubbingPin | None = None
+    friction: IdealPinFriction | None = None
     """Friction torque, proportional to the reaction force of the pin. Without it the pin is frictionless."""
 
     @model_validator(mode="before")
@@ -114,7 +121,7 @@ class IdealJoint(Table):
 Joint = Annotated[ClearanceJoint | IdealJoint, Field(discriminator="kind")]
 
 
-class Joints(Table):
+class CrankJoints(Table):
     """The joints that may have clearance; the joint of crank and frame is ideal."""
 
     crank_rod: Joint
@@ -239,12 +246,12 @@ def _joint(scene: Any, name: str) -> PlanarJoint:
     if not isinstance(joint, ClearanceJoint):
         return PlanarRevolute.model_construct(kind="revolute", friction=joint.friction, **places)
     return PlanarClearance.model_construct(
-        **places, **_entries(joint, Bearing), materials=_materials(joint)
+        **places, **_entries(joint, PinInBearing), materials=_materials(joint)
     )
 
 
 def _drive(drive: Any) -> PlanarDrive:
-    model = PlanarSpeed if isinstance(drive, ConstantSpeed) else PlanarTorque
+    model = PlanarSpeed if isinstance(drive, CrankSpeed) else PlanarTorque
     return model.model_construct(
         name="drive", body="crank", period=True, **_entries(drive, type(drive))
     )

@@ -25,7 +25,7 @@ from hpcclear.scene.stages import (
     Swarm,
     Verification,
 )
-from hpcclear.scene.variables import Variable
+from hpcclear.scene.variables import StudyVariable
 
 MOST_EXTREMES = 1024
 """Designs at most at which a distribution that depends on the design is looked at."""
@@ -35,10 +35,10 @@ class Moving:
     """What a study knows of its random inputs at a design."""
 
     if TYPE_CHECKING:
-        variables: tuple[Variable, ...]
+        variables: tuple[StudyVariable, ...]
         random: tuple[RandomInput, ...]
 
-    def own_entries(self, variable: Variable) -> tuple[str, ...]:
+    def own_entries(self, variable: StudyVariable) -> tuple[str, ...]:
         """Numbers of the scene that rows of a variable have, but for clearances of fits that a random input draws."""
         drawn = {
             path
@@ -49,7 +49,7 @@ class Moving:
         return tuple(path for path in variable.entry_paths if path not in drawn)
 
     @cached_property
-    def _drivers(self) -> dict[str, tuple[Variable, ...]]:
+    def _drivers(self) -> dict[str, tuple[StudyVariable, ...]]:
         """Variables that drive each random input."""
         return {
             row.name: tuple(
@@ -140,7 +140,7 @@ class Moving:
         for row in self.random:
             self._check_moving(row)
 
-    def _check_driven(self, variable: Variable, path: str) -> None:
+    def _check_driven(self, variable: StudyVariable, path: str) -> None:
         name, entry = input_entry(path)
         key, known = f"variables.{variable.name}", {row.name: row for row in self.random}
         check_known(name, known, "is not a random input of this study", key)
@@ -202,7 +202,7 @@ class StudyTables(Moving, Table):
     integration tolerance, measured by pairs of samples at a tighter tolerance. Default: `mean = 0.002`, `deviation =
     0.005` for the sampling error alone; the printed intervals then still include the error of the tolerance, from a few
     pairs."""
-    variables: Annotated[tuple[Variable, ...], NamedRows()]
+    variables: Annotated[tuple[StudyVariable, ...], NamedRows()]
     random: Annotated[tuple[RandomInput, ...], NamedRows()] = ()
     correlation: Correlation | None = None
     cases: Annotated[tuple[Case, ...], NamedRows()] = ()
@@ -227,7 +227,7 @@ class StudyTables(Moving, Table):
         """Names of the study variables, in file order: the columns of its designs."""
         return tuple(variable.name for variable in self.variables)
 
-    def variable(self, name: str) -> Variable:
+    def variable(self, name: str) -> StudyVariable:
         """The variable of that name; KeyError if there is none."""
         return {variable.name: variable for variable in self.variables}[name]
 
@@ -304,7 +304,7 @@ class StudyTables(Moving, Table):
         )
 
     @property
-    def load_cases(self) -> Variable | None:
+    def load_cases(self) -> StudyVariable | None:
         """The variable whose values or rows are load cases of every design."""
         return next((one for one in self.variables if one.over is not None), None)
 

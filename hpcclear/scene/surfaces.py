@@ -64,7 +64,7 @@ MOST_WAVES = 8
 Wave = Length
 
 
-class Waves(Table):
+class SurfaceWaves(Table):
     """Depth of a surface below the round one, m: a Fourier series in the angle around it. The angle is measured from
     the x axis of the body; in a slider-crank this axis points from the first joint of a link to its second.
     """
@@ -102,8 +102,8 @@ class Waves(Table):
 class OutOfRound(Table):
     """Waviness of the surfaces of a joint with clearance. A surface without an entry is round."""
 
-    bearing: Waves | None = None
-    journal: Waves | None = None
+    bearing: SurfaceWaves | None = None
+    journal: SurfaceWaves | None = None
 
 
 def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -> None:
@@ -182,7 +182,7 @@ class Wear(Table):
             )
 
 
-class Limits(Table):
+class WearLimits(Table):
     """Thresholds that end a service life; the first one that is passed counts. A clearance of a quarter of the bearing
     radius always ends it."""
 
@@ -220,7 +220,7 @@ class Lives(Table):
     """Angles at which an angular profile is stored."""
     points: Annotated[int, Count(2, 10**4)] = 41
     """Number of ages at which curves are stored."""
-    limit: Limits = Limits()
+    limit: WearLimits = WearLimits()
     """Thresholds that end a service life."""
     beyond_limit: bool = False
     """Whether service lives continue beyond the thresholds in `limit`, to `cycles` or to a clearance of a quarter of

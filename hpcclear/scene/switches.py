@@ -12,7 +12,7 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import mean_of
 from hpcclear.scene.curves import Curve
-from hpcclear.scene.driving import TorqueDrive, speed_entry
+from hpcclear.scene.driving import CrankTorque, speed_entry
 from hpcclear.scene.loads.declared import SizedLoad
 from hpcclear.scene.paths import replace
 from hpcclear.scene.planar import Planar, PlanarClearance, turns_of
@@ -186,7 +186,7 @@ def _mean(
 def _drives(scene: Scene) -> Iterator[Switch]:
     """A free crank, in whose place one turns at the speed that is expected of it, or that it starts with."""
     for drive in scene.linkage.drives:
-        if not isinstance(drive, TorqueDrive):
+        if not isinstance(drive, CrankTorque):
             continue
         key = scene.path_in_scene(f"mechanism.drives.{drive.name}")
         whose = "" if key == "drive" else f" of {drive.name}"

@@ -12,15 +12,15 @@ from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.choices import input_entry
-from hpcclear.scene.effects import Effects
+from hpcclear.scene.effects import EffectTables
 from hpcclear.scene.fields import NamedRows, Table, nearest
 from hpcclear.scene.joints import Guide, PlanarSlot
 from hpcclear.scene.named import SHORT_NAMES
 from hpcclear.scene.numerics import Numerics, Output
 from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities
-from hpcclear.scene.planar import Bending, Planar, PlanarClearance, PlanarSlide
+from hpcclear.scene.planar import BarBending, Planar, PlanarClearance, PlanarSlide
 from hpcclear.scene.plugged import Plugins
-from hpcclear.scene.slider_crank import Drive, Joints, Mechanism
+from hpcclear.scene.slider_crank import CrankJoints, Drive, SliderCrank
 from hpcclear.scene.study import Study
 from hpcclear.scene.surfaces import Film, Lives
 
@@ -36,15 +36,15 @@ class SceneTables(Table):
 
     format_version: Literal[1, 2] = 1
     """Version of the format; 2 is read as 1."""
-    mechanism: Annotated[Mechanism | Planar, Field(discriminator="kind")]
+    mechanism: Annotated[SliderCrank | Planar, Field(discriminator="kind")]
     """A slider-crank, or any planar linkage."""
     # A planar linkage has its drives and joints among its own tables; of a slider-crank neither is None.
     drive: Drive = cast(Any, None)
     """Drive of a slider-crank, required there. A linkage has `mechanism.drives` instead."""
-    joints: Joints = cast(Any, None)
+    joints: CrankJoints = cast(Any, None)
     """Joints of a slider-crank, required there. A linkage has `mechanism.joints` instead. The joint of crank and frame
     is always ideal."""
-    effects: Effects = Effects()
+    effects: EffectTables = EffectTables()
     numerics: Numerics = Numerics()
     output: Output = Output()
     study: Study | None = None
@@ -53,7 +53,7 @@ class SceneTables(Table):
 
     elsewhere: ClassVar = {
         key: (f"belongs to [{part}]", f"Write {part}.{key}")
-        for part, table in (("numerics", Numerics), ("effects", Effects), ("study", Study))
+        for part, table in (("numerics", Numerics), ("effects", EffectTables), ("study", Study))
         for key in table.model_fields
     }
 
@@ -137,7 +137,7 @@ class SceneTables(Table):
         """Contacts whose friction has bristles, each with a state of its own."""
         return len(self.contact_labels()) if self.effects.friction.bristled else 0
 
-    def bending(self) -> dict[str, Bending]:
+    def bending(self) -> dict[str, BarBending]:
         """How bodies bend, by the dotted paths of the bodies that do."""
         return {
             self.path_in_scene(f"mechanism.bodies.{body.name}"): body.bending
@@ -273,9 +273,9 @@ class SceneTables(Table):
         return found
 
     @property
-    def slider_crank(self) -> Mechanism:
+    def slider_crank(self) -> SliderCrank:
         """The tables of a scene that has a slider-crank."""
-        assert isinstance(self.mechanism, Mechanism)
+        assert isinstance(self.mechanism, SliderCrank)
         return self.mechanism
 
     @property

@@ -17,7 +17,7 @@ from hpcclear.scene.paths import PHYSICAL, flatten, of_kinds, quantities, replac
 from hpcclear.scene.plugged import texts_of
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables, plain
-from hpcclear.scene.variables import Variable
+from hpcclear.scene.variables import StudyVariable
 
 Valid = TypeVar("Valid", bound=Table)
 Whole = TypeVar("Whole", bound=SceneTables)
@@ -103,7 +103,7 @@ def _check_study(scene: SceneTables, study: Study) -> None:
     numbers = set(scene.numeric_paths())
     for table, rows in (("variables", study.variables), ("random", study.random)):
         for row in rows:
-            of_rows = row.entry_paths if isinstance(row, Variable) else ()
+            of_rows = row.entry_paths if isinstance(row, StudyVariable) else ()
             for path in (*row.paths, *of_rows):
                 if path not in numbers:
                     raise invalid(

@@ -9,7 +9,7 @@ from pydantic import PrivateAttr, model_validator
 
 from hpcclear.base.errors import at
 from hpcclear.scene import choices
-from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, Cost, Row
+from hpcclear.scene.choices import OF_INPUT, OF_RANDOM, CatalogueRow, Cost
 from hpcclear.scene.fields import Bounds, Number, Numbers, Quantity, invalid
 from hpcclear.scene.named import NamedInput, Range, texts_in, with_paths
 from hpcclear.scene.paths import described, quantities
@@ -17,7 +17,7 @@ from hpcclear.scene.paths import described, quantities
 LINK_INERTIAS = ("mechanism.crank.inertia", "mechanism.rod.inertia")
 
 
-class Variable(NamedInput):
+class StudyVariable(NamedInput):
     """A study variable: its name, the scene entries that it sets, and its bounds in SI or its allowed values."""
 
     range: Bounds = None
@@ -31,7 +31,7 @@ class Variable(NamedInput):
     fits: tuple[str, ...] | None = None
     """Instead of a range: ISO 286 fits, such as "20 H7/f7", for the joints in `path` and for random inputs with the
     distribution "fit": `path = ["joints.crank_rod.fit", "random.C12.fit"]`."""
-    catalogue: tuple[Row, ...] | None = None
+    catalogue: tuple[CatalogueRow, ...] | None = None
     """Instead of a range: rows of a catalogue. Each has a name, the same entries by their paths, and optionally a cost:
     `{ name = "6204", cost = 3, "joints.crank_rod.bearing_radius" = "10 mm" }`."""
     follows: tuple[str, ...] = ()
@@ -207,7 +207,7 @@ class Variable(NamedInput):
                 'Give each a weight, or write over = "worst"', "over",
             )  # fmt: skip
 
-    def _check_rows(self, rows: tuple[Row, ...]) -> None:
+    def _check_rows(self, rows: tuple[CatalogueRow, ...]) -> None:
         choices.checked_names([row.name for row in rows], "catalogue")
         for row in rows:
             if odd := sorted(row.entries.keys() ^ rows[0].entries.keys()):
@@ -219,7 +219,7 @@ class Variable(NamedInput):
             raise invalid(reason, "Give each row a cost", "catalogue")
 
     @cached_property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[CatalogueRow, ...]:
         """Rows of a catalogue or of fits; empty for other variables."""
         if self.fits is not None:
             return choices.rows_of_fits(self.fits, self.follows)

@@ -5,10 +5,10 @@ import numpy as np
 from hpcclear.base.arrays import Array, Records
 from hpcclear.base.outcome import Status
 from hpcclear.scene.points import Points
-from hpcclear.scene.variables import Variable
+from hpcclear.scene.variables import StudyVariable
 
 
-def at_all(loads: Variable, points: Points) -> Points:
+def at_all(loads: StudyVariable, points: Points) -> Points:
     """Designs (n, d) at all load cases, (n * cases, d), those of a design one behind the other."""
     options = np.array(loads.options)
     values = np.repeat(points.values, len(options), axis=0)
@@ -16,7 +16,7 @@ def at_all(loads: Variable, points: Points) -> Points:
     return Points(points.names, values, points.paths)
 
 
-def combined(records: Records, responses: Array, loads: Variable) -> tuple[Records, Array]:
+def combined(records: Records, responses: Array, loads: StudyVariable) -> tuple[Records, Array]:
     """A record for each design, (n,), of those at its load cases, (n * cases,), and its responses, (k, n), of theirs.
 
     Each response is the largest or the weighted mean of the load cases; the record is that with the largest objective, whose

@@ -12,7 +12,7 @@ from hpcclear.scene.domain import Box, box, to_coordinates
 from hpcclear.scene.points import snapped
 from hpcclear.scene.sampling import unit_lhs
 from hpcclear.scene.study import Study
-from hpcclear.scene.variables import Variable
+from hpcclear.scene.variables import StudyVariable
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.metrics import accuracy
@@ -30,7 +30,7 @@ STAGE = "kriging"
 _CHECKS = ("r2", "rmae", "r2_explained", "rmae_mean", "rmse")
 
 
-def coordinate(variable: Variable) -> str:
+def coordinate(variable: StudyVariable) -> str:
     """Name of what is sampled for a variable: I2_ratio for an inertia I2 that is given as a ratio."""
     return variable.name if variable.ratio is None else f"{variable.name}_ratio"
 

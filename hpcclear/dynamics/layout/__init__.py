@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array, Integers
-from hpcclear.base.numbered import Rows
+from hpcclear.base.numbered import RowNumbers
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 from hpcclear.laws.declared import LAW_NUMBERS
 
@@ -101,7 +101,7 @@ def waves_of(effects: Effects) -> tuple[Waves, ...]:
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
-OF_SAMPLE = Rows()
+OF_SAMPLE = RowNumbers()
 SPEED = OF_SAMPLE("of the drive: a turn over its share of the period", "rad/s")
 DRIVEN_LENGTH = OF_SAMPLE("largest distance between points of the body that gives the period", "m")
 PERIOD = OF_SAMPLE("one revolution at the prescribed speed", "s")
@@ -120,7 +120,7 @@ HELD_MOMENT = OF_SAMPLE("of a sample without anything to integrate: largest driv
 HELD_DEVIATION = OF_SAMPLE("likewise: standard deviation of the followed acceleration", "m/s^2")
 HELD_PEAK = OF_SAMPLE("likewise: its largest size", "m/s^2")
 
-OF_JOINT = Rows()  # within a joint's block
+OF_JOINT = RowNumbers()  # within a joint's block
 CLEARANCE = OF_JOINT("radial clearance", "m")
 BEARING_RADIUS = OF_JOINT("radius of the bearing", "m")
 JOURNAL_RADIUS = OF_JOINT("radius of the journal", "m")
@@ -163,7 +163,7 @@ PARAMETERS = OF_SAMPLE.end
 # ---- what the motion writes besides accelerations ---------------------------------------------
 # What joints have stands side by side, so that the compiler knows the distances between one joint's rows, whichever it is.
 # Rates that are integrated name the effect that requires them.
-WRITTEN = Rows()
+WRITTEN = RowNumbers()
 EACH = MAX_JOINTS
 GAP = WRITTEN("distance from the clearance circle, positive in contact", "m", EACH, "joints")
 FORCE = WRITTEN("normal force", "N", EACH, "responses")
@@ -283,7 +283,7 @@ def place(rate: int) -> int:
 WORKS = place(DRIVE_POWER)  # the first of four: drive, its absolute value, losses, load
 
 # ---- lane state and scratch ---------------------------------------------------------------------
-OF_LANE = Rows()
+OF_LANE = RowNumbers()
 Q = OF_LANE("coordinates at the start of the step", size=MAX_COORDINATES)
 V = OF_LANE("velocities", size=MAX_COORDINATES)
 QS = OF_LANE("coordinates of the stage", size=MAX_COORDINATES)
@@ -354,7 +354,7 @@ STAGES = BANK
 """First row of the explicit method's stage accelerations, behind them: row STAGES + s MAX_COORDINATES + k."""
 
 # ---- bookkeeping of a lane, touched at the end of a revolution ---------------------------------
-OF_BOOK = Rows()
+OF_BOOK = RowNumbers()
 SAMPLE = OF_BOOK("slot of the sample in the queue")
 REVOLUTION = OF_BOOK("revolutions finished")
 TIME_SUM = OF_BOOK("over the averaged revolutions", "s")
@@ -370,7 +370,7 @@ TOTAL = OF_BOOK("integrals over all revolutions, likewise", size=len(INTEGRATED)
 BOOK = OF_BOOK.end
 
 # ---- one finished sample --------------------------------------------------------------------------
-OF_OUTCOME = Rows()
+OF_OUTCOME = RowNumbers()
 OUT_STATUS = OF_OUTCOME("how it ended")
 OUT_OBJECTIVE = OF_OUTCOME("f of eq. 13", "m")
 OUT_SPREAD = OF_OUTCOME("standard deviation of f between averaged revolutions", "m")
@@ -398,7 +398,7 @@ OUT_STATE = OF_OUTCOME("coordinates and velocities at the end", size=2 * MAX_COO
 OUT = OF_OUTCOME.end
 
 # ---- one sample to come ---------------------------------------------------------------------------
-OF_START = Rows()
+OF_START = RowNumbers()
 OF_START("coordinates and velocities", size=2 * MAX_COORDINATES)
 START_CONTACTS = OF_START("active flags, then 1/d'_0", size=2 * MAX_JOINTS)
 START = OF_START.end

@@ -23,7 +23,7 @@ from hpcclear.scene.driving import (
     PlanarSpeed,
     PlanarTable,
 )
-from hpcclear.scene.joints import Materials, RubbingPin
+from hpcclear.scene.joints import IdealPinFriction, Materials
 from hpcclear.scene.planar import (
     Planar,
     PlanarBody,
@@ -141,7 +141,7 @@ def _joint(joint: Any) -> parts.Joint:
 
 def _rubbing(table: Any) -> Any:
     """Friction of a guide, or of a pin, which has a radius."""
-    kind = parts.PinFriction if isinstance(table, RubbingPin) else parts.GuideFriction
+    kind = parts.PinFriction if isinstance(table, IdealPinFriction) else parts.GuideFriction
     return None if table is None else _part(kind, table)
 
 

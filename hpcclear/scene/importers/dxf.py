@@ -16,7 +16,7 @@ from typing import NamedTuple
 from hpcclear.base.errors import InputError
 from hpcclear.base.units import to_si
 from hpcclear.scene.importers.file import GROUND, MOST_POINTS, File, Names, listed
-from hpcclear.scene.importers.points import Drawing, Point
+from hpcclear.scene.importers.points import Drawing, DrawnPoint
 
 _FOOT = 1200 / 3937  # of US surveys
 _UNITS = {
@@ -113,7 +113,7 @@ def drawing_of(file: File) -> Drawing:
         for k in {at[place] for place in body.points}:
             owners[k].append(name)
     points = [
-        _point(Point(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, file)
+        _point(DrawnPoint(f"P{k}", *place, tuple(own)), bodies, _SAME * extent, file)
         for k, (place, own) in enumerate(zip(places, owners, strict=True), 1)
     ]
     points = [
@@ -290,7 +290,7 @@ def _distinct(
     return made, at
 
 
-def _point(made: Point, bodies: Mapping[str, _Body], near: float, file: File) -> Point:
+def _point(made: DrawnPoint, bodies: Mapping[str, _Body], near: float, file: File) -> DrawnPoint:
     """A point of some bodies, in the drawing's unit; it slides where it lies inside a line of the ground."""
     place = made.x, made.y
     for carrier, body in bodies.items():

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 from hpcclear.scene.importers.file import GROUND, File, Names, listed
-from hpcclear.scene.importers.points import Drawing, Point
+from hpcclear.scene.importers.points import Drawing, DrawnPoint
 
 _SIZES = {
     "millimeters": (24.5e-3 / 96.0, 1e-3), "mm": (24.5e-3 / 96.0, 1e-3), "inches": (25.4e-3 / 96.0, 25.4e-3),
@@ -202,8 +202,8 @@ def _point(
     bodies: Mapping[str, Sequence[str]],
     size: float,
     file: File,
-) -> Point:
-    made = Point(one.name, round(size * one.x, 12), round(size * one.y, 12), tuple(one.links))
+) -> DrawnPoint:
+    made = DrawnPoint(one.name, round(size * one.x, 12), round(size * one.y, 12), tuple(one.links))
     limits = [limit.get("id", "") for limit in one.row.findall("slidelimit")]
     if not one.has("slider") or len(limits) < 2:
         return made

@@ -14,7 +14,7 @@ from urllib.parse import unquote
 
 from hpcclear.base.units import to_si
 from hpcclear.scene.importers.file import GROUND, File, Names, listed
-from hpcclear.scene.importers.points import Drawing, Point
+from hpcclear.scene.importers.points import Drawing, DrawnPoint
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_-"
 _LENGTHS = ("in", "cm", "m")
@@ -266,7 +266,7 @@ def _drawing(
             for k in dict.fromkeys(link.joints):
                 own[k].append(bodies[link.key])
     lines = _lines(links, by_key, file)
-    points: list[Point] = []
+    points: list[DrawnPoint] = []
     speeds: dict[str, float] = {}
     alone = []
     for one in joints:
@@ -288,7 +288,7 @@ def _drawing(
                 )
         pins = (GROUND, *own[one.key]) if one.flags & _GROUNDED else tuple(own[one.key])
         name = given.given(one.name, one.key)
-        point = Point(name, round(size * one.x, 12), round(size * one.y, 12), pins)
+        point = DrawnPoint(name, round(size * one.x, 12), round(size * one.y, 12), pins)
         points.append(_sliding(point, one, lines.get(one.key), by_key, bodies, file))
     if alone:
         notes.append(f"Not read: joints without a link: {listed(alone)}")
@@ -318,13 +318,13 @@ def _lines(links: Sequence[_Link], joints: Mapping[str, _Joint], file: File) -> 
 
 
 def _sliding(
-    point: Point,
+    point: DrawnPoint,
     joint: _Joint,
     line: _Joint | None,
     joints: Mapping[str, _Joint],
     bodies: Mapping[str, str],
     file: File,
-) -> Point:
+) -> DrawnPoint:
     """The point with its line, if it slides; a welded joint keeps its own link from turning."""
     if line is None:
         return point

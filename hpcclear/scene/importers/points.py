@@ -22,7 +22,7 @@ FARTHEST = 1e5
 """m from the origin."""
 
 
-class Point(NamedTuple):
+class DrawnPoint(NamedTuple):
     """A point of a linkage where it stands."""
 
     name: str
@@ -41,7 +41,7 @@ class Point(NamedTuple):
 class Drawing(NamedTuple):
     """A linkage that a file holds."""
 
-    points: Sequence[Point]
+    points: Sequence[DrawnPoint]
     """In m."""
     speeds: Mapping[str, float] = {}
     """rpm of each driven body, counter-clockwise; none: the first body that turns about a pin of the ground, at `SPEED`."""
@@ -157,7 +157,7 @@ def summary(content: Mapping[str, Any], drawing: Drawing) -> list[tuple[str, str
     return lines + [("note", note) for note in drawing.notes]
 
 
-def _checked(points: Sequence[Point], key: str) -> Sequence[Point]:
+def _checked(points: Sequence[DrawnPoint], key: str) -> Sequence[DrawnPoint]:
     """Points that are not too many, and near enough."""
     limit(len(points), key)
     limit(sum(len(one.bodies) for one in points) // 4, key)
@@ -168,7 +168,7 @@ def _checked(points: Sequence[Point], key: str) -> Sequence[Point]:
     return points
 
 
-def _driven(points: Sequence[Point], names: Sequence[str], key: str) -> str:
+def _driven(points: Sequence[DrawnPoint], names: Sequence[str], key: str) -> str:
     """The first body that turns about a pin of the ground."""
     pinned = {
         name for one in points if GROUND in one.bodies and one.slide is None for name in one.bodies
@@ -192,7 +192,7 @@ def _driven(points: Sequence[Point], names: Sequence[str], key: str) -> str:
     raise InputError(key, listed(names), reason, remedy)
 
 
-def _with_blocks(points: Sequence[Point], key: str) -> list[Point]:
+def _with_blocks(points: Sequence[DrawnPoint], key: str) -> list[DrawnPoint]:
     """Points with the body that slides last at each that does: a guide keeps it from turning."""
     made = []
     uses = Counter(body for one in points for body in set(one.bodies))
@@ -218,7 +218,7 @@ class _Frame(NamedTuple):
     y: float
     angle: float
 
-    def local(self, point: Point) -> list[float]:
+    def local(self, point: DrawnPoint) -> list[float]:
         """Place of a point in these axes, m."""
         dx, dy = point.x - self.x, point.y - self.y
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
@@ -228,9 +228,9 @@ class _Frame(NamedTuple):
         ]  # no -0
 
 
-def _by_body(points: Sequence[Point]) -> dict[str, list[Point]]:
+def _by_body(points: Sequence[DrawnPoint]) -> dict[str, list[DrawnPoint]]:
     """Points of each body: its pins first, then the places of its guides."""
-    made: dict[str, list[Point]] = {}
+    made: dict[str, list[DrawnPoint]] = {}
     for one in points:
         for name in dict.fromkeys(one.bodies):
             made.setdefault(name, []).append(one)
@@ -240,7 +240,7 @@ def _by_body(points: Sequence[Point]) -> dict[str, list[Point]]:
     return made
 
 
-def _frame(name: str, own: Sequence[Point], key: str) -> _Frame:
+def _frame(name: str, own: Sequence[DrawnPoint], key: str) -> _Frame:
     """The first point at the origin and the second on the x axis; of a body that slides the x axis along its line."""
     slides = [one.slide for one in own if one.slide is not None and one.block == name]
     if slides:
@@ -255,7 +255,7 @@ def _frame(name: str, own: Sequence[Point], key: str) -> _Frame:
     return _Frame(first.x, first.y, math.atan2(second.y - first.y, second.x - first.x))
 
 
-def _body(own: Sequence[Point], frame: _Frame, size: float) -> dict[str, Any]:
+def _body(own: Sequence[DrawnPoint], frame: _Frame, size: float) -> dict[str, Any]:
     """Its table; a body of one point is as long as a tenth of the linkage."""
     places = {one.name: frame.local(one) for one in own}
     centre = [round(sum(place[k] for place in places.values()) / len(places), 12) for k in (0, 1)]
@@ -273,7 +273,7 @@ def _degrees(angle: float) -> str:
     return f"{0.0 + round(math.degrees(angle), 9)!r} deg"
 
 
-def _joints(points: Sequence[Point], frames: Mapping[str, _Frame]) -> dict[str, Any]:
+def _joints(points: Sequence[DrawnPoint], frames: Mapping[str, _Frame]) -> dict[str, Any]:
     """A pin for each further body of a point; a guide where a point slides."""
     made: dict[str, Any] = {}
     taken = {one.name for one in points}

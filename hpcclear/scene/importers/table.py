@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from hpcclear.base.errors import InputError, at, nearest
 from hpcclear.base.units import factor, to_si
-from hpcclear.scene.delimited import Column
+from hpcclear.scene.delimited import SheetColumn
 from hpcclear.scene.importers.file import GROUND, File, Names
-from hpcclear.scene.importers.points import Drawing, Point
+from hpcclear.scene.importers.points import Drawing, DrawnPoint
 from hpcclear.scene.sheets import Sheet, read
 
 _COLUMNS = {
@@ -42,15 +42,15 @@ def drawing_of(file: File) -> Drawing:
     _check_apart([own for own, slide in zip(belonging, slides, strict=True) if slide is None], file)
     notes = [*points.notes(), *bodies.notes()]
     if "remark" in columns:
-        notes.append(f"Column {columns['remark'].heading!r} is not taken over")
-    made = [Point(*one) for one in zip(names, x, y, belonging, slides, strict=True)]
+        notes.append(f"SheetColumn {columns['remark'].heading!r} is not taken over")
+    made = [DrawnPoint(*one) for one in zip(names, x, y, belonging, slides, strict=True)]
     return Drawing(made, {}, notes)
 
 
-def _columns(sheet: Sheet, file: File) -> dict[str, Column]:
+def _columns(sheet: Sheet, file: File) -> dict[str, SheetColumn]:
     """Columns by what they are; InputError where one is not known, stands twice or is missing."""
     known = [word for words in _COLUMNS.values() for word in words]
-    found: dict[str, Column] = {}
+    found: dict[str, SheetColumn] = {}
     for column in sheet.columns:
         word = column.name.strip().lower()
         kind = next((kind for kind, words in _COLUMNS.items() if word in words), None)
@@ -70,7 +70,7 @@ def _columns(sheet: Sheet, file: File) -> dict[str, Column]:
     return found
 
 
-def _name(sheet: Sheet, column: Column, row: int, points: Names) -> str:
+def _name(sheet: Sheet, column: SheetColumn, row: int, points: Names) -> str:
     text = column.cells[row].strip()
     where = f"{sheet.path}, line {sheet.lines[row]}"
     if not text:
@@ -80,7 +80,7 @@ def _name(sheet: Sheet, column: Column, row: int, points: Names) -> str:
     return points.given(text)
 
 
-def _lengths(sheet: Sheet, column: Column | None, file: File) -> list[float]:
+def _lengths(sheet: Sheet, column: SheetColumn | None, file: File) -> list[float]:
     assert column is not None  # looked for before
     if not sheet.states_unit(column) and not file.unit:
         file.refuse(column.heading, "nothing says its unit", f'Write "{column.name} [mm]", say')
@@ -91,7 +91,7 @@ def _lengths(sheet: Sheet, column: Column | None, file: File) -> list[float]:
 
 
 def _bodies(
-    column: Column | None, names: Sequence[str], file: File, given: Names
+    column: SheetColumn | None, names: Sequence[str], file: File, given: Names
 ) -> list[tuple[str, ...]]:
     """Bodies of each point; of a file without them bars from each point to the next, the first and the last on the ground."""
     if column is None:
@@ -123,7 +123,7 @@ def _check_apart(pins: Sequence[tuple[str, ...]], file: File) -> None:
             file.refuse(first, reason, "Write one name for one body, such as rocker_arm")
 
 
-def _slide(sheet: Sheet, column: Column | None, row: int) -> float | None:
+def _slide(sheet: Sheet, column: SheetColumn | None, row: int) -> float | None:
     if column is None or column.cells[row].strip() in ("", "-"):
         return None
     with at(sheet.path, column.heading):

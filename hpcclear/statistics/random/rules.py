@@ -16,7 +16,7 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.special import ndtr, roots_legendre
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.quantiles import TAIL, Normal, Quantiles, Samples, Uniform, truncated_quantile
+from hpcclear.base.quantiles import TAIL, Empirical, Normal, Quantiles, Uniform, truncated_quantile
 
 FINE = 400
 """Nodes of the inner products that define rules, and steps of a quantile function."""
@@ -46,7 +46,7 @@ def _(law: Normal, size: int, rng: np.random.Generator) -> Array:
 
 
 @draw.register
-def _(law: Samples, size: int, rng: np.random.Generator) -> Array:
+def _(law: Empirical, size: int, rng: np.random.Generator) -> Array:
     return rng.choice(np.array(law.values), size)
 
 
@@ -74,7 +74,7 @@ def _(law: Normal, count: int) -> Rule:
 
 
 @rule.register
-def _(law: Samples, count: int) -> Rule:
+def _(law: Empirical, count: int) -> Rule:
     return _sampled_rule(law.values, count)
 
 
@@ -104,7 +104,7 @@ def _(law: Normal, centres: Array, length: float) -> Array:
 
 
 @kernel_integral.register
-def _(law: Samples, centres: Array, length: float) -> Array:
+def _(law: Empirical, centres: Array, length: float) -> Array:
     whole = np.zeros(np.shape(centres))
     for value in law.values:  # one after the other: centres may be many
         whole += np.exp(-0.5 * ((value - centres) / length) ** 2)
