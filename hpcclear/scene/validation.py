@@ -278,10 +278,9 @@ def _follow(location: tuple[int | str, ...], content: object) -> tuple[tuple[str
             content = content.get(key)
             names.append(str(key))
         else:
-            fits = (
-                isinstance(content, (list, tuple)) and isinstance(step, int) and step < len(content)
-            )
-            content = content[step] if fits else None  # type: ignore[index]
+            place = int(step) if str(step).isdecimal() else -1
+            listed = isinstance(content, (list, tuple)) and 0 <= place < len(content)
+            content = content[place] if listed else None  # type: ignore[index]
             names.append(str(step))
     return tuple(names), content
 
