@@ -104,7 +104,7 @@ class Browser:
         self._ask("POST", "/url", {"url": page.resolve().as_uri()})
 
     def visit(self, address: str) -> None:
-        """Load a page of a server."""
+        """Load a page by its address."""
         self._ask("POST", "/url", {"url": address})
 
     def run(self, script: str) -> Any:

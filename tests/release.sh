@@ -175,7 +175,7 @@ site() {
     "${PYTHON:-python3}" -m venv "$scratch/docs"
     "$scratch/docs/bin/pip" -q --disable-pip-version-check install --no-compile ".[docs]"
     "$scratch/docs/bin/mkdocs" build --quiet --strict -f docs/mkdocs/mkdocs.yml -d "$scratch/site"
-    find "$scratch/site" -name index.html | wc -l
+    find "$scratch/site" -name "*.html" | wc -l
 }
 
 if [ -n "$tests" ]; then step "nightly profile" bash tests/run.sh --nightly --strict; fi

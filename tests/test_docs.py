@@ -4,11 +4,8 @@ import os
 import re
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
-from functools import cache, partial
+from functools import cache
 from html.parser import HTMLParser
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import click
@@ -211,9 +208,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.nightly
 def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
-    made = {str(path.relative_to(site).parent) for path in site.rglob("index.html")}
+    made = {str(path.relative_to(site).with_suffix("")) for path in site.rglob("*.html")}
     pages = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in PAGES[2:]}
-    assert made == (pages - {"index"}) | {"."}
+    assert made == pages | {"404"}
     for path in site.rglob("*.html"):
         for address in Site(path).loads:
             assert not re.match(r"(https?:)?//", address), f"{path} loads {address}"
@@ -221,16 +218,16 @@ def test_the_site_has_every_page_and_loads_nothing_from_elsewhere(site):
 
 @pytest.mark.nightly
 def test_the_reference_is_complete(site):
-    commands = Site(site / "reference/commands/index.html").text
+    commands = Site(site / "reference/commands.html").text
     for name, command in cli.every().items():
         for parameter in command.params:
             assert all(word in commands for word in parameter.opts if word[0] == "-"), name
-    files = "".join(Site(page).text for page in site.glob("reference/files*/index.html"))
+    files = "".join(Site(page).text for page in site.glob("reference/files*.html"))
     assert all(name in files for kind in KINDS.values() for name in (*kind.coords, *kind.data))
-    scene = "".join(Site(page).text for page in site.glob("reference/scene*/index.html"))
+    scene = "".join(Site(page).text for page in site.glob("reference/scene*.html"))
     for path in load_scene(ROOT / "jobs/robust_slider_crank.toml").numeric_paths():
         assert path.rpartition(".")[2] in scene, path
-    python = Site(site / "reference/python/index.html").text
+    python = Site(site / "reference/python.html").text
     assert all(f"{name}" in python for name in ("load_scene", "simulate", "evaluate", "InputError"))
 
 
@@ -261,34 +258,24 @@ def test_no_code_of_ours_is_left_in_the_pages(site):
         assert "<!--" not in text, path
 
 
-@pytest.fixture(scope="module")
-def served(site: Path) -> Iterator[str]:
-    """The address of the site."""
-    handler = partial(SimpleHTTPRequestHandler, directory=str(site))
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-
-
 @pytest.mark.nightly
-def test_a_reader_finds_entries_and_moved_sections(served):
-    """In a browser: the search leads to the section of an entry, and a former anchor to where the section is now."""
-    browser = Browser()
+def test_a_reader_finds_entries_and_moved_sections(site):
+    """In a browser, without a server: the search leads to an entry, and a former anchor to where the section is now."""
+    browser, home = Browser(), site.as_uri()
     for word, place in {
-        "stribeck_speed": "reference/scene-effects/#effectsfriction",
-        "joints.guide": "reference/scene-slider-crank/#jointsguide-of-kind-slide",
-        "deviation_within": "reference/files-study/#verification",
+        "stribeck_speed": "reference/scene-effects.html#effectsfriction",
+        "joints.guide": "reference/scene-slider-crank.html#jointsguide-of-kind-slide",
+        "deviation_within": "reference/files-study.html#verification",
     }.items():
-        browser.visit(f"{served}/?q={word}")
-        link = f"[...document.querySelectorAll('.md-search-result__link')].find(a => a.href.includes('{place}'))"
-        browser.wait(link)
+        browser.visit(f"{home}/index.html?q={word}")
+        links = "[...document.querySelectorAll('.md-search-result__link')]"
+        browser.wait(f"{links}.find(link => link.href.includes('{place}'))")
     for old, new in {
-        "reference/scene/#studysensitivity": "reference/scene-study/#studysensitivity",
-        "reference/files/#what-a-response-contains": "reference/files-response/#what-a-response-contains",
-        "theory/#integration": "theory-numerics/#integration",
+        "reference/scene.html#studysensitivity": "reference/scene-study.html#studysensitivity",
+        "reference/files.html#what-a-response-contains": "reference/files-response.html#what-a-response-contains",
+        "theory.html#integration": "theory-numerics.html#integration",
     }.items():
-        browser.visit(f"{served}/{old}")
-        browser.wait(f"location.href === '{served}/{new}'")
+        browser.visit(f"{home}/{old}")
+        browser.wait(f"location.href === '{home}/{new}'")
         browser.wait(f"document.getElementById('{new.partition('#')[2]}')")
     browser.close()
