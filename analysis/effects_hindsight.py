@@ -16,7 +16,7 @@ import numpy as np
 from effects_kept import FRESH, Simulated, going_on, scene_of
 from scenes import JOB
 
-from hpcclear.ensemble.certificate import Asked, Variant
+from hpcclear.ensemble.certificate import Variant, VariantRequest
 from hpcclear.ensemble.trial import CONFIDENCE, Trial
 from hpcclear.results.names import ALL_ON
 from hpcclear.statistics.random.paired import deviation_change, mean_change
@@ -31,7 +31,7 @@ class Known:
         self.seconds: dict[Variant, float] = {(): self.simulate.samples}
 
     def _values(self, off: Variant) -> np.ndarray:
-        asked = Asked(off, FRESH, FRESH + self.replicates)
+        asked = VariantRequest(off, FRESH, FRESH + self.replicates)
         records = self.simulate(self.trial.simulated(off), self.trial.points(asked))
         if not off:
             self.trial.seen(asked, records)  # what dearer variants are cut off by

@@ -35,7 +35,7 @@ from hpcclear.base.arrays import Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import asked
 from hpcclear.dynamics.evaluation import evaluator_of
-from hpcclear.ensemble.certificate import Asked, Certificate
+from hpcclear.ensemble.certificate import Certificate, VariantRequest
 from hpcclear.ensemble.trial import CONFIDENCE, Trial, Wanted
 from hpcclear.results.names import ALL_ON
 from hpcclear.scene import Scene
@@ -227,7 +227,7 @@ def truth(trial: Trial, off: tuple[int, ...], replicates: int) -> dict[str, obje
     """Changes of mean and deviation at points that the certificate has not seen, with limits."""
     simulate, values = Simulated(), []
     for variant in ((), off):
-        one = Asked(variant, FRESH, FRESH + replicates)
+        one = VariantRequest(variant, FRESH, FRESH + replicates)
         records = simulate(trial.variant(variant).scene, trial.points(one))
         values.append(records["objective"].reshape(replicates, -1))
     changes = {

@@ -18,7 +18,7 @@ from effects_kept import Simulated, scene_of
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.setup.problem import implicit_method
-from hpcclear.ensemble.certificate import Asked
+from hpcclear.ensemble.certificate import VariantRequest
 from hpcclear.ensemble.trial import Trial
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
@@ -44,7 +44,7 @@ def drawn(first: int, count: int, oil: bool) -> Iterator[tuple[int, Scene, Point
             continue  # an effect that this mechanism cannot have
         rubs = scene.effects.friction.law in ("coulomb", "ambrosio")
         if bool(scene.films()) if oil else explicit and rubs:
-            yield number, short, trial.points(Asked((), 0, 4))
+            yield number, short, trial.points(VariantRequest((), 0, 4))
 
 
 def responses(scene: Scene, points: Points, rtol: float) -> tuple[float, float, Array]:

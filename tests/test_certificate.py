@@ -22,8 +22,8 @@ from hpcclear.cli.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
     Certificate,
-    Plan,
-    Seen,
+    Screening,
+    VariantResult,
     certificate,
     interaction,
 )
@@ -129,7 +129,7 @@ def followed(
     `works` tells what a sample takes."""
     saves = saves or [0.3] * effects
     works = works or (lambda off: np.prod([1.0 - saves[k] for k in off]))
-    plan = Plan(effects, tolerance, 0.99, most, False, False, possible, implicit, budget)
+    plan = Screening(effects, tolerance, 0.99, most, False, False, possible, implicit, budget)
 
     def seen(one):
         rows = np.arange(one.first, one.last)
@@ -137,7 +137,7 @@ def followed(
         rng = np.random.default_rng([*one.off, 99, one.first])
         f = design * (1.0 + change(one.off)) + noise * rng.standard_normal(design.shape)
         work = 1000.0 * works(one.off)
-        return Seen(
+        return VariantResult(
             f, np.full((*f.shape, 2), 5.0), np.full(f.shape, int(work)), np.full(f.shape, work)
         )
 
@@ -189,12 +189,12 @@ def test_chaos_is_averaged_where_that_helps_and_not_believed_where_it_does_not()
 
 
 def test_the_cheapest_set_that_is_impossible_is_not_asked_for():
-    plan = Plan(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), explicit)
+    plan = Screening(2, 0.01, 0.99, 16, False, False, lambda off: off != (0, 1), explicit)
 
     def told(wanted):
         assert all(one.off != (0, 1) for one in wanted)
         ones = [np.ones((one.last - one.first, 4)) for one in wanted]
-        return [Seen(x, np.ones((*x.shape, 1)), x.astype(int), x) for x in ones]
+        return [VariantResult(x, np.ones((*x.shape, 1)), x.astype(int), x) for x in ones]
 
     found = answered(certificate(plan), told)
     assert found.recommended == (0,)

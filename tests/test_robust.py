@@ -12,7 +12,7 @@ from sklearn.gaussian_process.kernels import Matern
 from hpcclear.base.errors import InputError
 from hpcclear.base.quantiles import Normal, Uniform
 from hpcclear.statistics.random import rules
-from hpcclear.statistics.random.inputs import Derived, RandomVariable
+from hpcclear.statistics.random.inputs import DerivedInput, RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective, sample_moments
 from hpcclear.statistics.surrogate.kernels import MATERN
 from hpcclear.statistics.surrogate.kriging import Kriging
@@ -176,7 +176,7 @@ def test_nothing_random_about_the_design_or_at_all():
 
 # Inputs that are derived: trained in r = I / m, tolerances in I and m
 
-RATIO = (Derived("r", ("I", "m"), lambda inertia, mass: inertia / mass),)
+RATIO = (DerivedInput("r", ("I", "m"), lambda inertia, mass: inertia / mass),)
 RATIO_NAMES = ("m", "u", "r", "C")
 RATIO_UPPER = np.array([2.0, 0.3, 1e-3, 1e-3])
 

@@ -20,7 +20,7 @@ ALONG = (0.6, 0.8)
 
 
 def quantities_of(scene: Scene) -> tuple[str, ...]:
-    """Names of what methods are compared by, in the order of `methods.Outcome.values`."""
+    """Names of what methods are compared by, in the order of `methods.TurnOutcome.values`."""
     return OF_A_BODY if scene.template is None else QUANTITIES
 
 

@@ -27,19 +27,19 @@ from hpcclear.scene import Scene
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TurnOutcome:
     """What a method makes of the designs: values (designs, 4) as in `QUANTITIES`, NaN where it failed."""
 
     values: Array
     evaluations: Array  # (designs,)
 
 
-Run = Callable[[], Outcome]
+Run = Callable[[], TurnOutcome]
 Event = Callable[[float, Array], float]
 
 
 @dataclass(frozen=True)
-class Method:
+class Integrator:
     """A method of the panel."""
 
     name: str
@@ -68,7 +68,7 @@ def one_turn(scene: Scene, rtol: float | None = None, **numerics: object) -> Sce
 # ---- the kernel's own methods -------------------------------------------------------------------
 
 
-def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics: Any) -> Method:
+def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics: Any) -> Integrator:
     """A method of the kernel.
 
     Raises
@@ -88,12 +88,12 @@ def kernel_method(name: str, scene: Scene, designs: int, width: int, **numerics:
         Lanes(problem, width).step(1)  # without samples it only compiles
         return (lambda: _kernel_outcome(here, problem, width, par, start, designs)), 1.0 / len(par)
 
-    return Method(name, prepare)
+    return Integrator(name, prepare)
 
 
 def _kernel_outcome(
     scene: Scene, problem: Problem, width: int, par: Array, start: views.Start, designs: int
-) -> Outcome:
+) -> TurnOutcome:
     outcome = Lanes(problem, width).run(par, start)[:designs]
     n = problem.coordinates
     values = np.full((designs, len(QUANTITIES)), np.nan)
@@ -102,7 +102,7 @@ def _kernel_outcome(
         if one.status == 0:
             place = end_of(scene, par[k], one.coordinates(n), one.velocities(n))
             values[k] = *place, one.peak_force.max(), one.objective
-    return Outcome(values, outcome.evaluations)
+    return TurnOutcome(values, outcome.evaluations)
 
 
 # ---- methods that are not the kernel's ----------------------------------------------------------
@@ -117,19 +117,21 @@ def systems(scene: Scene, designs: int) -> list[Equations]:
     return [Equations(problem, own, start[k]) for k, own in enumerate(par)]
 
 
-def outside_method(scene: Scene, designs: int, name: str) -> Method:
+def outside_method(scene: Scene, designs: int, name: str) -> Integrator:
     """A solver of scipy on the compiled equations, restarted wherever a gap changes sign."""
     made = systems(scene, designs)
 
-    def run(rtol: float) -> Outcome:
+    def run(rtol: float) -> TurnOutcome:
         pairs = [solve_turn(scene, one, name, rtol) for one in made]
-        return Outcome(np.array([values for values, _ in pairs]), np.array([n for _, n in pairs]))
+        return TurnOutcome(
+            np.array([values for values, _ in pairs]), np.array([n for _, n in pairs])
+        )
 
     def prepare(rtol: float) -> tuple[Run, float]:
         made[0](0.0, made[0].start)
         return (lambda: run(rtol)), 1.0 / designs
 
-    return Method(f"{name} (scipy)", prepare, compiled=False)
+    return Integrator(f"{name} (scipy)", prepare, compiled=False)
 
 
 def _values(
@@ -232,7 +234,7 @@ def _largest_force(one: Equations, piece: object) -> float:
 # ---- all of them --------------------------------------------------------------------------------
 
 
-def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
+def methods_of(scene: Scene, designs: int, more: bool) -> list[Integrator]:
     """Every method that can integrate this scene, the kernel's first."""
     wanted = [
         ("tsitouras", 1, "minimal", "tsitouras"),
@@ -252,7 +254,7 @@ def methods_of(scene: Scene, designs: int, more: bool) -> list[Method]:
     return found + [outside_method(scene, designs, name) for name in ("DOP853", "LSODA")]
 
 
-def timed(run: Run, repeats: int) -> tuple[Outcome, float]:
+def timed(run: Run, repeats: int) -> tuple[TurnOutcome, float]:
     """Outcome and median seconds of repeated runs."""
     seconds = []
     for _ in range(repeats):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hpcclear.cli.terminal import console, fitting, table
-from hpcclear.ensemble.corners import MOST, Tried, tried
+from hpcclear.ensemble.corners import MOST, CornerOutcomes, tried
 from hpcclear.report.failures import Column, sentences, where
 from hpcclear.scene import Scene
 
@@ -15,7 +15,7 @@ def describe(scene: Scene, simulate: bool) -> None:
     console().print(table("Corners of the study's ranges", rows))
 
 
-def lines(found: Tried, simulate: bool) -> list[tuple[str, str]]:
+def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
     """Return label and text of each line."""
     points, total = found.points, len(found.points)
     columns = [

@@ -53,7 +53,7 @@ SINGLY = 0.6
 """Of the budget that single effects may take; the rest is for sets."""
 
 
-class Asked(NamedTuple):
+class VariantRequest(NamedTuple):
     """A variant over replicates `first` to `last`."""
 
     off: Variant
@@ -61,7 +61,7 @@ class Asked(NamedTuple):
     last: int
 
 
-class Seen(NamedTuple):
+class VariantResult(NamedTuple):
     """What came of it: objective (r, s); peak contact force (r, s, joints) by the whole scene's joints, NaN where there is
     none; evaluations (r, s), and their work (r, s), which goes by the size of the motion and the kind of step as well."""
 
@@ -72,7 +72,7 @@ class Seen(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Plan:
+class Screening:
     """What is required of an effect screening."""
 
     effects: int
@@ -117,17 +117,19 @@ class Certificate:
 class Book:
     """What is known of each variant."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Screening) -> None:
         self.plan = plan
-        self.seen: dict[Variant, list[Seen]] = {}
+        self.seen: dict[Variant, list[VariantResult]] = {}
 
     def replicates(self, off: Variant) -> int:
         """Replicates that were simulated."""
         return sum(len(one.objective) for one in self.seen.get(off, ()))
 
-    def all(self, off: Variant) -> Seen:
+    def all(self, off: Variant) -> VariantResult:
         """All that was seen of a variant."""
-        return Seen(*(np.concatenate(parts) for parts in zip(*self.seen[off], strict=True)))
+        return VariantResult(
+            *(np.concatenate(parts) for parts in zip(*self.seen[off], strict=True))
+        )
 
     def changes(self, off: Variant) -> Changes:
         """By how much a variant differs from the whole scene, over the replicates of both."""
@@ -176,11 +178,11 @@ def _largest(on: Array, off: Array) -> tuple[Array, Array]:
     return on[..., shared].max(axis=2), off[..., shared].max(axis=2)
 
 
-Asking = Generator[list[Asked], list[Seen], Certificate]
-Part = Generator[list[Asked], list[Seen], None]
+Asking = Generator[list[VariantRequest], list[VariantResult], Certificate]
+Part = Generator[list[VariantRequest], list[VariantResult], None]
 
 
-def certificate(plan: Plan) -> Asking:
+def certificate(plan: Screening) -> Asking:
     """The procedure; see the module."""
     book = Book(plan)
     singles = [(k,) for k in range(plan.effects) if plan.possible((k,))]
@@ -197,7 +199,7 @@ def _judge(book: Book, variants: Sequence[Variant], budget: float) -> Part:
     pending = [one for one in variants if book.replicates(one) < count]
     while pending:
         asked = [
-            Asked(one, done, count) for one in dict.fromkeys([(), *pending])
+            VariantRequest(one, done, count) for one in dict.fromkeys([(), *pending])
             if (done := book.replicates(one)) < count
         ]  # fmt: skip
         for one, seen in zip(asked, (yield asked), strict=True):

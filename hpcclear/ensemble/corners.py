@@ -22,7 +22,7 @@ STEPS = 20_000
 """Steps of a corner at most: some hundred times what two revolutions take."""
 
 
-class Tried(NamedTuple):
+class CornerOutcomes(NamedTuple):
     """What came of the corners."""
 
     points: Points
@@ -52,7 +52,7 @@ def corners(scene: Scene) -> Points:
     return expanded(study, made)
 
 
-def tried(scene: Scene, simulate: bool) -> Tried:
+def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
     """Return what the corners of a study's ranges come to.
 
     Parameters
@@ -78,7 +78,7 @@ def tried(scene: Scene, simulate: bool) -> Tried:
         }  # fmt: skip
         short = scene.with_({f"numerics.{name}": value for name, value in brief.items()})
         status[good] = evaluate_records(short, points.take(good))["status"]
-    return Tried(points, refused, status)
+    return CornerOutcomes(points, refused, status)
 
 
 def _refusal(scene: Scene, corner: Points) -> str:

@@ -16,7 +16,7 @@ from hpcclear.base.arrays import Array, Records
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.setup.problem import coordinate_count
-from hpcclear.ensemble.certificate import Certificate, Changes, Plan, Seen, judged
+from hpcclear.ensemble.certificate import Certificate, Changes, Screening, VariantResult, judged
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import Finished, Options, Place, Session
@@ -80,7 +80,7 @@ def run_effects(
     return session.finished(content, began)
 
 
-def _certified(trial: Trial, plan: Plan, session: Session) -> Results:
+def _certified(trial: Trial, plan: Screening, session: Session) -> Results:
     points = trial.drawn.points(0, 1)
     units = dict(zip(points.names, points.units, strict=True))
     checkpoint = session.opened(points.names, units)
@@ -169,7 +169,7 @@ def _mean(values: Array) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
-def _refuse_zero(scene: Scene, whole: Seen) -> None:
+def _refuse_zero(scene: Scene, whole: VariantResult) -> None:
     known = whole.objective[np.isfinite(whole.objective)]
     if known.size and not known.any():
         raise InputError(

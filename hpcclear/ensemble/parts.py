@@ -15,7 +15,7 @@ from hpcclear.ranks.progress import Progress, Style
 from hpcclear.statistics.streams.summary import BLOCK, LEAF, Summary, empty, rows_of, summarise
 
 if TYPE_CHECKING:
-    from hpcclear.ranks.schedule import Points, Worker
+    from hpcclear.ranks.schedule import PointSource, Worker
     from hpcclear.ranks.team import Ranks
 
 PARTS_A_RANK = 32
@@ -66,7 +66,7 @@ class Summariser:
     ----------
     worker : Worker
         Simulates samples.
-    points : Points
+    points : PointSource
         Makes the design's points by sample number.
     record : dtype
         Type of the records of samples.
@@ -79,7 +79,7 @@ class Summariser:
     lanes = 1  # parts at once: one is worked on while the next fills lanes that it leaves
 
     def __init__(
-        self, worker: "Worker", points: "Points", record: np.dtype, edges: Array, length: int
+        self, worker: "Worker", points: "PointSource", record: np.dtype, edges: Array, length: int
     ) -> None:
         self._worker, self._points, self._edges, self._length = worker, points, edges, length
         self._record, self._kind = record, partial_of(record)

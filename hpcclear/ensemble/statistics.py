@@ -24,7 +24,7 @@ from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks import leading
-from hpcclear.ranks.schedule import COLUMNS, Points, Task
+from hpcclear.ranks.schedule import COLUMNS, PointSource, Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.results.content import Results
@@ -224,7 +224,7 @@ class _Streaming:
         if time.monotonic() - self._saved > self._checkpoint.interval:
             self._save()
 
-    def _run(self, task: Task, points: Points, take: Callable[[np.ndarray], None]) -> None:
+    def _run(self, task: Task, points: PointSource, take: Callable[[np.ndarray], None]) -> None:
         style, sums = self._session.options.style, self._sums
         leading.run_points(
             self._session.ranks,

@@ -14,7 +14,14 @@ from hpcclear.base.outcome import Flag
 from hpcclear.dynamics.evaluation import evaluator_of
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method, problem_of
-from hpcclear.ensemble.certificate import Asked, Certificate, Plan, Seen, Variant, certificate
+from hpcclear.ensemble.certificate import (
+    Certificate,
+    Screening,
+    Variant,
+    VariantRequest,
+    VariantResult,
+    certificate,
+)
 from hpcclear.ensemble.simulate import payload_of
 from hpcclear.results.names import ALL_ON
 from hpcclear.scene import Scene
@@ -193,7 +200,7 @@ class Trial:
                 self._implicit[kept] = True
         return self._implicit[kept]
 
-    def plan(self, wanted: Wanted) -> Plan:
+    def plan(self, wanted: Wanted) -> Screening:
         """What is required of the effect screening.
 
         Raises
@@ -206,12 +213,12 @@ class Trial:
                 "--tolerance", wanted.tolerance, "is not a relative change above 0 and below 1", "Write 1%, or 0.01"
             )  # fmt: skip
         most = max(wanted.samples // self.drawn.size, 4)
-        return Plan(
+        return Screening(
             len(self.switches), wanted.tolerance, CONFIDENCE, 2 ** int(np.log2(most)), self.drawn.scattered,
             wanted.forces, self.possible, self.implicit, wanted.budget / self.drawn.size,
         )  # fmt: skip
 
-    def points(self, asked: Asked) -> Points:
+    def points(self, asked: VariantRequest) -> Points:
         """Its points: the same columns for every variant, which drive what is there of it."""
         return self._seen_by(asked.off, self.drawn.points(asked.first, asked.last))
 
@@ -238,7 +245,7 @@ class Trial:
             limit = min(turns, numerics.target_revolutions)
             self._turns = {"numerics.target_revolutions": limit}
 
-    def seen(self, asked: Asked, records: Records) -> Seen:
+    def seen(self, asked: VariantRequest, records: Records) -> VariantResult:
         """What the effect screening uses of records."""
         if not asked.off and self._evaluations == 0:
             self._limit(records)
@@ -251,20 +258,23 @@ class Trial:
         evaluations = records["rhs_evaluations"]
         weight = np.where(records["flags"] & int(Flag.STIFF), IMPLICIT, 1.0)
         work = evaluations * weight * (1.0 + coordinate_count(scene))
-        return Seen(
+        return VariantResult(
             records["objective"].reshape(shape), force.reshape(*shape, len(labels)),
             evaluations.reshape(shape), work.reshape(shape),
         )  # fmt: skip
 
     def payloads(self) -> list[dict[str, Any]]:
         """What ranks need to compile the whole scene and each effect's absence (`compile_share`)."""
-        asked = [Asked((), 0, 1), *(Asked((k,), 0, 1) for k in range(len(self.switches)))]
+        asked = [
+            VariantRequest((), 0, 1),
+            *(VariantRequest((k,), 0, 1) for k in range(len(self.switches))),
+        ]
         return [payload_of(self.variant(one.off).scene, self.points(one)) for one in asked]
 
-    def certify(self, plan: Plan, simulate: Simulate) -> Certificate:
+    def certify(self, plan: Screening, simulate: Simulate) -> Certificate:
         """Follow the effect screening to its end; raises what `simulate` does."""
 
-        def answer(wanted: Sequence[Asked]) -> list[Seen]:
+        def answer(wanted: Sequence[VariantRequest]) -> list[VariantResult]:
             return [
                 self.seen(one, simulate(self.simulated(one.off), self.points(one)))
                 for one in wanted

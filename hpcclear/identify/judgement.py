@@ -11,7 +11,7 @@ from hpcclear.identify.features import Layout, sensed
 from hpcclear.identify.measured import Measured
 from hpcclear.identify.posterior import LEVELS, Calibration, Model
 from hpcclear.identify.signals import Sensor
-from hpcclear.identify.summaries import FLOOR, Expected, Regression, informative, regressions
+from hpcclear.identify.summaries import FLOOR, Expected, InputRegression, informative, regressions
 from hpcclear.identify.training import Ensemble
 
 REFUSED = 3.5
@@ -33,7 +33,7 @@ class Prepared:
 
     ensemble: Ensemble
     layouts: tuple[Layout, ...]
-    summaries: tuple[Regression, ...]
+    summaries: tuple[InputRegression, ...]
     expected: Expected
     """Features, in units of their noise, that members with the same summaries have."""
     centre: Array

@@ -40,7 +40,7 @@ PREDICTABLE = 0.1
 
 
 @dataclass(frozen=True)
-class Regression:
+class InputRegression:
     """An input, between 0 and 1, as a function of features.
 
     Attributes
@@ -70,7 +70,7 @@ class Regression:
 
 def regressions(
     features: Array, noise: Array, orders: Integers, places: Array
-) -> tuple[Regression, ...]:
+) -> tuple[InputRegression, ...]:
     """Return a regression of each input.
 
     Parameters
@@ -85,7 +85,7 @@ def regressions(
         Inputs of the members.
     """
     centre = features.mean(axis=0)
-    best: list[Regression | None] = [None] * places.shape[1]
+    best: list[InputRegression | None] = [None] * places.shape[1]
     least = np.full(places.shape[1], np.inf)
     for scale in _scales(features, noise, orders):
         rows = (features - centre) * scale
@@ -99,12 +99,12 @@ def regressions(
                 size = (error**2).mean(axis=0)
                 for k in np.flatnonzero(size < least):
                     left_out = places[:, k] - error[:, k]
-                    best[k] = Regression(centre, scale, rows, weights[:, k], length, left_out)
+                    best[k] = InputRegression(centre, scale, rows, weights[:, k], length, left_out)
                 least = np.minimum(size, least)
     return tuple(one for one in best if one is not None)
 
 
-def informative(made: tuple[Regression, ...], places: Array) -> tuple[Regression, ...]:
+def informative(made: tuple[InputRegression, ...], places: Array) -> tuple[InputRegression, ...]:
     """Return those that explain their inputs (n, d); one at least."""
     left = [np.mean((one.left_out - own) ** 2) for one, own in zip(made, places.T, strict=True)]
     explained = 1.0 - np.array(left) / places.var(axis=0)

@@ -14,7 +14,7 @@ from hpcclear.ranks.schedule import (
     QUANTUM,
     HandOut,
     Kept,
-    Points,
+    PointSource,
     Task,
 )
 from hpcclear.ranks.stopping import RankFailed, Stopped
@@ -30,7 +30,7 @@ _BUSY, _COMPILE = COLUMNS.index("busy"), COLUMNS.index("compile")
 def run_points(
     ranks: Ranks,
     task: Task,
-    points: Points,
+    points: PointSource,
     *,
     completed: np.ndarray | None = None,
     on_records: Callable[[np.ndarray], object] | None = None,
@@ -42,7 +42,7 @@ def run_points(
 
     Parameters
     ----------
-    points : ndarray, shape (n, d), or Points
+    points : ndarray, shape (n, d), or PointSource
         The design, or an object that makes the rows requested.
     completed : structured ndarray, optional
         Records of samples finished before; they are not simulated again.
@@ -85,7 +85,7 @@ def run_points(
 class Lead:
     """Root's part in a stage: a design on its way through the ranks, seen from who hands it out."""
 
-    def __init__(self, ranks: Ranks, book: HandOut, points: Points) -> None:
+    def __init__(self, ranks: Ranks, book: HandOut, points: PointSource) -> None:
         self._ranks, self._mail = ranks, ranks.mail
         self._points = points
         self._present = set(range(1, ranks.size))  # ranks that will still say DONE

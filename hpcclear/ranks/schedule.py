@@ -47,7 +47,7 @@ class Worker(Protocol):
         """Work for about `seconds`, or until idle; return the finished records (may be empty)."""
 
 
-class Points(Protocol):
+class PointSource(Protocol):
     """A design: an array (n, d), or anything that makes the rows requested."""
 
     def __len__(self) -> int:

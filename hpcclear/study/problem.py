@@ -18,7 +18,7 @@ from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.scene.sampling import offsets, unit_lhs
 from hpcclear.scene.streams import generator, sobol
 from hpcclear.scene.study import Study
-from hpcclear.statistics.random.inputs import Derived, RandomVariable
+from hpcclear.statistics.random.inputs import DerivedInput, RandomVariable
 from hpcclear.statistics.random.moments import Drawn, RobustObjective
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import excess, guessed, shortfall
@@ -179,7 +179,7 @@ class _Averages:
         places = region.lower + unit * (region.upper - region.lower)
         return to_physical(self.scene, self.names, places)
 
-    def derived(self) -> list[Derived]:
+    def derived(self) -> list[DerivedInput]:
         """Ratios that the model knows instead of inertias."""
         variables = [self.study.variable(name) for name in self.study.optimisation]
         return [_ratio(self.scene, one.paths[0]) for one in variables if one.ratio is not None]
@@ -236,7 +236,7 @@ def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:
     return quantiles.Uniform((low + high) / 2.0, (high - low) / 2.0)
 
 
-def _ratio(scene: Scene, inertia: str) -> Derived:
+def _ratio(scene: Scene, inertia: str) -> DerivedInput:
     """The ratio I / (m L^2 / 12) of a link from the inertia, and from its mass and length."""
     study, link = scene.required_study, inertia.rpartition(".")[0]
     variable = {path: name for name in study.optimisation for path in study.variable(name).paths}
@@ -254,4 +254,4 @@ def _ratio(scene: Scene, inertia: str) -> Derived:
         )
         return np.asarray(values[0] / (mass * length**2 / 12))
 
-    return Derived(coordinate(study.variable(variable[inertia])), tuple(of), function)
+    return DerivedInput(coordinate(study.variable(variable[inertia])), tuple(of), function)

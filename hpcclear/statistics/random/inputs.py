@@ -21,7 +21,7 @@ class RandomVariable:
 
 
 @dataclass(frozen=True)
-class Derived:
+class DerivedInput:
     """A model input computed from others."""
 
     name: str
@@ -52,7 +52,7 @@ class Wiring:
         design_names: Sequence[str],
         random_inputs: Sequence[RandomVariable],
         fixed: Mapping[str, float],
-        derived: Sequence[Derived],
+        derived: Sequence[DerivedInput],
     ) -> None:
         self.names = tuple(names)
         self.column = {name: k for k, name in enumerate(design_names)}

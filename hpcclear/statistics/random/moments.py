@@ -9,7 +9,7 @@ Three ways, each a check on the others:
 - the closed form in error functions, for independent inputs of one model.
 
 Random inputs are independent, unless their draws are given. They may stand for the model's inputs themselves or act through
-`Derived` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2
+`DerivedInput` ones: a model trained in the ratio r2 = I2 / (m2 L^2 / 12), say, under tolerances of m2
 and I2. Inputs that share a random source form a group with a tensor rule of its own, and the kernel
 is still a product over the groups.
 """
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.statistics.random.inputs import Derived, RandomVariable, Wiring
+from hpcclear.statistics.random.inputs import DerivedInput, RandomVariable, Wiring
 from hpcclear.statistics.random.rules import kernel_integral
 from hpcclear.statistics.random.tensor_rule import TensorRule
 from hpcclear.statistics.surrogate.kriging import Kriging
@@ -90,7 +90,7 @@ class RobustObjective:
         Names of the design variables, in the order of their columns.
     fixed : mapping of str to float, optional
         Values of inputs that are neither.
-    derived : sequence of Derived, optional
+    derived : sequence of DerivedInput, optional
         Model inputs that are computed from design variables and random inputs.
     probes : (m, k) array, optional
         Designs at which the nodes of derived inputs are chosen; spread them over the design space.
@@ -119,7 +119,7 @@ class RobustObjective:
         random_inputs: Sequence[RandomVariable],
         *,
         fixed: Mapping[str, float] | None = None,
-        derived: Sequence[Derived] = (),
+        derived: Sequence[DerivedInput] = (),
         probes: np.ndarray | None = None,
         tolerance: float = 1e-8,
         draws: tuple[int, np.random.Generator] | Drawn | None = None,

@@ -52,8 +52,6 @@ class ResponseSurface:
     leave_one_out_r2 : float
         1 - sum of squares of those errors / SST; NaN if the values do not vary. Of chosen terms
         that of points left out of the choice as well.
-    condition : float
-        Condition number of the design matrix.
     n_points, n_dropped : int
         Points that counted, and those dropped because their value was not finite.
     """
@@ -67,7 +65,6 @@ class ResponseSurface:
     degrees_of_freedom: int
     leave_one_out_errors: Array
     leave_one_out_r2: float
-    condition: float
     n_points: int
     n_dropped: int
 
@@ -209,7 +206,6 @@ def fit_response_surface(
         leave_one_out_r2=float(1 - (least * len(y) if chosen else np.sum(errors**2)) / total)
         if total > len(y) * rounding
         else float("nan"),
-        condition=float(singular[0] / singular[-1]),
         n_points=len(y),
         n_dropped=n_dropped,
     )
