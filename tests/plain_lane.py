@@ -29,8 +29,6 @@ BLOCKS = 700  # of their parameters
 PLAIN = {
     bits.bits_of: lambda x: np.float64(x).view(np.int64),
     bits.double_of: lambda n: float(np.int64(n).view(np.float64)),
-    bits.no_less: lambda x, least: least if least > x else x,
-    bits.no_more: lambda x, most: most if most < x else x,
 }
 """What compiled code has of a processor's own, as ordinary Python."""
 
@@ -58,12 +56,23 @@ _ON = effects_with({"fixed", "coulomb", "energies", "series"})
 EFFECTS = _ON._replace(contact=plain_law(_ON.contact), friction=plain_law(_ON.friction))
 
 
+_RATES = [
+    "gap", "force", "rate", "friction", "force_kink", "low_kink", "high_kink", "sliding_power",
+    "impact_power", "force_square", "objective_rate", "sliding_speed", "normal_x", "normal_y",
+]  # fmt: skip
+
+
 def joints_of(mechanism):
     """Rows of the joints in `work` and `par`."""
+    rates = zip(_RATES, (*range(8), *range(10, 16)), strict=True)
+    rows = {name: FREE + j - at.RATE_NOW for name, j in rates} | {
+        "active": FREE + 8, "inverse_impact": FREE + 9
+    }  # fmt: skip
     return tuple(
-        at.Joint(k, BLOCKS + at.JOINT_ROWS * k, 0,
-                 *(FREE + 20 * k + j - at.RATE_NOW for j in (*range(8), *range(10, 16))),
-                 FREE + 20 * k + 8, FREE + 20 * k + 9)
+        types.SimpleNamespace(
+            place=k, block=BLOCKS + at.JOINT_ROWS * k, further=0,
+            **{name: row + 20 * k for name, row in rows.items()},
+        )
         for k, _ in enumerate(mechanism.contacts)
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ Rows are numbered as they are declared (`hpcclear.base.numbered`). They are modu
 distance between two rows and can vectorise over the lanes without run-time checks. Rows of disabled effects are never touched.
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -405,39 +406,33 @@ START = OF_START.end
 
 
 # ---- what the steppers hand on as one -------------------------------------------------------------
-class Joint(NamedTuple):
+@dataclass(frozen=True)
+class Joint:
     """Where the motion finds and leaves the numbers of one joint with clearance; steppers count from its place."""
 
     place: int
-    block: int  # of parameters
-    further: int
-    gap: int  # rates
-    force: int
-    rate: int
-    friction: int
-    force_kink: int
-    low_kink: int
-    high_kink: int
-    sliding_power: int
-    impact_power: int
-    force_square: int
-    objective_rate: int
-    sliding_speed: int
-    normal_x: int
-    normal_y: int
-    active: int  # rows of `work`
-    inverse_impact: int
+
+    block = property(lambda self: JOINT_BLOCKS + JOINT_ROWS * self.place)  # of parameters
+    further = property(lambda self: FURTHER + FURTHER_ROWS * self.place)
+    gap = property(lambda self: GAP + self.place)  # rates
+    force = property(lambda self: FORCE + self.place)
+    rate = property(lambda self: GAP_RATE + self.place)
+    friction = property(lambda self: FRICTIONS + self.place)
+    force_kink = property(lambda self: FORCE_KINKS + self.place)
+    low_kink = property(lambda self: LOW_KINKS + self.place)
+    high_kink = property(lambda self: HIGH_KINKS + self.place)
+    sliding_power = property(lambda self: SLIDING_POWERS + self.place)
+    impact_power = property(lambda self: IMPACT_POWERS + self.place)
+    force_square = property(lambda self: FORCE_SQUARES + self.place)
+    objective_rate = property(lambda self: OBJECTIVE_RATES + self.place)
+    sliding_speed = property(lambda self: SLIDING_SPEEDS + self.place)
+    normal_x = property(lambda self: NORMALS_X + self.place)
+    normal_y = property(lambda self: NORMALS_Y + self.place)
+    active = property(lambda self: ACTIVE + self.place)  # rows of `work`
+    inverse_impact = property(lambda self: INVERSE_IMPACT + self.place)
 
 
-JOINTS = tuple(
-    Joint(
-        k, JOINT_BLOCKS + JOINT_ROWS * k, FURTHER + FURTHER_ROWS * k, GAP + k, FORCE + k, GAP_RATE + k, FRICTIONS + k,
-        FORCE_KINKS + k, LOW_KINKS + k, HIGH_KINKS + k, SLIDING_POWERS + k,
-        IMPACT_POWERS + k, FORCE_SQUARES + k, OBJECTIVE_RATES + k, SLIDING_SPEEDS + k, NORMALS_X + k, NORMALS_Y + k,
-        ACTIVE + k, INVERSE_IMPACT + k,
-    )
-    for k in _PLACES
-)  # fmt: skip
+JOINTS = tuple(map(Joint, _PLACES))
 
 
 class Block(NamedTuple):

@@ -2,7 +2,7 @@
 
 import hashlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import ModuleType
 
 from hpcclear.base.generated import module_of
@@ -56,9 +56,11 @@ _LOOK_UP = """    repeats, intervals = tables[{head} + {repeats}], tables[{head}
 """
 
 
-def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
-    """The text of that module; `joints`: the rows of the joints with clearance, in the mechanism's order."""
-    rows = ", ".join(f"at.{joint!r}" for joint in joints)
+def module_with(motion: Motion, places: Iterable[int]) -> ModuleType:
+    """The module of a motion: ``accelerations`` of all lanes and ``motion``, which steppers call.
+
+    `places`: of the joints with clearance, in the mechanism's order.
+    """
     looked_up = "".join(
         _LOOK_UP.format(
             curve=row - at.CURVES,
@@ -77,21 +79,15 @@ def module_text(motion: Motion, joints: tuple[at.Joint, ...]) -> str:
         geometries="".join(f"from {one.module} import {one.function}\n" for one in geometries),
         elements=", ".join(called or ["look_up"]),
     )
-    held = f"JOINTS = ({rows}{',' if joints else ''})"
+    held = f"JOINTS = tuple(map(at.Joint, {tuple(places)}))"
     own = [f"@lane_function\n{_source(one, name)}\n\n" for name, one in motion.functions.items()]
     lane = f"@apart\n@lane_function\n{motion.source}"
     text = f"{''.join(own)}{lane}\n{_MOTION.format(looked_up=looked_up, bank=BANK)}"
-    return f"{head}\n{held}\n\n\n{text}"
+    text = f"{head}\n{held}\n\n\n{text}"
+    return module_of(f"linkage_{hashlib.sha256(text.encode()).hexdigest()[:12]}", text)
 
 
 def _source(function: Callable[..., object], name: str) -> str:
     """The source of a function under another name."""
     source = inspect.getsource(function)
     return source.replace(f"def {function.__name__}(", f"def {name}(", 1)
-
-
-def module_with(motion: Motion, joints: tuple[at.Joint, ...]) -> ModuleType:
-    """The module of a motion: ``accelerations`` of all lanes and ``motion``, which steppers call."""
-    text = module_text(motion, joints)
-    name = f"linkage_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    return module_of(name, text)

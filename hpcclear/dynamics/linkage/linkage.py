@@ -173,7 +173,7 @@ class Linkage:
             pins=bool(effects.series),
         )  # fmt: skip
         on = _with_impacts(on) if effects.impacts else on
-        return module_with(self._text(on), tuple(at.JOINTS[k] for k in self.places))
+        return module_with(self._text(on), self.places)
 
     def fill(
         self, par: Array, sample: Mechanism, gravity: Any, feedback: tuple[float, float]

@@ -4,6 +4,7 @@ The terms are those of `closing.Closing`, evaluated by Python or, for many insta
 """
 
 from collections.abc import Callable
+from functools import partial
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.table_drive import words_of
+from hpcclear.dynamics.linkage.parts import TableDrive
 from hpcclear.dynamics.linkage.trees import forest
 
 
@@ -52,6 +53,28 @@ def on_arrays(mechanism: Mechanism, source: str, **functions: Any) -> Callable[.
     exec(source, names)
     made: Callable[..., None] = names[source[len("def ") : source.index("(")]]
     return made
+
+
+def of_terms(
+    mechanism: Mechanism, writer: Writer, lines: list[str], results: str
+) -> Callable[..., None]:
+    """The function (work, par, *results) of a writer's statements and of lines behind them, as of `on_arrays`."""
+    text = "\n    ".join([*writer.lines, *lines, "pass"])
+    return on_arrays(mechanism, f"def terms(work, par, {results}, i=0, W=1):\n    {text}")
+
+
+def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], tuple[Array, ...]]]:
+    """What texts for numpy call for each table of angles: ``table_of_NAME(time)``, its `curves` at times of any shape, from
+    the same pieces that the kernel reads."""
+    return {
+        f"table_of_{drive.name}": partial(_all_at, drive.pieces)
+        for drive in mechanism.drives
+        if isinstance(drive, TableDrive)
+    }
+
+
+def _all_at(pieces: tuple[Any, ...], time: Array) -> tuple[Array, ...]:
+    return tuple(one.at(time) for one in pieces)
 
 
 class State(NamedTuple):
@@ -101,9 +124,7 @@ class Loops:
                     texts.append(f"entries[{len(places) - 1}] = {writer.text(term)}")
         self.owners = tuple(owners)
         self._places = tuple(np.array(places, int).reshape(-1, 2).T)
-        lines = "\n    ".join([*writer.lines, *texts, "pass"])
-        source = f"def closed(work, par, error, rate, entries, i=0, W=1):\n    {lines}"
-        self._evaluate = on_arrays(mechanism, source)
+        self._evaluate = of_terms(mechanism, writer, texts, "error, rate, entries")
         self._rows = {name: writer.rows[name] for name in writer.read}
         self.take(values(mechanism, cartesian=not trees))
         self.length = length = float(typical_length(mechanism))

@@ -11,7 +11,7 @@ from hpcclear.dynamics.linkage.assembly import Assembly, placed
 from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
-from hpcclear.dynamics.linkage.loops import on_arrays
+from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide
 from hpcclear.dynamics.linkage.trees import Forest
@@ -63,14 +63,19 @@ class Poses:
             for axis, part in enumerate(apart):
                 lines.append(f"out[{first + 2 * k + axis}] = {writer.text(part)}")
         self.size = first + 2 * len(forest.mechanism.contacts)
-        text = "\n    ".join([*writer.lines, *lines, "pass"])
-        source = f"def poses(work, par, out, i=0, W=1):\n    {text}"
-        self._evaluate = on_arrays(forest.mechanism, source)
+        self._evaluate = of_terms(forest.mechanism, writer, lines, "out")
         self.rows = {name: row for name, row in writer.rows.items() if name in writer.read}
 
     @staticmethod
     def _angle(kin: Kinematics, frame: str) -> Term:
         return Term("0") if frame == GROUND else _needed(kin, frame)
+
+    def par_of(self, base: Mapping[str, Any]) -> Array:
+        """Parameters (rows,) of this object's rows, by names as of `numbers.values`."""
+        par = np.zeros(max(self.rows.values(), default=0) + 1)
+        for name, row in self.rows.items():
+            par[row] = base[name]
+        return par
 
     def at(self, par: Array, q: Array, v: Array, time: Array | float) -> tuple[Pose, Array]:
         """Poses, each (bodies, m), and eccentricities (contacts, 2, m): of a journal from the centre of its bearing, of a

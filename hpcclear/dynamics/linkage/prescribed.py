@@ -177,11 +177,7 @@ def cartesian(assembly: Assembly, passage: Passage, q: Array, v: Array, times: A
     """Coordinates and velocities (t, 2, n) in the order of ``assembly.loops.forest``, of those of the trees (n, t)."""
     mechanism, loops = assembly.loops.mechanism, assembly.loops
     poses = Poses(passage.loops.forest, {}, 0)
-    base = values(mechanism)
-    par = np.zeros(max(poses.rows.values(), default=0) + 1)
-    for name, row in poses.rows.items():
-        par[row] = base[name]
-    pose, _ = poses.at(par, q, v, times)
+    pose, _ = poses.at(poses.par_of(values(mechanism)), q, v, times)
     names = [body.name for body in mechanism.bodies]
     parts = {"x": (pose.x, pose.vx), "y": (pose.y, pose.vy), "angle": (pose.angle, pose.spin)}
     found = np.zeros((len(times), 2, loops.size))

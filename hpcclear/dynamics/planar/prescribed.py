@@ -213,10 +213,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     shown = np.searchsorted(edges, times)
     found = dense.taken(shown * (1 + len(_NODES)))
     poses = Poses(found.assembly.loops.forest, {}, 0)
-    base = values(mechanism, cartesian=True, gravity=gravity)
-    par = np.zeros(max(poses.rows.values(), default=0) + 1)
-    for name, row in poses.rows.items():
-        par[row] = base[name]
+    par = poses.par_of(values(mechanism, cartesian=True, gravity=gravity))
     pose, _ = poses.at(par, found.q.T, found.v.T, times)
     mass, inertia = (
         np.array([getattr(body, part) for body in mechanism.bodies])[:, None]
