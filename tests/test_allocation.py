@@ -16,6 +16,8 @@ from patience import crowded
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
+from hpcclear.report.constraints import worded
+from hpcclear.results.content import Results
 from hpcclear.scene import load_scene
 from hpcclear.study import run_study
 
@@ -187,8 +189,9 @@ def test_the_cheapest_design_is_that_of_enumeration(results):
     best = found.sel(design="a alpha")
     assert float(best["first_true"]) == least
     assert best["constraint_verdict"].to_numpy().tolist() == [Verdict.HOLDS] * 2
-    assert "mean of peak torque of the drive on the crank" in str(best["constraints"].item())
-    assert "at most 600 µN m" in str(best["constraints"].item())
+    words = "; ".join(worded(Results.of(best)))
+    assert "mean of peak torque of the drive on the crank" in words
+    assert "at most 600 µN m" in words
     assert str(best["second_goal"].item()) == "99.9th percentile of f"
 
 

@@ -20,7 +20,7 @@ from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.ensemble.api import as_points, evaluate
-from hpcclear.report.figures.linkage_sketch import key
+from hpcclear.report.figures.sketch import key
 from hpcclear.scene import Scene
 
 LINKAGES = Path(__file__).parents[1] / "jobs" / "linkages"

@@ -135,7 +135,6 @@ def with_goals(verified: xr.Dataset, words: dict[str, tuple[str, ...]]) -> xr.Da
         verified[f"{name}_unit"] = ("design", np.array(units))
         usual = [USUAL.get(words[case][k], Usual.OTHER) for case in cases]
         verified[f"{name}_usual"] = ("design", np.array(usual, np.int8))
-    verified["constraints"] = ("design", np.array([""] * len(cases)))
     return verified
 
 

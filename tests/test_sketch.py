@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report import sketch_figure
-from hpcclear.report.figures.linkage_sketch import Placed
+from hpcclear.report.figures.sketch import Placed
 from hpcclear.scene import load_scene
 from hpcclear.scene.slider_crank import DRAWN_AT
 

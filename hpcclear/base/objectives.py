@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cache
-from inspect import signature
+from inspect import Parameter, Signature, signature
 from typing import Any, Literal
 
 import numpy as np
@@ -183,68 +183,30 @@ def arguments(function: Function) -> tuple[str, ...]:
     return tuple(signature(function).parameters)
 
 
-OURS = {
-    "mean-gap": Objective(
-        "mean distance from the clearance circle", "m", lambda objective: objective
-    ),
-    "mean-contact-force": Objective(
-        "mean contact force, of the joint where it is larger", "N",
-        lambda mean_contact_force: mean_contact_force.max(),
-    ),
-    "peak-contact-force": Objective(
-        "peak contact force, of the joint where it is larger", "N",
-        lambda peak_contact_force: peak_contact_force.max(),
-    ),
-    "peak-contact-pressure": Objective(
-        "peak contact pressure, of the joint where it is larger", "Pa",
-        lambda peak_contact_pressure: np.nanmax(peak_contact_pressure),
-    ),
-    "contact-half-angle": Objective(
-        "half angle of contact at the peak force, of the joint where it is larger", "rad",
-        lambda contact_half_angle: np.nanmax(contact_half_angle),
-    ),
-    "peak-crank-moment": Objective(
-        "peak torque of the drive on the crank", "N m", lambda peak_crank_moment: peak_crank_moment
-    ),
-    "slider-acceleration-deviation": Objective(
-        "standard deviation in time of the slider acceleration", "m/s^2",
-        lambda slider_acceleration_deviation: slider_acceleration_deviation,
-    ),
-    "point-acceleration-deviation": Objective(
-        "root mean square about its mean of the acceleration of the followed point", "m/s^2",
-        lambda point_acceleration_deviation: point_acceleration_deviation,
-    ),
-    "peak-point-acceleration": Objective(
-        "largest acceleration of the followed point", "m/s^2",
-        lambda peak_point_acceleration: peak_point_acceleration,
-    ),
-    "impacts": Objective(
-        "number of impacts in a revolution, of the joint where it is larger", "",
-        lambda impacts: impacts.max(),
-    ),
-    "impact-energy": Objective(
-        "energy lost in impacts in a revolution, of all joints", "J",
-        lambda impact_energy: impact_energy.sum(),
-    ),
-    "contact-impulse": Objective(
-        "impulse of the contact force in a revolution, of the joint where it is larger", "N s",
-        lambda contact_impulse: contact_impulse.max(),
-    ),
-    "contact-loss": Objective(
-        "angle of the drive without contact in a revolution, of the joint where it is larger", "rad",
-        lambda contact_loss: contact_loss.max(),
-    ),
-    "rms-contact-force": Objective(
-        "root mean square of the contact force, of the joint where it is larger", "N",
-        lambda rms_contact_force: rms_contact_force.max(),
-    ),
-    "rms-frame-force": Objective(
-        "root mean square about its mean of the force on the frame", "N",
-        lambda rms_frame_force: rms_frame_force,
-    ),
+def _taken(name: str) -> Function:
+    """What takes a field of a record: at joints the largest, of energies the sum."""
+
+    def value(found: Array) -> float:
+        return float(np.sum(found) if FIELDS[name].unit == "J" else np.nanmax(found))
+
+    value.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_OR_KEYWORD)])  # type: ignore[attr-defined]
+    return value
+
+
+MEAN_GAP = Objective(
+    "mean distance from the clearance circle", "m", _taken("objective"), name="mean-gap"
+)
+"""f of eq. 13, of a scene without a study, and of a study that names no other."""
+
+OURS = {MEAN_GAP.name: MEAN_GAP} | {
+    name.replace("_", "-"): Objective(
+        one.goal + (", of the joint where it is larger" if one.per and one.unit != "J" else ""),
+        one.unit.removeprefix("1"), _taken(name), name=name.replace("_", "-"),
+    )
+    for name, one in FIELDS.items()
+    if one.goal
 }  # fmt: skip
-OURS = {name: replace(one, name=name) for name, one in OURS.items()}
-"""Ours by their names."""
+"""Ours by their names: a field of a record with a `goal` each."""
 
 
 def band_of(frequency: float) -> float:
@@ -300,10 +262,6 @@ class Usual(IntEnum):
     MEAN = 1
     DEVIATION = 2
     PERCENTILE = 3
-
-
-MEAN_GAP = OURS["mean-gap"]
-"""f of eq. 13, of a scene without a study, and of a study that names no other."""
 
 
 @cache

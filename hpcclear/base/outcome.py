@@ -155,6 +155,8 @@ class Field(NamedTuple):
     error), "map"; "" of what always does."""
     required: bool = False
     """Whether every file with the outcome of a simulation has it."""
+    goal: str = ""
+    """What a study makes small by it, in words (`hpcclear.base.objectives.OURS`); "" for no objective."""
 
 
 FIELDS = {
@@ -163,21 +165,31 @@ FIELDS = {
     "objective_spread": Field("objective", "cycle-to-cycle standard deviation of f", required=True),
     "objective_uncertainty": Field("objective", "half-width of f, by replicas or of its steady mean"),
     "mean_gap": Field("m", "time mean of the distance from the clearance circle", per="joint"),
-    "peak_contact_force": Field("N", "largest contact force over the averaged revolutions", per="joint"),
-    "mean_contact_force": Field("N", "mean contact force over the averaged revolutions", per="joint", when="response"),
-    "peak_crank_moment": Field("N m", "largest absolute torque of the drive on the crank", when="response"),
-    "slider_acceleration_deviation": Field(
-        "m/s^2", "standard deviation of the slider acceleration in time", when="response"),
+    "peak_contact_force": Field("N", "largest contact force over the averaged revolutions", per="joint",
+        goal="peak contact force"),
+    "mean_contact_force": Field("N", "mean contact force over the averaged revolutions", per="joint", when="response",
+        goal="mean contact force"),
+    "peak_crank_moment": Field("N m", "largest absolute torque of the drive on the crank", when="response",
+        goal="peak torque of the drive on the crank"),
+    "slider_acceleration_deviation": Field("m/s^2", "standard deviation of the slider acceleration in time", when="response",
+        goal="standard deviation in time of the slider acceleration"),
     "point_acceleration_deviation": Field(
-        "m/s^2", "root mean square of the acceleration of the followed point about its mean", when="response"),
-    "peak_point_acceleration": Field("m/s^2", "largest acceleration of the followed point", when="response"),
-    "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact"),
-    "impact_energy": Field(
-        "J", "energy lost by damping of the contact in a revolution", per="joint", when="impact"),
-    "contact_impulse": Field("N s", "impulse of the normal force in a revolution", per="joint", when="impact"),
-    "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact"),
-    "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact"),
-    "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact"),
+        "m/s^2", "root mean square of the acceleration of the followed point about its mean", when="response",
+        goal="root mean square about its mean of the acceleration of the followed point"),
+    "peak_point_acceleration": Field("m/s^2", "largest acceleration of the followed point", when="response",
+        goal="largest acceleration of the followed point"),
+    "impacts": Field("1", "number of contacts that begin in a revolution", per="joint", when="impact",
+        goal="number of impacts in a revolution"),
+    "impact_energy": Field("J", "energy lost by damping of the contact in a revolution", per="joint", when="impact",
+        goal="energy lost in impacts in a revolution, of all joints"),
+    "contact_impulse": Field("N s", "impulse of the normal force in a revolution", per="joint", when="impact",
+        goal="impulse of the contact force in a revolution"),
+    "contact_loss": Field("rad", "angle of a revolution without contact", per="joint", when="impact",
+        goal="angle of the drive without contact in a revolution"),
+    "rms_contact_force": Field("N", "root mean square of the normal force", per="joint", when="impact",
+        goal="root mean square of the contact force"),
+    "rms_frame_force": Field("N", "root mean square about its mean of the force on the frame", when="impact",
+        goal="root mean square about its mean of the force on the frame"),
     "band": Field("Hz", "middle of the third-octave band", per="band", when="level"),
     "frame_force_level": Field(
         "1", "third-octave level of the force on the frame, dB re 1e-6 N", per="band", when="level"),
@@ -192,10 +204,10 @@ FIELDS = {
             ("contact_loss", "rad", "joint"), ("rms_contact_force", "N", "joint"), ("rms_frame_force", "N", ""),
         )
     },
-    "peak_contact_pressure": Field(
-        "Pa", "largest pressure at the peak contact force", per="joint", when="pressure"),
-    "contact_half_angle": Field(
-        "rad", "half of the angle of contact at the peak contact force", per="joint", when="pressure"),
+    "peak_contact_pressure": Field("Pa", "largest pressure at the peak contact force", per="joint", when="pressure",
+        goal="peak contact pressure"),
+    "contact_half_angle": Field("rad", "half of the angle of contact at the peak contact force", per="joint", when="pressure",
+        goal="half angle of contact at the peak force"),
     "rate_of_objective": Field("rate", "mean, integral, RMS or peak of the objective's own rate", per="joint", when="rate"),
     "sliding_work": Field("J", "normal force times sliding distance in a revolution", per="joint", when="wear"),
     "sliding_waves": Field(

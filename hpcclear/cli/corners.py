@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.cli.terminal import console, fitting, table
 from hpcclear.ensemble.corners import MOST, CornerOutcomes, tried
-from hpcclear.report.failures import Column, sentences, where
+from hpcclear.report.failures import Sampled, sentences, where
 from hpcclear.scene import Scene
 
 
@@ -19,7 +19,7 @@ def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
     """Return label and text of each line."""
     points, total = found.points, len(found.points)
     columns = [
-        Column(name, unit or "1", values)
+        Sampled(name, unit or "1", values)
         for name, unit, values in zip(points.names, points.units, points.values.T, strict=True)
     ]
     failed = list(sentences(found.status, columns, "corners")) if simulate else []

@@ -12,6 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
 from hpcclear.results.content import Results
+from hpcclear.scene import Scene
 from hpcclear.scene.joints import length_path
 from hpcclear.scene.loading import scene_of_text
 
@@ -23,11 +24,6 @@ ROUNDING = 1e-12
 
 SENSITIVE = 0.01
 """Half-width over f beyond which f is reported as sensitive to initial conditions."""
-
-_SENSITIVE_WORDS = (
-    "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is {:.0%} of f. "
-    "{}"
-)
 
 REMARKS = labels.FLAGS | {Flag.TARGET_MISSED: "f is not known to numerics.target_error"}
 WARNED = tuple(flag for flag in REMARKS if flag is not Flag.STIFF)
@@ -149,15 +145,17 @@ def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:
 
 def _one_drive(response: Results) -> bool:
     """Whether all work is that of a single drive; a slider-crank has no other."""
-    return "drive_phase" not in response or _drives_in(str(response.attrs.get("scene"))) == 1
+    scene = _scene_in(str(response.attrs.get("scene"))) if "drive_phase" in response else None
+    return "drive_phase" not in response or (scene is not None and len(scene.linkage.drives) == 1)
 
 
 @lru_cache(maxsize=4)
-def _drives_in(text: str) -> int:
+def _scene_in(text: str) -> Scene | None:
+    """The scene of a file, which each table requests of a page; None without it, or of another version."""
     try:
-        return len(scene_of_text(text, "scene").linkage.drives)
+        return scene_of_text(text, "scene")
     except InputError:
-        return 0  # of another version
+        return None
 
 
 def remarks(response: Results) -> list[tuple[str, str]]:
@@ -169,11 +167,8 @@ def remarks(response: Results) -> list[tuple[str, str]]:
     found += [("Warning", text) for text in _gaining(response)]
     found += [("Warning", text) for text in str(response.attrs.get("cautions", "")).splitlines()]
     flags = int(response["flags"])
-    warnings = flag_remarks(flags & sum(WARNED))
-    notes = flag_remarks(flags & int(Flag.STIFF))
-    return [
-        *found, *(("Warning", text) for text in warnings), *(("Note", text) for text in notes)
-    ]  # fmt: skip
+    found += [("Warning", text) for text in flag_remarks(flags & sum(WARNED))]
+    return [*found, *(("Note", text) for text in flag_remarks(flags & int(Flag.STIFF)))]
 
 
 def _gaining(response: Results) -> list[str]:
@@ -238,14 +233,15 @@ def degrees(one: Bearing) -> str:
 
 def sensitive_words(relative: float, content: Results) -> str:
     """Return the warning of a half-width of f that is so large, relative to f, of a response or samples."""
-    return _SENSITIVE_WORDS.format(relative, remedy(content))
-
-
-def remedy(content: Results) -> str:
-    """Return what makes the objective of a response or samples surer; only the mean gap has steady means."""
-    if "objective" in content.attrs:  # as files have of other objectives only
-        return "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
-    return "Set numerics.target_error for a mean with a confidence interval"
+    remedy = "Set numerics.target_error for a mean with a confidence interval"
+    if (
+        "objective" in content.attrs
+    ):  # as files have of other objectives only; these have no steady means
+        remedy = "Raise numerics.averaged_revolutions, and compare results of equal numbers of them"
+    return (
+        "f is sensitive to initial conditions or to the tolerance. From replicas with other starts its half-width is "
+        f"{relative:.0%} of f. {remedy}"
+    )
 
 
 def flag_remarks(flags: int) -> list[str]:
@@ -277,21 +273,9 @@ def _weights(time: Array) -> Array:
 
 def _projected_areas(response: Results) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
-    try:
-        return _areas_in(str(response.attrs["scene"]))
-    except (InputError, KeyError):
-        return {}  # a file of another version, or without its scene
-
-
-@lru_cache(maxsize=4)
-def _areas_in(text: str) -> dict[str, float]:
-    """`_projected_areas` of a scene's text, which each table requests of a page."""
-    scene = scene_of_text(text, "scene")
-    areas = {}
-    for joint in scene.pins():
+    scene, areas = _scene_in(str(response.attrs.get("scene"))), {}
+    for joint in () if scene is None else scene.pins():
         one = scene.pin(joint)
-        path = length_path(one)
-        if path is not None:
-            length: float = attrgetter(path)(one)
-            areas[joint] = 2.0 * one.bearing_radius * length
+        if (path := length_path(one)) is not None:
+            areas[joint] = 2.0 * one.bearing_radius * float(attrgetter(path)(one))
     return areas

@@ -140,7 +140,7 @@ def beside_original(
         for name in _asked(designs[0]):
             words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")
             lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
-        if "constraints" in verified:
+        if "first_goal" in verified:
             found = map(verdict_of, designs)
             lines.append(("constraints", *("none" if v is None else WORDS[v] for v in found)))
         lines.append(("active bounds", "", *(bounds(one) for one in designs[1:])))

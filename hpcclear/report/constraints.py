@@ -22,14 +22,8 @@ OPEN = "the integration tolerance leaves it open"
 
 
 def verdict_of(one: Results) -> Verdict | None:
-    """Return the verdict on all constraints of a design (of kind ``verification``); None if its case has none.
-
-    Constraints in words alone, without codes, are not known to be satisfied.
-    """
-    if "constraint_verdict" not in one:
-        told = "constraints" in one and str(one["constraints"].to_numpy())
-        return Verdict.UNDECIDED if told else None
-    codes = one["constraint_verdict"].to_numpy()
+    """Return the verdict on all constraints of a design (of kind ``verification``); None if its case has none."""
+    codes = one["constraint_verdict"].to_numpy() if "constraint_verdict" in one else np.array([])
     found = codes[codes != ABSENT].tolist()
     return together(found) if found else None
 
@@ -45,8 +39,7 @@ def worded(one: Results) -> Iterator[str]:
     """Yield constraints of a design: "probability of f above 3 N = 0.01 (95 % CI 0.009 to 0.011), at most 0.05: satisfied"."""
     if "constraint_verdict" not in one:
         return
-    for k in range(one.sizes["constraint"]):
-        own = one.isel(constraint=k)
+    for own in one.each("constraint"):
         if int(own["constraint_verdict"]) == ABSENT:
             continue
         unit = str(own["constraint_unit"].item())

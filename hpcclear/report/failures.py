@@ -22,7 +22,7 @@ NAMED = 2
 """Variables that are named for each status."""
 
 
-class Column(NamedTuple):
+class Sampled(NamedTuple):
     """A variable: its name, SI unit, and value in each sample, shape (n,)."""
 
     name: str
@@ -41,15 +41,15 @@ def explained(samples: Results) -> list[str]:
     return list(sentences(samples["status"].to_numpy(), variables(samples)))
 
 
-def variables(samples: Results) -> list[Column]:
+def variables(samples: Results) -> list[Sampled]:
     """Return the design variables of samples (kind ``samples``)."""
     return [
-        Column(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())
+        Sampled(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())
         for one in labels.design_variables(samples)
     ]
 
 
-def sentences(status: Array, columns: Sequence[Column], what: str = "samples") -> Iterator[str]:
+def sentences(status: Array, columns: Sequence[Sampled], what: str = "samples") -> Iterator[str]:
     """Return the same of outcomes (n,) and the variables of what was simulated."""
     for code in Status:
         failed = status == code
@@ -60,7 +60,7 @@ def sentences(status: Array, columns: Sequence[Column], what: str = "samples") -
         yield f"{count} {code.name.lower()}: {code.message}{place and f'; {place}'}. Remedy: {code.remedy}"
 
 
-def where(failed: Booleans, columns: Sequence[Column]) -> str:
+def where(failed: Booleans, columns: Sequence[Sampled]) -> str:
     """Return in which ranges of which variables failures (n,) lie; "" where all failed, as ranges then explain nothing.
 
     A variable is named if its values in failures are distributed unlike those in the others.

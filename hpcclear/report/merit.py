@@ -25,7 +25,7 @@ def goals_of(one: Results) -> list[str]:
 
 def leading_goals(verified: Results) -> list[str]:
     """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
-    if not any(counts(verified.isel(design=k)) for k in range(verified.sizes["design"])):
+    if not any(map(counts, verified.each("design"))):
         return []
     first = ours_of(verified).isel(design=0)
     return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
@@ -46,7 +46,7 @@ def is_plain(one: Results) -> bool:
 
 def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
-    rows = [k for k in range(verified.sizes["design"]) if counts(verified.isel(design=k))]
+    rows = [k for k, one in enumerate(verified.each("design")) if counts(one)]
     if "case" in verified:
         cases = [str(case) for case in verified["case"].to_numpy()]
         chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
@@ -66,10 +66,8 @@ def counts(one: Results) -> bool:
 
 def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
-    for k, name in enumerate(ours["design"].to_numpy()):
-        if str(name).rpartition(" ")[2] == "original":
-            return ours.isel(design=k)
-    return None
+    every = ours.each("design")
+    return next((d for d in every if str(d["design"].item()).split(" ")[-1] == "original"), None)
 
 
 def best_of(ours: Results) -> Results:
@@ -81,12 +79,11 @@ def judged(ours: Results) -> np.ndarray:
     """Merit of the designs of a case, (designs,): infinite for those that satisfy its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
         return ours["mean_true"].to_numpy() + SPAN * ours["deviation_true"].to_numpy()
-    each = [verdict_of(ours.isel(design=k)) for k in range(ours.sizes["design"])]
+    each = [verdict_of(one) for one in ours.each("design")]
     found, level = best([Verdict.HOLDS if one is None else one for one in each])
     merit = ours["first_true"].to_numpy()
-    if (
-        found is not Verdict.HOLDS and "constraint_excess" in ours
-    ):  # none is surely within: the nearest
+    if found is not Verdict.HOLDS and "constraint_excess" in ours:
+        # none is surely within: the nearest
         excess = ours["constraint_excess"].to_numpy()
         within = level & (excess <= 0.0)
         level, merit = (within, merit) if within.any() else (level, excess)

@@ -1,4 +1,4 @@
-"""Lines on the scatter of one design: which random inputs contribute to its variance, and what tighter tolerances bring."""
+"""Lines on the scatter of f: what contributes to it at one design and over the ranges, what tighter tolerances bring, chaos."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -143,4 +143,86 @@ def _upwards(half_width: float, step: float) -> float:
     return float(max(np.ceil(half_width / step - 1e-9), 1.0) * step)
 
 
-PARTS = (LinesOf(20, ("contributions",), lines), LinesOf(30, ("worst",), _worst))
+LITTLE = 0.01
+"""Share of the variance of f, with its half-width, below which a variable is called negligible."""
+
+UNSURE = 0.1
+"""Half-width of a Sobol index above which more samples are advised."""
+
+
+def _indices(of: Recommended) -> Iterator[Line]:
+    """First-order and total Sobol indices with their errors, the largest total first; none where they are not known."""
+    found = of.files.get("sensitivity")
+    if found is None or "sobol_total" not in found:
+        return
+    indices = {
+        kind: [found[f"sobol_{kind}{end}"].to_numpy() for end in ("", "_error")]
+        for kind in ("first", "total")
+        if f"sobol_{kind}" in found
+    }
+    total, error = indices["total"]
+    if not total.size or not np.isfinite([total, error]).all():
+        return
+    names = [str(name) for name in found["parameter"].to_numpy()]
+    order = np.argsort(-total, kind="stable")
+    little = total + HALF_WIDTH * error < LITTLE
+    texts = {
+        kind: ", ".join(
+            share(names[k], value[k], HALF_WIDTH * error[k]) for k in order if not little[k]
+        )
+        for kind, (value, error) in indices.items()
+    }
+    own = "first-order Sobol indices, the share of the variance of f that a variable explains alone (± 95 % half-width)"
+    if texts["total"] and "first" in texts:
+        yield Line("sensitivity", f"{own}: {texts['first']}")
+    if texts["total"]:
+        words = "total Sobol indices, with all interactions (their sum may exceed 100 %)"
+        yield Line("interactions", f"{words}: {texts['total']}")
+    noise, doubt = (float(found.get(f"sobol_noise{end}", np.nan)) for end in ("", "_error"))
+    if noise > HALF_WIDTH * doubt and noise > LITTLE:
+        text = f"{share('chaotic scatter', noise, HALF_WIDTH * doubt)} of the variance over the study's ranges, "
+        yield Line("chaotic scatter", text + "by perturbed runs; the total indices are without it")
+    if little.any():
+        hardly = ", ".join(names[k] for k in order if little[k])
+        yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")
+    if any(HALF_WIDTH * float(np.nanmax(error)) > UNSURE for _, error in indices.values()):
+        text = f"Sobol indices are known to ± {UNSURE:.0%} or worse: raise study.sensitivity.sobol_samples"
+        yield Line("warning", text)
+
+
+SOME = 0.05
+"""Share of samples that change with a perturbation above which a design is called sensitive to initial conditions."""
+
+LARGE = 0.1
+"""Share of the variance above which chaotic scatter is worth more revolutions."""
+
+
+def _chaos(of: Recommended) -> Iterator[Line]:
+    """Share of the design's variance that is chaos, and how many designs are chaotic; none if it was not simulated."""
+    own = of.of_best("chaos")
+    if own is None:
+        return
+    moved = of.files["chaos"]["chaotic"].to_numpy() > SOME
+    text = f"{int(moved.sum())} of {moved.size} designs are sensitive to initial conditions"
+    if not float(own["chaotic"]) > SOME:
+        text += "; the recommended one is not: perturbations of 1e-9, relative, leave its samples unchanged"
+    else:
+        text += (
+            f". Relative perturbations of 1e-9 change {float(own['chaotic']):.0%} of the recommended design's samples "
+            f"and explain {float(own['chaos_share']):.0%} of its variance"
+        )
+    yield Line("chaos", text)
+
+
+def _steadier(of: Recommended) -> Iterator[str]:
+    own = of.of_best("chaos")
+    if own is not None and float(own["chaos_share"]) > LARGE:
+        yield "a larger numerics.averaged_revolutions, since chaotic scatter decreases with it"
+
+
+PARTS = (
+    LinesOf(20, ("contributions",), lines),
+    LinesOf(30, ("worst",), _worst),
+    LinesOf(40, ("sensitivity",), _indices),
+    LinesOf(80, ("chaos",), _chaos, _steadier),
+)

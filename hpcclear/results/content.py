@@ -184,6 +184,10 @@ class Results:
         """Return what stands at labels of coordinates, one or several of each; raises KeyError where there are none."""
         return self.isel({dim: place_of(self.labels[dim], one) for dim, one in labels.items()})
 
+    def each(self, dim: str) -> list[Results]:
+        """Return what stands at each place along a dimension."""
+        return [self.isel({dim: k}) for k in range(self.sizes[dim])]
+
     def assign_attrs(self, **attrs: object) -> Results:
         """Return these results with further global attributes."""
         return Results(self.variables, {**self.attrs, **attrs}, tuple(self.labels))

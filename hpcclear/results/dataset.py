@@ -149,7 +149,7 @@ def _design_row(
     dims, base, start, role = table.design_dims, name, "", ROLE
     if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
         dims, base, start, role = table.limit_dims, name[:-6], f"{name[-5:]} limit of the ", LIMIT
-    unit, long_name = DESIGN_VARIABLES.get(base, (None, f"design variable {base}"))
+    unit, long_name, _ = DESIGN_VARIABLES.get(base, (None, f"design variable {base}", ""))
     unit = units.get(base, unit)
     unit = "1" if unit == "" else unit
     if unit is None or dims is None:

@@ -12,18 +12,18 @@ from hpcclear.results.content import Results
 from hpcclear.results.rows import Kind
 
 DESIGN_VARIABLES = {
-    "m1": ("kg", "mass of the crank"),
-    "u1": ("m", "position of the mass centre of the crank, from its first joint"),
-    "I1": ("kg m^2", "inertia of the crank about its mass centre"),
-    "m2": ("kg", "mass of the rod"),
-    "u2": ("m", "position of the mass centre of the rod, from its first joint"),
-    "I2": ("kg m^2", "inertia of the rod about its mass centre"),
-    "m3": ("kg", "mass of the slider"),
-    "C": ("m", "radial clearance"),
-    "I1_ratio": ("1", "inertia of the crank over that of a slender rod, m1 L1^2/12"),
-    "I2_ratio": ("1", "inertia of the rod over that of a slender rod, m2 L2^2/12"),
-}
-"""Units and long names of the design variables of the paper (its Table 3)."""
+    "m1": ("kg", "mass of the crank", "crank mass $m_1$"),
+    "u1": ("m", "position of the mass centre of the crank, from its first joint", "crank centre $u_1$"),
+    "I1": ("kg m^2", "inertia of the crank about its mass centre", "crank inertia $I_1$"),
+    "m2": ("kg", "mass of the rod", "rod mass $m_2$"),
+    "u2": ("m", "position of the mass centre of the rod, from its first joint", "rod centre $u_2$"),
+    "I2": ("kg m^2", "inertia of the rod about its mass centre", "rod inertia $I_2$"),
+    "m3": ("kg", "mass of the slider", "slider mass $m_3$"),
+    "C": ("m", "radial clearance", "clearance $C$"),
+    "I1_ratio": ("1", "inertia of the crank over that of a slender rod, m1 L1^2/12", ""),
+    "I2_ratio": ("1", "inertia of the rod over that of a slender rod, m2 L2^2/12", ""),
+}  # fmt: skip
+"""Units, long names and labels of axes of the design variables of the paper (its Table 3)."""
 
 SECONDS_PER_SAMPLE = "seconds_per_sample"
 """Attribute of the file of times: processor time of a sample by the names of the effects that are off, as JSON."""

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.objectives import MEAN_GAP, Objective, Usual
-from hpcclear.base.outcome import FIELDS, IMPACTS, JUDGED, ON_REQUEST, Flag, Regime, Status
+from hpcclear.base.objectives import MEAN_GAP, Objective
+from hpcclear.base.outcome import FIELDS, JUDGED, ON_REQUEST, Flag, Regime, Status
 
 Dims = tuple[str, ...]
 
@@ -173,77 +173,29 @@ def outcome(*per_sample: str) -> Columns:
     }  # fmt: skip
 
 
-def by_revolution() -> Columns:
-    """Measures of impact and noise of each averaged revolution."""
-    found = {}
-    means = outcome()
-    for name in IMPACTS:
-        row = means[name]
-        dims = ("revolution", *row.dims)
-        found[f"{name}_by_revolution"] = number(dims, row.units, f"{row.long_name}: of each")
-    return found
+def estimate(
+    name: str,
+    dims: Dims,
+    units: str,
+    words: str,
+    true: str = "",
+    level: str = "",
+    *,
+    required: bool = False,
+) -> Columns:
+    """A number, called NAME and `true`, and the ends of its confidence interval of some `level`, NAME_lower and NAME_upper.
 
-
-def spectrum(name: str, words: str, *dims: str) -> Columns:
-    """Orders and third-octave levels of a force."""
-    found = {
-        f"{name}_orders": number(
-            ("order", *dims), "N", f"root mean square of the order in the {words}"
+    `required`: the number itself."""
+    ends = {
+        f"{name}_{end}": number(
+            dims, units, f"{words}: {end} end of its {level}confidence interval"
         )
+        for end in ("lower", "upper")
     }
-    level = f"third-octave level of the {words}, dB re 1e-6 N; NaN of a band without an order"
-    for end, which in (("", ""), ("_lower", ": lower end"), ("_upper", ": upper end")):
-        interval = f"{which} of its 95 % confidence interval" if which else ""
-        found[f"{name}_level{end}"] = number(("band", *dims), "1", level + interval)
-    return found
+    return {f"{name}{true}": number(dims, units, words, required=required)} | ends
 
 
-def fit(*dims: str) -> Columns:
-    """How well a model does."""
-    return {
-        "r2": number(dims, "1", "1 - SSE/SST on test points", required=True),
-        "rmae": number(
-            dims,
-            "1",
-            "largest test error / standard deviation of test values",
-            required=True,
-        ),
-        "r2_explained": number(dims, "1", "explained variance ratio, eq. 26 as printed"),
-        "rmae_mean": number(
-            dims,
-            "1",
-            "largest test error / mean of test values, eq. 27 as printed",
-        ),
-        "rmse": number(dims, "objective", "root mean square error on test points"),
-        "points": count(dims, "number of points fitted"),
-    }
-
-
-def statistics_of(name: str, dims: Dims, units: str, words: str) -> Columns:
-    """Statistics of one result."""
-    return {
-        f"{name}_count": count(dims, f"number of finite values of the {words}", required=True),
-        f"{name}_mean": number(dims, units, f"mean of the {words}", required=True),
-        f"{name}_deviation": number(
-            dims, units, f"sample standard deviation of the {words}", required=True
-        ),
-        f"{name}_minimum": number(dims, units, f"least {words}", required=True),
-        f"{name}_maximum": number(dims, units, f"greatest {words}", required=True),
-        f"{name}_histogram": count((*dims, "bin"), f"number of samples by {words}", required=True),
-        f"{name}_edges": number(
-            (*dims, "edge"), units, f"edges of the bins of the {words}", required=True
-        ),
-    }
-
-
-def goal(name: str) -> Columns:
-    """Objectives of a case, other than mean and standard deviation; each design has those of its case."""
-    of = f"{name} objective of the case"
-    return {
-        f"{name}_goal": text(("design",), f"{of}, in words"),
-        f"{name}_unit": text(("design",), f"{of}: unit, empty for none"),
-        f"{name}_usual": flag(("design",), f"{of}: whether it is reported of every design", Usual),
-        f"{name}_true": number(("design",), "", f"{of}, by simulation"),
-        f"{name}_lower": number(("design",), "", f"{of}: lower end of its confidence interval"),
-        f"{name}_upper": number(("design",), "", f"{of}: upper end of its confidence interval"),
-    }
+def with_error(name: str, dims: Dims, units: str, words: str, *, required: bool = False) -> Columns:
+    """A number, `required` or not, and its standard error as NAME_error."""
+    error = number(dims, units, f"standard error of {name}")
+    return {name: number(dims, units, words, required=required), f"{name}_error": error}

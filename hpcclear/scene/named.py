@@ -36,7 +36,7 @@ RESERVED = frozenset(
         ),
         *("case", "run", "solution", "design", "model", "mean", "deviation"),
         "label",
-        *("searched", "searched_first", "searched_second", "constraints"),
+        *("searched_first", "searched_second"),
     )
 )
 """Names of dimensions and results in the datasets."""

@@ -9,7 +9,7 @@ from hpcclear.results import dataset
 from hpcclear.scene.cases import Goal
 from hpcclear.scene.domain import to_physical
 from hpcclear.statistics.surrogate.piecewise import Piecewise
-from hpcclear.study.goals import most_of, names_of
+from hpcclear.study.goals import most_of
 from hpcclear.study.optimisation import Choice
 from hpcclear.study.problem import problem_of
 from hpcclear.study.run import Result, StudyRun
@@ -32,7 +32,6 @@ def write(run: StudyRun, fronts: Result, verified: Sequence[Choice], model: Piec
     searched: list[str] = []
     if not plain.all():
         unit = run.scene.objective.unit
-        data["searched"] = np.array([", ".join(names_of(case, unit)) for case in run.study.cases])
         searched = [f"searched_{name}" for name in ORDINALS[: most_of(run.study.cases)]]
         data |= {name: np.full(shape, np.nan) for name in searched}
         for column, name in enumerate(searched):

@@ -8,7 +8,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.objectives import ORDINALS, Usual
 from hpcclear.base.verdict import Verdict, best, together
-from hpcclear.report.constraints import ABSENT, worded
+from hpcclear.report.constraints import ABSENT
 from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
 from hpcclear.scene.domain import box, to_coordinates
@@ -76,8 +76,6 @@ class Table:
         that is also alpha or beta stands there twice.
     rows : list of int
         Number of each in what was simulated.
-    same_as : list of str
-        The first design before it that it is statistically indistinguishable from; empty if there is none.
     equivalent : list of list of str
         All designs of its case that it is statistically indistinguishable from.
     dominated : list of bool
@@ -86,7 +84,6 @@ class Table:
 
     choices: list[Choice]
     rows: list[int]
-    same_as: list[str]
     equivalent: list[list[str]]
     dominated: list[bool]
 
@@ -99,7 +96,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     study's confidence it is the best in the others. Each design of the front is significantly better than each
     other in one of them. They are chosen among the designs that significantly satisfy all constraints, if there are any.
     """
-    table = Table([], [], [], [], [])
+    table = Table([], [], [], [])
     for case in run.study.cases:
         rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
         _name_case(run, case, rows, choices, true, table)
@@ -138,16 +135,13 @@ def _name_case(
     named += [
         (k, choices[rows[k]].name or f"{case.name} candidate {unnamed.index(k) + 1}") for k in left
     ]
-    seen: list[tuple[int, str]] = []
     for k, name in named:
         table.choices.append(replace(choices[rows[k]], name=name))
         table.rows.append(rows[k])
-        table.same_as.append(next((label for j, label in seen if everything.one[j, k]), ""))
         table.equivalent.append(
             [label for j, label in named if everything.one[j, k] and label != name]
         )
         table.dominated.append(bool(everything.beaten[k]))
-        seen.append((k, name))
 
 
 def _nearest(rows: Sequence[int], verdicts: Sequence[Verdict], broken: Array) -> list[int]:
@@ -192,7 +186,6 @@ def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
         for end in ("", "_lower", "_upper"):  # behind what a case makes small stand its constraints
             values = true[f"goal{end}"][:, column]
             data[f"{name}{end or '_true'}"] = np.where(there, values, np.nan)
-    data["constraints"] = np.full(len(cases), "")
     if any(case.kept for case in cases):
         each = {case.name: _broken(case, true) for case in cases}
         found = np.array([each[case.name][row] for row, case in enumerate(cases)])
@@ -314,9 +307,7 @@ def write(
         data[name] = true[name].astype(np.int64)
     if true["rare_samples"].any():
         data["rare_samples"] = true["rare_samples"].astype(np.int64)
-    data["same_as"] = np.array(table.same_as)
     names = np.array([choice.name for choice in choices])
-    data["equivalent"] = np.array(["; ".join(alike) for alike in table.equivalent])
     data["equivalence"] = np.array([np.isin(names, alike) for alike in table.equivalent], np.int8)
     if study.paired:
         data["accuracy_missed"] = _missed(run, table, true)
@@ -332,13 +323,10 @@ def write(
         "verification", coords, data, None, units, run.scene.objective, run.words
     )
     if "first_goal" in content:
-        each = (content.isel(design=row) for row in range(len(names)))
-        texts = np.array(["; ".join(worded(one)) for one in each])
-        content["constraints"].values = texts
         *others, last = names_of(study.cases[0], run.scene.objective.unit)
         asked = f"{', '.join(others)} and {last}" if others else last
         asked = "the objectives of its case" if len(study.cases) > 1 else asked
-        for name in ("same_as", "equivalent", "equivalence", "dominated"):
+        for name in ("equivalence", "dominated"):
             words = content[name].attrs["long_name"].replace("mean and standard deviation", asked)
             content[name].attrs["long_name"] = words
     content.attrs["confidence"] = study.verification.confidence

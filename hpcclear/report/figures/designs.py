@@ -121,8 +121,7 @@ def _verified(
     panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, *, all_designs: bool
 ) -> None:
     """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
-    for k in range(verification.sizes["design"]):
-        one = verification.isel(design=k)
+    for one in verification.each("design"):
         label, marker = _mark(one)
         if ("case" in one and str(one["case"].item()) != case) or not (
             all_designs or marker == "o"

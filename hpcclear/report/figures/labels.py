@@ -157,18 +157,6 @@ def words(variable: Variable) -> str:
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
 
 
-MEANINGS = {
-    "m1": "crank mass $m_1$",
-    "u1": "crank centre $u_1$",
-    "I1": "crank inertia $I_1$",
-    "m2": "rod mass $m_2$",
-    "u2": "rod centre $u_2$",
-    "I2": "rod inertia $I_2$",
-    "m3": "slider mass $m_3$",
-    "C": "clearance $C$",
-}
-"""Of the short names of a scene, for a variable that is what its short name says."""
-
 WIDE = 32
 """Letters of a line of an axis label: half a column."""
 
@@ -183,9 +171,9 @@ def axis(variable: Variable) -> str:
 
 def entry(path: str, words: str = "") -> str:
     """What an entry of a scene is called on an axis, by its path or short name and its words, where a file has some."""
-    short = DESIGN_VARIABLES.get(path, ("", ""))[1]
+    _, short, label = DESIGN_VARIABLES.get(path, ("", "", ""))
     if short and words in ("", short):
-        return MEANINGS.get(path, wrapped(short))
+        return label or wrapped(short)
     if words in ("", f"design variable {path}"):
         words = described([path]) if "." in path else path.replace("_", " ")
     return wrapped(words)

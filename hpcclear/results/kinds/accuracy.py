@@ -1,6 +1,6 @@
 """Errors against run time."""
 
-from hpcclear.results.rows import count, kind_of, number, text
+from hpcclear.results.rows import count, estimate, kind_of, number, text, with_error
 
 KIND = kind_of(
     180, "Accuracy against run time", ("integrator", "rung"),
@@ -26,9 +26,8 @@ KIND = kind_of(
         "spent_model": number(("tolerance", "spent"), "1",
             "relative error of f by the formula sqrt(bias^2 + variance/revolutions)", required=True),
         "spent_seconds": number(("tolerance", "spent"), "s", "core-seconds of a mean, transients included", required=True),
-        "tolerance_bias": number(("tolerance",), "1",
+        **with_error("tolerance_bias", ("tolerance",), "1",
             "bias of f relative to the mean of the tightest tolerances that agree", required=True),
-        "tolerance_bias_error": number(("tolerance",), "1", "standard error of the bias", required=True),
         "turn_variance": number(("tolerance",), "1",
             "relative variance of f per averaged revolution", required=True),
         "tolerance_seconds": number(("tolerance",), "s", "core-seconds of a revolution", required=True),
@@ -52,11 +51,8 @@ KIND = kind_of(
         "estimate": text(("estimate",), "source of the values: surrogate or simulations"),
         "moment": text(("moment",), "mean or standard deviation"),
         "draws": count(("draws",), "Monte Carlo sample size"),
-        "moment_error": number(("estimate", "moment", "draws"), "1", "RMS error of Monte Carlo, relative", required=True),
-        "moment_lower": number(("estimate", "moment", "draws"), "1",
-            "lower end of its 95 % confidence interval", required=True),
-        "moment_upper": number(("estimate", "moment", "draws"), "1",
-            "upper end of its 95 % confidence interval", required=True),
+        **estimate("moment", ("estimate", "moment", "draws"), "1", "RMS error of Monte Carlo, relative", "_error", "95 % ",
+            required=True),
         "moment_seconds": number(("estimate", "draws"), "s", "core-seconds of one Monte Carlo estimate", required=True),
         "moment_bias": number(("moment",), "1", "bias of the surrogate by quadrature, relative to simulations", required=True),
         "bias_error": number(("moment",), "1", "standard error of the bias", required=True),

@@ -16,7 +16,6 @@ KIND = kind_of(
             "standard deviation of the objective, by the surrogate", required=True),
         "verified": flag(("case", "run", "solution"), "whether the solution was simulated", "not_simulated simulated"),
         "hypervolume": number(("case", "run"), "objective^2", "area that the front dominates"),
-        "searched": text(("case",), "objectives of the case, if other than mean and standard deviation of f"),
         **{
             f"searched_{name}{end}": row
             for name in ORDINALS

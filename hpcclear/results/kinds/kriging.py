@@ -1,6 +1,6 @@
 """Surrogates, with all that a prediction takes."""
 
-from hpcclear.results.rows import count, fit, flag, kind_of, number, text
+from hpcclear.results.rows import count, flag, kind_of, number, text
 
 KIND = kind_of(
     50, "Kriging models of the objective", ("model", "point"),
@@ -24,6 +24,11 @@ KIND = kind_of(
         "output_scale": number(("model",), "objective", "standard deviation used as divisor before the fit"),
         "dropped": count(("model",), "number of failed samples left out of the fit"),
         "accepted": flag(("model",), "whether the model passed on its test points", "refused accepted"),
-        **fit("model"),
+        "r2": number(("model",), "1", "1 - SSE/SST on test points", required=True),
+        "rmae": number(("model",), "1", "largest test error / standard deviation of test values", required=True),
+        "r2_explained": number(("model",), "1", "explained variance ratio, eq. 26 as printed"),
+        "rmae_mean": number(("model",), "1", "largest test error / mean of test values, eq. 27 as printed"),
+        "rmse": number(("model",), "objective", "root mean square error on test points"),
+        "points": count(("model",), "number of points fitted"),
     },
 )

@@ -1,6 +1,6 @@
 """Designs of the paper under interpretations of its text."""
 
-from hpcclear.results.rows import count, kind_of, number, text
+from hpcclear.results.rows import count, kind_of, number, text, with_error
 
 KIND = kind_of(
     120, "Designs of the paper under interpretations of its text", ("reading", "design"),
@@ -9,10 +9,8 @@ KIND = kind_of(
         "design": text(("design",), "design of the paper, its Table 4"),
         "case": text(("design",), "case of the robust design"),
         "objective_smallest": number(("reading", "design"), "m", "objective at the smallest clearance", required=True),
-        "mean": number(("reading", "design"), "m", "mean of the objective, by simulation", required=True),
-        "mean_error": number(("reading", "design"), "m", "standard error of the preceding variable"),
-        "deviation": number(("reading", "design"), "m", "standard deviation of the objective", required=True),
-        "deviation_error": number(("reading", "design"), "m", "standard error of the preceding variable"),
+        **with_error("mean", ("reading", "design"), "m", "mean of the objective, by simulation", required=True),
+        **with_error("deviation", ("reading", "design"), "m", "standard deviation of the objective", required=True),
         "failed": count(("reading", "design"), "number of simulations that failed"),
         "mean_paper": number(("design",), "m", "mean as printed"),
         "deviation_paper": number(("design",), "m", "standard deviation as printed"),

@@ -1,6 +1,7 @@
 """Time series of one simulation, with its outcome."""
 
-from hpcclear.results.rows import by_revolution, kind_of, number, outcome, spectrum, text
+from hpcclear.base.outcome import IMPACTS
+from hpcclear.results.rows import estimate, kind_of, number, outcome, text
 
 KIND = kind_of(
     10, "Response of a mechanism with clearance joints", ("time",),
@@ -62,9 +63,16 @@ KIND = kind_of(
         "revolution": number(("revolution",), "1", "number of the averaged revolution"),
         "order": number(("order",), "1", "periods in a revolution"),
         "band": number(("band",), "Hz", "middle of the third-octave band"),
-        **by_revolution(),
-        **spectrum("contact_force", "contact force", "joint"),
-        **spectrum("frame_force", "force on the frame"),
+        **{
+            f"{name}_by_revolution": number(("revolution", *row.dims), row.units, f"{row.long_name}: of each")
+            for name, row in outcome().items() if name in IMPACTS
+        },
+        "contact_force_orders": number(("order", "joint"), "N", "root mean square of the order in the contact force"),
+        "frame_force_orders": number(("order",), "N", "root mean square of the order in the force on the frame"),
+        **estimate("contact_force_level", ("band", "joint"), "1",
+            "third-octave level of the contact force, dB re 1e-6 N; NaN of a band without an order", level="95 % "),
+        **estimate("frame_force_level", ("band",), "1",
+            "third-octave level of the force on the frame, dB re 1e-6 N; NaN of a band without an order", level="95 % "),
         "kinetic_energy": number(("time",), "J", "kinetic energy"),
         "elastic_energy": number(("time",), "J", "energy stored in the contacts"),
         "strain_energy": number(("time",), "J", "energy stored in bars that bend"),

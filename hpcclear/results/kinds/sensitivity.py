@@ -1,6 +1,6 @@
 """Slopes of response surfaces and Sobol indices."""
 
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import count, flag, kind_of, number, text, with_error
 
 KIND = kind_of(
     40, "Sensitivity of the objective against clearance", ("surface", "interval", "clearance", "parameter"),
@@ -35,14 +35,10 @@ KIND = kind_of(
         "surface_points": count(("surface", "clearance"), "points that the surface was fitted to"),
         "surface_terms": count(("surface", "clearance"), "number of terms of the surface; 0 if none was fitted"),
         "surface_accepted": flag(("surface", "clearance"), "whether the surface passed on its test points", "refused accepted"),
-        "mean_objective": number(("clearance",), "objective", "mean of the objective over the box"),
-        "mean_objective_error": number(("clearance",), "objective", "standard error of the preceding variable"),
-        "sobol_first": number(("parameter",), "1", "first-order Sobol index"),
-        "sobol_first_error": number(("parameter",), "1", "its standard error"),
-        "sobol_total": number(("parameter",), "1", "total Sobol index, without the share of chaotic scatter"),
-        "sobol_total_error": number(("parameter",), "1", "its standard error"),
-        "sobol_noise": number((), "1", "share of the variance over the ranges that is chaotic scatter, by perturbed runs"),
-        "sobol_noise_error": number((), "1", "its standard error"),
+        **with_error("mean_objective", ("clearance",), "objective", "mean of the objective over the box"),
+        **with_error("sobol_first", ("parameter",), "1", "first-order Sobol index"),
+        **with_error("sobol_total", ("parameter",), "1", "total Sobol index, without the share of chaotic scatter"),
+        **with_error("sobol_noise", (), "1", "share of the variance over the ranges that is chaotic scatter, by perturbations"),
         "influence": number(("parameter",), "objective", "mean effect; parameters are ranked by it"),
         "selected": flag(("parameter",), "whether the parameter is selected for its influence", "left_out selected"),
     },

@@ -1,7 +1,7 @@
 """Sums and histograms of samples that are not stored."""
 
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.results.rows import count, flag, kind_of, statistics_of, text
+from hpcclear.results.rows import count, flag, kind_of, number, text
 
 KIND = kind_of(
     130, "Statistics of many samples", ("bin",),
@@ -13,10 +13,24 @@ KIND = kind_of(
         "flags": flag(("flags",), "validity warning of a result", Flag),
         "samples_by_status": count(("outcome",), "number of samples with this outcome", required=True),
         "samples_by_flag": count(("flags",), "number of samples with this flag", required=True),
-        **statistics_of("objective", (), "objective", "objective"),
-        **statistics_of("objective_spread", (), "objective", "cycle-to-cycle standard deviation"),
-        **statistics_of("mean_gap", ("joint",), "m", "mean gap"),
-        **statistics_of("peak_contact_force", ("joint",), "N", "peak contact force"),
-        **statistics_of("rhs_evaluations", (), "1", "number of force evaluations"),
+        **{
+            f"{name}_{end}": row
+            for name, dims, units, words in (
+                ("objective", (), "objective", "objective"),
+                ("objective_spread", (), "objective", "cycle-to-cycle standard deviation"),
+                ("mean_gap", ("joint",), "m", "mean gap"),
+                ("peak_contact_force", ("joint",), "N", "peak contact force"),
+                ("rhs_evaluations", (), "1", "number of force evaluations"),
+            )
+            for end, row in {
+                "count": count(dims, f"number of finite values of the {words}", required=True),
+                "mean": number(dims, units, f"mean of the {words}", required=True),
+                "deviation": number(dims, units, f"sample standard deviation of the {words}", required=True),
+                "minimum": number(dims, units, f"least {words}", required=True),
+                "maximum": number(dims, units, f"greatest {words}", required=True),
+                "histogram": count((*dims, "bin"), f"number of samples by {words}", required=True),
+                "edges": number((*dims, "edge"), units, f"edges of the bins of the {words}", required=True),
+            }.items()
+        },
     },
 )

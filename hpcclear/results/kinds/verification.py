@@ -1,7 +1,7 @@
 """Designs verified by simulation."""
 
-from hpcclear.base.objectives import ORDINALS
-from hpcclear.results.rows import count, flag, goal, kind_of, number, text
+from hpcclear.base.objectives import ORDINALS, Usual
+from hpcclear.results.rows import count, estimate, flag, kind_of, number, text, with_error
 
 KIND = kind_of(
     70, "Simulated designs with confidence intervals", ("design",),
@@ -9,29 +9,17 @@ KIND = kind_of(
     table={
         "design": text(("design",), "name of the design"),
         "case": text(("design",), "case of the robust design"),
-        "mean_true": number(("design",), "objective", "mean of the objective, by simulation", required=True),
-        "mean_lower": number(("design",), "objective", "lower end of the confidence interval of the mean"),
-        "mean_upper": number(("design",), "objective", "upper end of the confidence interval of the mean"),
+        **estimate("mean", ("design",), "objective", "mean of the objective, by simulation", "_true", required=True),
         "mean_surrogate": number(("design",), "objective", "mean of the objective, by the surrogate"),
         "mean_error": number(("design",), "1", "error of the mean by the surrogate, relative to the simulated mean"),
         "mean_paper": number(("design",), "m", "mean as printed in the paper, its Table 4"),
-        "deviation_true": number(("design",), "objective", "standard deviation, by simulation", required=True),
-        "deviation_lower": number(("design",), "objective", "lower end of the confidence interval of the standard deviation"),
-        "deviation_upper": number(("design",), "objective", "upper end of the confidence interval of the standard deviation"),
+        **estimate("deviation", ("design",), "objective", "standard deviation, by simulation", "_true", required=True),
         "deviation_surrogate": number(("design",), "objective", "standard deviation, by the surrogate"),
         "deviation_error": number(("design",), "1", "error of the standard deviation by the surrogate, relative"),
         "deviation_paper": number(("design",), "m", "standard deviation as printed in the paper, its Table 4"),
-        "percentile": number(("design",), "objective", "95th percentile of the objective, by simulation"),
-        "percentile_lower": number(("design",), "objective", "lower end of the confidence interval of the percentile"),
-        "percentile_upper": number(("design",), "objective", "upper end of the confidence interval of the percentile"),
-        "life_mean": number(("design",), "objective", "mean of the objective over service lives and ages"),
-        "life_mean_lower": number(("design",), "objective", "lower end of its confidence interval"),
-        "life_mean_upper": number(("design",), "objective", "upper end of its confidence interval"),
-        "life_deviation": number(("design",), "objective", "standard deviation of the objective over service lives and ages"),
-        "life_deviation_lower": number(("design",), "objective", "lower end of its confidence interval"),
-        "life_deviation_upper": number(("design",), "objective", "upper end of its confidence interval"),
-        "same_as": text(("design",), "earlier design that is statistically indistinguishable in mean and standard deviation"),
-        "equivalent": text(("design",), "designs of its case, statistically indistinguishable in mean and standard deviation"),
+        **estimate("percentile", ("design",), "objective", "95th percentile of the objective, by simulation"),
+        **estimate("life_mean", ("design",), "objective", "mean of the objective over service lives and ages"),
+        **estimate("life_deviation", ("design",), "objective", "standard deviation over service lives and ages"),
         "rival": text(("rival",), "name of another design"),
         "equivalence": flag(("design", "rival"),
             "whether two designs of a case are statistically indistinguishable in mean and standard deviation",
@@ -43,19 +31,27 @@ KIND = kind_of(
         "mean_within": number(("design",), "1",
             "relative half-width of the confidence interval of the mean, error of the tolerance included"),
         "deviation_within": number(("design",), "1", "the same of the standard deviation"),
-        "mean_tolerance": number(("design",), "1",
+        **with_error("mean_tolerance", ("design",), "1",
             "relative bias of the mean by the integration tolerance, from pairs at a tighter one; part of mean_within"),
-        "mean_tolerance_error": number(("design",), "1", "its standard error; part of mean_within"),
-        "deviation_tolerance": number(("design",), "1", "relative bias of the standard deviation by the integration tolerance"),
-        "deviation_tolerance_error": number(("design",), "1", "its standard error"),
-        **{name: row for place in ORDINALS for name, row in goal(place).items()},
-        "constraints": text(("design",), "the constraints of its case and the verdicts on them, in words"),
+        **with_error("deviation_tolerance", ("design",), "1",
+            "relative bias of the standard deviation by the integration tolerance"),
+        **{
+            f"{place}_{end}": row
+            for place in ORDINALS
+            for end, row in {
+                "goal": text(("design",), f"{place} objective of the case, in words"),
+                "unit": text(("design",), f"{place} objective of the case: unit, empty for none"),
+                "usual": flag(("design",), f"{place} objective of the case: whether it is reported of every design", Usual),
+            }.items()
+        },
+        **{
+            name: row for place in ORDINALS
+            for name, row in estimate(place, ("design",), "", f"{place} objective of the case, by simulation", "_true").items()
+        },
         "constraint": count(("constraint",), "number of the constraint in its case"),
         "constraint_goal": text(("design", "constraint"), "quantity of the constraint, in words; empty for none"),
         "constraint_unit": text(("design", "constraint"), "unit of that quantity, empty for none"),
-        "constraint_true": number(("design", "constraint"), "", "that quantity, by simulation"),
-        "constraint_lower": number(("design", "constraint"), "", "that quantity: lower end of its confidence interval"),
-        "constraint_upper": number(("design", "constraint"), "", "that quantity: upper end of its confidence interval"),
+        **estimate("constraint", ("design", "constraint"), "", "that quantity, by simulation", "_true"),
         "constraint_most": number(("design", "constraint"), "", "largest allowed value of that quantity"),
         "constraint_verdict": flag(("design", "constraint"),
             "whether the design satisfies the constraint, significantly over all designs and looks",

@@ -2,7 +2,7 @@
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import count, estimate, flag, kind_of, number, text
 
 KIND = kind_of(
     140, "Service lives of a mechanism with wear", ("life", "cycle"), design_dims=("life",), optional=("angle",), alone=True,
@@ -53,12 +53,9 @@ KIND = kind_of(
         "lifetime_quantile": number(("quantile",), "1",
             "quantiles of the service life; infinite if not reached", required=True),
         "lifetime_hours_quantile": number(("quantile",), "h", "the same at the drive's nominal speed"),
-        "survival": number(("cycle",), "1", "share of service lives that have not ended", required=True),
-        "survival_lower": number(("cycle",), "1", "lower end of the 95 % confidence interval of the survival", required=True),
-        "survival_upper": number(("cycle",), "1", "upper end of the 95 % confidence interval of the survival", required=True),
-        "exceedance": number(("cycle", "joint"), "1", "share of service lives whose clearance is above its limit"),
-        "exceedance_lower": number(("cycle", "joint"), "1", "lower end of its 95 % confidence interval"),
-        "exceedance_upper": number(("cycle", "joint"), "1", "upper end of its 95 % confidence interval"),
+        **estimate("survival", ("cycle",), "1", "share of service lives that have not ended", level="95 % ", required=True),
+        **estimate("exceedance", ("cycle", "joint"), "1",
+            "share of service lives whose clearance is above its limit", level="95 % "),
         "rank_correlation": number(("random_input", "joint"), "1",
             "rank correlation of the growth of the clearance per revolution with the random input", required=True),
     },
