@@ -273,9 +273,11 @@ def _weights(time: Array) -> Array:
 
 def _projected_areas(response: Results) -> dict[str, float]:
     """2 R_B L of each joint whose length the scene gives, m^2."""
-    scene, areas = _scene_in(str(response.attrs.get("scene"))), {}
-    for joint in () if scene is None else scene.pins():
-        one = scene.pin(joint)
-        if (path := length_path(one)) is not None:
-            areas[joint] = 2.0 * one.bearing_radius * float(attrgetter(path)(one))
-    return areas
+    if (scene := _scene_in(str(response.attrs.get("scene")))) is None:
+        return {}
+    pins = {joint: scene.pin(joint) for joint in scene.pins()}
+    lengths = {joint: path for joint, one in pins.items() if (path := length_path(one)) is not None}
+    return {
+        joint: 2.0 * pins[joint].bearing_radius * float(attrgetter(path)(pins[joint]))
+        for joint, path in lengths.items()
+    }
