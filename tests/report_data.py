@@ -7,7 +7,7 @@ import numpy as np
 import opened
 import xarray as xr
 
-from hpcclear.base.outcome import OUTCOME, Flag, Status
+from hpcclear.base.outcome import JOINTS, OUTCOME, Flag, Status
 from hpcclear.base.verdict import Verdict
 from hpcclear.results import dataset
 from hpcclear.results.provenance import provenance
@@ -313,7 +313,8 @@ def timing(ranks: int = 2) -> xr.Dataset:
     data = {"busy": busy, "idle": 0.1 * busy + 0.2, "compile": 0.2 * busy, "write": 0.01 * busy}
     data["samples"] = np.array([[260, 0], [252, 0]])[:ranks]
     command = "mpiexec -n 2 hpcclear run jobs/<i>x</i>.toml -o results/x"
-    return dataset.timing_dataset(["samples", "kriging"], data, command, ATTRIBUTES).to_xarray()
+    coords = {"rank": np.arange(ranks), "stage": ["samples", "kriging"]}
+    return dataset.dataset("timing", coords, {**data, "command": command}, ATTRIBUTES).to_xarray()
 
 
 def response(revolutions: int = 4, clearance: float = 3e-4, instants: int = 200) -> xr.Dataset:
@@ -356,7 +357,8 @@ def response(revolutions: int = 4, clearance: float = 3e-4, instants: int = 200)
         "status": 0,
         "flags": 0,
     }
-    return dataset.response_content(angle / speed, data, ATTRIBUTES).to_xarray()
+    coords = {"time": angle / speed, "joint": JOINTS}
+    return dataset.dataset("response", coords, data, ATTRIBUTES).to_xarray()
 
 
 def write_study(directory: Path) -> Path:

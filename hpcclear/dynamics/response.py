@@ -196,17 +196,16 @@ def _response(
         )
     reported = {name: record[name][0] for name in names}
     counted = {name: data.pop(name) for name in _COUNTED if name in data}
-    return dataset.response_content(
-        times,
+    return dataset.dataset(
+        "response",
+        {"time": times, "joint": labels, **_dimensions(scene), **counted},
         {**data, **reported},
         provenance(named.text or named.to_toml(), named.hash, named.references)
         | recorded(named, record)
         | {"integrator": integrator_of(scene)}
         | _kept(scene)
         | _reason(scene, data),
-        objective,
-        labels,
-        {**(_dimensions(scene) or {}), **counted},
+        objective=objective,
     )
 
 
@@ -214,7 +213,7 @@ _COUNTED = ("revolution", "order", "band")
 """Coordinates of measures of impact and noise."""
 
 
-def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
+def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]]:
     """Labels along what a linkage's series have besides time and joints."""
     found = planar_labels(scene, linkage_of(scene).mechanism)
     if scene.modes:
@@ -223,7 +222,7 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]] | None:
         found["guide"] = scene.guides()
     if not scene.modes:
         found["pin"] = pins_of(linkage_of(scene).mechanism)
-    return found or None
+    return found
 
 
 def _kept(scene: Scene) -> dict[str, str | int]:

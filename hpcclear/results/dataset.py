@@ -114,11 +114,14 @@ def dataset(
     fixed = {"Conventions": CONVENTIONS, "title": table.title, "hpcclear_kind": kind}
     if objective.words != MEAN_GAP.words:
         fixed["objective"] = objective.words
+    if "objective_uncertainty" in table.data:
+        fixed["objective_half_width"] = _half_width(data)
     return Results(variables, {**fixed, **(attributes or {})})
 
 
 def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> Variable:
-    array = np.asarray(values)
+    words = row.dtype == "text" and not isinstance(values, np.ndarray)
+    array = np.array(values, str) if words else np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
     if array.shape != expected:
         raise ValueError(f"{name} has shape {array.shape}, not {expected} {row.dims}")
@@ -247,21 +250,20 @@ def samples_dataset(
     data |= {name: records[name] for name in kept}
     if len(labels):
         data["label"] = np.array(labels, dtype=str)[order]
-    coords = {"sample": records["sample"], "joint": np.array(joints, dtype=str)}
+    coords: dict[str, ArrayLike] = {"sample": records["sample"], "joint": joints}
     if "sliding_waves" in kept:
         coords["wave"] = np.arange(WAVE_ROWS)
     if len(bands):
         coords["band"] = bands
-    attrs = {**(attributes or {}), **_checked(data)}
-    return dataset("samples", coords, data, attrs, units, objective, words)
+    return dataset("samples", coords, data, attributes, units, objective, words)
 
 
-def _checked(data: Mapping[str, ArrayLike]) -> dict[str, str]:
-    """The global attribute that says where the half-width of the objective stands, or that there is none."""
+def _half_width(data: Mapping[str, ArrayLike]) -> str:
+    """Where the half-width of the objective stands, or that there is none."""
     for name in ("objective_limit", "objective_uncertainty"):
         if np.isfinite(np.asarray(data.get(name, np.nan), float)).any():
-            return {"objective_half_width": name}
-    return {"objective_half_width": NOT_CHECKED}
+            return name
+    return NOT_CHECKED
 
 
 def _bands_of(records: np.ndarray) -> np.ndarray:
@@ -284,38 +286,6 @@ def records(samples: Results) -> np.ndarray:
         heard = np.isfinite(found["contact_force_level"]).any(axis=(1, 2))
         found["band"][~heard] = np.nan  # of failed samples
     return found
-
-
-def response_content(
-    time: ArrayLike,
-    data: Mapping[str, ArrayLike],
-    attributes: Mapping[str, object] | None = None,
-    objective: Objective = MEAN_GAP,
-    joints: Sequence[str] = JOINTS,
-    linkage: Mapping[str, Sequence[str] | np.ndarray] | None = None,
-) -> Results:
-    """One response: series of shape (t,), (t, joints), scalars, values of shape (joints,) at the joints.
-
-    `linkage`: labels or numbers along further dimensions, of what has these.
-    """
-    coords = {"time": time, "joint": np.array(joints, dtype=str)}
-    coords |= {
-        name: words if isinstance(words, np.ndarray) else np.array(words, dtype=str)
-        for name, words in (linkage or {}).items()
-    }
-    attrs = {**(attributes or {}), **_checked(data)}
-    return dataset("response", coords, data, attrs, objective=objective)
-
-
-def timing_dataset(
-    stages: Sequence[str],
-    data: Mapping[str, ArrayLike],
-    command: str,
-    attributes: Mapping[str, object] | None = None,
-) -> Results:
-    """Where the time went: arrays of shape (ranks, stages) in seconds; kind ``timing``."""
-    coords = {"rank": np.arange(np.shape(data["busy"])[0]), "stage": np.array(stages, dtype=str)}
-    return dataset("timing", coords, {**data, "command": command}, attributes)
 
 
 # -----------------------------------------------------------------------------------------------

@@ -59,15 +59,12 @@ class Signal:
     name: str
     label: str
     """Its words, for an axis: "contact force of crank_rod"."""
+    unit: str
+    """SI unit."""
     time: Array
-    series: Variable
+    series: Array
     """Of the response (t,): the signal, or what it is made of."""
     derived: Derived | None = None
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
-        return str(self.series.attrs["units"]) if self.derived is None else self.derived.unit
 
     @property
     def counted(self) -> bool:
@@ -77,8 +74,7 @@ class Signal:
     @property
     def values(self) -> Array:
         """Values (t,), SI."""
-        values = self.series.to_numpy()
-        return values if self.derived is None else self.derived.made(self.time, values)
+        return self.series if self.derived is None else self.derived.made(self.time, self.series)
 
 
 def is_counted(name: str) -> bool:
@@ -96,13 +92,15 @@ def signals_in(response: Results) -> dict[str, Signal]:
         others = [dim for dim in variable.dims if dim != "time"]
         if "time" not in variable.dims or len(others) > 1:
             return
-        if not others:
-            found[name] = Signal(name, label, time, variable, derived)
-        for k, place in enumerate(variable.labels[others[0]]) if others else ():
-            one = variable.isel({others[0]: k})
-            key = f"{name} {place}"
-            found[key] = Signal(key, f"{label} of {place}", time, one, derived)
-            if variable.shape[variable.dims.index(others[0])] == 1:
+        unit = str(variable.attrs["units"]) if derived is None else derived.unit
+        places = variable.labels[others[0]] if others else [""]
+        for place, series in zip(
+            places, variable.values.reshape(len(time), len(places)).T, strict=True
+        ):
+            key = f"{name} {place}" if others else name
+            words = f"{label} of {place}" if others else label
+            found[key] = Signal(key, words, unit, time, series, derived)
+            if len(places) == 1:
                 found[name] = found[key]
 
     for name, variable in response.data_vars.items():

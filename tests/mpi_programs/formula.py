@@ -14,7 +14,7 @@ import last_bits
 import numpy as np
 
 from hpcclear.base.objectives import asked
-from hpcclear.base.outcome import Status, failed
+from hpcclear.base.outcome import JOINTS, Status, failed
 from hpcclear.ensemble import compiling, simulate, single
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
@@ -194,7 +194,8 @@ def respond(scene: Scene, copy: int = 0, *, checked: bool = True):
     data = {**series, "crank_angle": angle, "contact_force": pair}
     data |= {"eccentricity_x": 1e-4 * pair, "eccentricity_y": 0 * pair}
     scalars = {"objective": size, "objective_spread": 0.0, "rhs_evaluations": 7, "status": 0}
-    return dataset.response_content(angle / 523.0, data | scalars, objective=scene.objective)
+    coords = {"time": angle / 523.0, "joint": JOINTS}
+    return dataset.dataset("response", coords, data | scalars, objective=scene.objective)
 
 
 def respond_together(scenes: Sequence[Scene], copies: Sequence[int]):

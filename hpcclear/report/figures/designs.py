@@ -188,22 +188,20 @@ def _bars(one: Results, name: str, unit: labels.Scale) -> np.ndarray | None:
 
 
 @style.drawn
-def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) -> "style.Figure":
-    """Responses of optimised designs beside the baseline design's, α left and β right (the paper's Fig. 10), further ends
-    behind them.
+def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
+    """Responses over the last two revolutions of optimised designs beside the baseline design's, α left and β right (the
+    paper's Fig. 10), further ends behind them.
 
     Parameters
     ----------
     responses : mapping of str to xarray.Dataset
         Kind ``response``, by the name of the design: names with ``alpha`` go left, with ``beta`` right, names without an
         end are drawn in all columns as what to compare with.
-    revolutions : int
-        The last ones are drawn.
 
     Raises
     ------
     InputError
-        No response at all, or one with fewer revolutions.
+        No response at all.
     """
     if not responses:
         reason = "there is no response to draw"
@@ -212,7 +210,7 @@ def comparison_figure(responses: Mapping[str, Results], revolutions: int = 2) ->
     quantities = motion.quantities(next(iter(responses.values())))
     height = 24.0 + 33.0 * len(quantities)
     figure, axes = style.grid(len(quantities), len(columns), height, sharex=True, sharey="row")
-    shown = {name: motion.latest(response, revolutions) for name, response in responses.items()}
+    shown = {name: motion.latest(response) for name, response in responses.items()}
     order = sorted(responses, key=lambda name: (end_of(name) != "", name))
     kinds = list(dict.fromkeys(_kind(name) for name in order))
     for line, (name, joint, words) in zip(axes, quantities, strict=True):

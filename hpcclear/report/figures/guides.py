@@ -38,15 +38,9 @@ def touches(response: Results) -> list[Touch]:
 
 
 @style.drawn
-def guide_figure(response: Results, revolutions: int = 2) -> "style.Figure":
-    """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last revolutions.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    revolutions : int
-        How many; fewer if the response has fewer.
+def guide_figure(response: Results) -> "style.Figure":
+    """Offset and tilt of sliders in guides with clearance, and when their corners touch, over the last two revolutions of a
+    response (kind ``response``).
 
     Raises
     ------
@@ -58,7 +52,7 @@ def guide_figure(response: Results, revolutions: int = 2) -> "style.Figure":
             "guide", "", "no guide of this mechanism has clearance",
             "Give a slide a clearance, length, height and corner_radius",
         )  # fmt: skip
-    shown = motion.latest(response, revolutions)
+    shown = motion.latest(response)
     turn, guides = motion.turns(shown), [str(name) for name in shown["guide"].to_numpy()]
     figure, axes = style.grid(3, 1, 110.0, sharex=True)
     for panel, name in zip(axes[:2, 0], ("guide_offset", "guide_tilt"), strict=True):

@@ -25,8 +25,6 @@ _EXPONENT = "largest Lyapunov exponent\nper revolution"
 def map_figure(content: Results) -> "style.Figure":
     """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval.
 
-    Of a dataset that `hpcclear map` wrote.
-
     Raises
     ------
     InputError
@@ -123,13 +121,8 @@ def bifurcation_figure(content: Results) -> "style.Figure":
     x = np.repeat(varied, content.sizes["crossing"])
     unit, panel = labels.of(content["observed"]), axes[0, 0]
     size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
-    look: style.Look = {
-        "ms": size,
-        "mew": 0.0,
-        "color": style.PALETTE["blue"],
-        "rasterized": len(x) > 5000,
-    }
-    panel.plot(x, unit(content["observed"]).ravel(), ".", **look)
+    look: style.Look = {"ms": size, "mew": 0.0, "color": style.PALETTE["blue"]}
+    panel.plot(x, unit(content["observed"]).ravel(), ".", rasterized=len(x) > 5000, **look)
     words = unit.label(str(content["observed"].attrs["long_name"]))
     panel.set(xlabel=across, ylabel="\n".join(textwrap.wrap(words, 30)))
     return figure

@@ -54,7 +54,7 @@ def _passages(response: Results) -> tuple[int, int]:
     return int(np.ceil(angle[0] - slack)), int(np.floor(angle[-1] + slack))
 
 
-def latest(response: Results, revolutions: int) -> Results:
+def latest(response: Results, revolutions: int = 2) -> Results:
     """The last whole revolutions; all there is of a response that ended in the first."""
     whole = whole_turns(response)
     return steady(response, min(revolutions, whole)) if whole > 0 else response

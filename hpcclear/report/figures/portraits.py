@@ -14,17 +14,10 @@ _FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
 
 
 @style.drawn
-def orbit_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
-    """Orbit of the journal centres in the clearance circle, contact distinguished from free flight.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    revolutions : int, optional
-        The last ones are drawn; half of all by default.
-    """
-    shown = motion.of_pins(motion.steady(response, revolutions))
+def orbit_figure(response: Results) -> "style.Figure":
+    """Orbit of the journal centres in the clearance circle, contact distinguished from free flight, over the later half of the
+    revolutions of a response (kind ``response``)."""
+    shown = motion.of_pins(motion.steady(response))
     joints = motion.joints(shown)
     figure, axes = style.grid(len(joints), 1, 85.0 * len(joints))
     unit = labels.scale("m", motion.eccentricity(shown))
@@ -46,9 +39,9 @@ def orbit_figure(response: Results, revolutions: int | None = None) -> "style.Fi
 
 
 @style.drawn
-def force_polar_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
-    """Contact force over its direction in the fixed frame; parameters as for `orbit_figure`."""
-    shown = motion.steady(response, revolutions)
+def force_polar_figure(response: Results) -> "style.Figure":
+    """Contact force over its direction in the fixed frame, over the same revolutions as `orbit_figure`."""
+    shown = motion.steady(response)
     joints = motion.joints(shown)
     polar = {"projection": "polar"}
     figure, axes = style.grid(len(joints), 1, 82.5 * len(joints), subplot_kw=polar)
@@ -60,13 +53,7 @@ def force_polar_figure(response: Results, revolutions: int | None = None) -> "st
         radius = force(shown["contact_force"].sel(joint=joint))
         contact = radius > 0.0
         colour = np.mod(turn, 1.0)[contact] * 360.0
-        look: style.Look = {
-            "s": 3.0,
-            "cmap": _cyclic(),
-            "vmin": 0.0,
-            "vmax": 360.0,
-            "linewidths": 0,
-        }
+        look: style.Look = {"s": 3.0, "cmap": _cyclic(), "vmin": 0.0, "vmax": 360.0, "lw": 0}
         drawn = panel.scatter(np.arctan2(y, x)[contact], radius[contact], c=colour, **look)
         panel.set_title(joints[joint])
         panel.set_rlabel_position(112.5)
@@ -77,14 +64,14 @@ def force_polar_figure(response: Results, revolutions: int | None = None) -> "st
 
 
 @style.drawn
-def phase_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
+def phase_figure(response: Results) -> "style.Figure":
     """Phase portraits: velocity of the slider over its position, acceleration over velocity.
 
-    Of a linkage, speed of its last body over its angle or place. Parameters as for `orbit_figure`.
+    Of a linkage, speed of its last body over its angle or place. Over the same revolutions as `orbit_figure`.
     """
     from matplotlib.collections import LineCollection
 
-    shown = motion.steady(response, revolutions)
+    shown = motion.steady(response)
     position, velocity = motion.followed(shown)
     pairs = [(position, velocity)]
     if "slider_acceleration" in shown:
@@ -111,22 +98,12 @@ def _bar(figure: "style.Figure", drawn: Any, panels: Any, words: str) -> Any:
 
 
 @style.drawn
-def poincare_figure(
-    response: Results, phase: float = 0.0, revolutions: int | None = None
-) -> "style.Figure":
-    """Poincaré section: output (slider, or a linkage's last body) and journal centres once a revolution, at one crank angle.
+def poincare_figure(response: Results, revolutions: int | None = None) -> "style.Figure":
+    """Poincaré section of a response (kind ``response``): output (slider, or a linkage's last body) and journal centres once a
+    revolution, at crank angle 0, over the last `revolutions`, half of all by default.
 
     A periodic motion is one point, a motion of period n is n points, anything else a cloud; the more revolutions
     the response has, the more it says.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    phase : float
-        Crank angle of the section, rad.
-    revolutions : int, optional
-        The last ones are used; half of all by default.
     """
     shown = motion.steady(response, revolutions)
     figure = style.page(118.0)
@@ -135,21 +112,15 @@ def poincare_figure(
     top = figure.add_subplot(cells[0, :])
     output = motion.followed(shown)
     x, y = (labels.of(one) for one in output)
-    position, velocity = (labels.of(one)(motion.section(shown, one, phase)) for one in output)
+    position, velocity = (labels.of(one)(motion.section(shown, one)) for one in output)
     order = np.arange(1, len(position) + 1)
-    options: style.Look = {
-        "c": order,
-        "cmap": style.COLOURS,
-        "s": 10.0,
-        "linewidths": 0,
-        "zorder": 3,
-    }
+    options: style.Look = {"c": order, "cmap": style.COLOURS, "s": 10.0, "lw": 0, "zorder": 3}
     drawn = top.scatter(position, velocity, **options)
     top.set(xlabel=x.label(labels.axis(output[0])), ylabel=y.label(labels.axis(output[1])))
-    top.set_title(f"{len(order)} crossings of crank angle {np.degrees(phase):g}°")
+    top.set_title(f"{len(order)} crossings of crank angle 0°")
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = unit(motion.clearances(shown))
-    across, up = (unit(motion.section(shown, f"eccentricity_{c}", phase)) for c in "xy")
+    across, up = (unit(motion.section(shown, f"eccentricity_{c}")) for c in "xy")
     panels = [figure.add_subplot(cells[1, joint]) for joint in range(len(joints))]
     reach = 1.08 * np.nanmax([*clearances, *np.abs(np.ravel([across, up]))])
     for joint, panel in enumerate(panels):

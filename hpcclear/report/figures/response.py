@@ -20,17 +20,10 @@ def _curve(row: int) -> dict[str, Any]:
 
 
 @style.drawn
-def response_figure(response: Results, revolutions: int = 2) -> "style.Figure":
-    """Slider motion, where there is a slider, contact forces and torque of the drive over the last revolutions.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        Kind ``response``.
-    revolutions : int
-        How many; fewer if the response has fewer.
-    """
-    shown = motion.latest(response, revolutions)
+def response_figure(response: Results) -> "style.Figure":
+    """Slider motion, where there is a slider, contact forces and torque of the drive over the last two revolutions of a
+    response (kind ``response``)."""
+    shown = motion.latest(response)
     moved = (f"slider_{word}" for word in ("position", "velocity", "acceleration"))
     names = [name for name in (*moved, "contact_force", "crank_moment") if name in shown]
     figure, axes = style.grid(len(names), 1, 28.0 * len(names), sharex=True)
@@ -50,9 +43,9 @@ def response_figure(response: Results, revolutions: int = 2) -> "style.Figure":
 
 
 @style.drawn
-def penetration_figure(response: Results, revolutions: int = 2) -> "style.Figure":
-    """Penetration of the joints over the last revolutions; parameters as for `response_figure`."""
-    shown = motion.latest(response, revolutions)
+def penetration_figure(response: Results) -> "style.Figure":
+    """Penetration of the joints over the last two revolutions of a response (kind ``response``)."""
+    shown = motion.latest(response)
     joints = motion.joints(shown)
     figure, axes = style.grid(len(joints), 1, 40.0 * len(joints), sharex=True, sharey=True)
     unit = labels.of(shown["penetration"])
@@ -72,10 +65,8 @@ def penetration_figure(response: Results, revolutions: int = 2) -> "style.Figure
 
 @style.drawn
 def energy_figure(response: Results) -> "style.Figure":
-    """Energy balance: work of drive and loads and dissipated energy since the start, stored energy, and the residual.
-
-    Of a dataset of kind ``response``.
-    """
+    """Energy balance of a response (kind ``response``): work of drive and loads and dissipated energy since the start, stored
+    energy, and the residual."""
     figure, axes = style.grid(3, 1, 120.0, sharex=True, height_ratios=[1.2, 1.2, 0.8])
     turn = motion.turns(response)
     balances = {

@@ -13,9 +13,8 @@ from hpcclear.results.content import Results, Variable
 
 @style.drawn
 def samples_figure(samples: Results) -> "style.Figure":
-    """Objective against every design variable, coloured by clearance; its spread, histogram and failures.
-
-    Of a dataset of kind ``samples``.
+    """Objective of samples (kind ``samples``) against every design variable, coloured by clearance; its spread, histogram and
+    failures.
 
     Raises
     ------
@@ -115,14 +114,14 @@ def _cloud(axes: "style.Axes", variable: Variable, result: Variable, colour: Arr
     return drawn
 
 
-def binned(x: Array, y: Array, bins: int = 12) -> tuple[Array, Array]:
+def binned(x: Array, y: Array) -> tuple[Array, Array]:
     """Middles of bins of equal width and the median of y in them, from x and y of shape (n,).
 
     Bins of fewer than five points are left out.
     """
     if len(x) < 10 or not np.ptp(x) > 0.0:
         return np.zeros(0), np.zeros(0)
-    edges = np.linspace(x.min(), x.max(), min(bins, len(x) // 5) + 1)
+    edges = np.linspace(x.min(), x.max(), min(12, len(x) // 5) + 1)
     place = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
     full = [k for k in range(len(edges) - 1) if (place == k).sum() >= 5]
     middle = 0.5 * (edges[1:] + edges[:-1])

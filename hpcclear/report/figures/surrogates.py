@@ -16,12 +16,10 @@ if TYPE_CHECKING:
 
 @style.drawn
 def sensitivity_figure(sensitivity: Results) -> "style.Figure":
-    """Sensitivities against clearance, a panel for each response surface (the paper's Fig. 5, curves).
+    """Sensitivities (kind ``sensitivity``) against clearance, a panel for each response surface (the paper's Fig. 5, curves).
 
     Lines and bands: the global interval with two standard errors. Marks with bars: where the sensitivity stopped
     changing and is determined, with its uncertainty.
-
-    Of a dataset of kind ``sensitivity``.
     """
     surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
     rows = (len(surfaces) + 1) // 2
@@ -71,10 +69,7 @@ def _sensitivity_panel(
 
 @style.drawn
 def fit_figure(sensitivity: Results) -> "style.Figure":
-    """Fit of the response surfaces against clearance, a curve for each interval (the paper's Fig. 7).
-
-    Of a dataset of kind ``sensitivity``.
-    """
+    """Fit of the response surfaces (kind ``sensitivity``) against clearance, a curve for each interval (the paper's Fig. 7)."""
     surfaces = [str(name) for name in sensitivity["surface"].to_numpy()]
     figure, axes = style.grid(len(surfaces), 2, 24.0 + 36.0 * len(surfaces), sharex=True)
     across = labels.of(sensitivity["clearance"])
@@ -85,12 +80,7 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
         for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
             for k, interval in enumerate(intervals):
                 values = sensitivity[name].sel(surface=surface).isel(interval=k).to_numpy()
-                look: style.Look = {
-                    "color": colours[k],
-                    "marker": style.MARKERS[k % 7],
-                    "ms": 2.2,
-                    "lw": 0.7,
-                }
+                look = {**style.look(k), "color": colours[k], "ls": "-", "ms": 2.2, "lw": 0.7}
                 panel.plot(clearance, values, label=f"{interval:.0%}", **look)
             panel.set_ylabel(label)
         line[0].set_title(f"surface in {_surface(surface)}")
@@ -110,12 +100,7 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
 
 @style.drawn
 def sobol_figure(sensitivity: Results) -> "style.Figure":
-    """Global sensitivity: first-order and total Sobol indices with two standard errors.
-
-    Parameters
-    ----------
-    sensitivity : xarray.Dataset
-        Kind ``sensitivity``, with Sobol indices.
+    """Global sensitivity (kind ``sensitivity``): first-order and total Sobol indices with two standard errors.
 
     Raises
     ------
@@ -144,16 +129,15 @@ def sobol_figure(sensitivity: Results) -> "style.Figure":
     return figure
 
 
+LEVELS = 24
+"""Steps of the colour scale of predictions."""
+
+
 @style.drawn
-def surfaces_figure(kriging: Results, levels: int = 24) -> "style.Figure":
+def surfaces_figure(kriging: Results) -> "style.Figure":
     """Objective over pairs of design variables at the least and the largest clearance (the paper's Fig. 5, surfaces).
 
-    Parameters
-    ----------
-    kriging : xarray.Dataset
-        Kind ``kriging``; its models of two variables and the clearance are drawn.
-    levels : int
-        Steps of the colour scale.
+    Of a file of kind ``kriging`` the models of two variables and the clearance are drawn.
 
     Raises
     ------
@@ -173,7 +157,7 @@ def surfaces_figure(kriging: Results, levels: int = 24) -> "style.Figure":
     fields = [_fields(model, model.names.index(name)) for model in shown.values()]
     unit = labels.scale("m", np.concatenate([np.ravel(z) for _, _, z, _ in fields]))
     finite = [unit(z[np.isfinite(z)]) for _, _, z, _ in fields]
-    edges = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), levels + 1)
+    edges = np.linspace(min(map(np.min, finite)), max(map(np.max, finite)), LEVELS + 1)
     by_path = {str(v.attrs["scene_path"]): v for v in labels.design_variables(kriging)}
     across = labels.of(by_path[name])
     known = fits.of_models(kriging)
@@ -213,15 +197,10 @@ def _fields(model: "Piecewise", main: int) -> tuple[Any, Any, Any, Any]:
 
 @style.drawn
 def parity_figure(kriging: Results) -> "style.Figure":
-    """Surrogate against dynamics, every model (the paper's Figs. 6 and 8).
+    """Surrogate against dynamics, every model of a file of kind ``kriging`` (the paper's Figs. 6 and 8).
 
     Each point is predicted by the model without that point, so that no point is judged by itself; R2 on the test
     points of the study stands in the titles.
-
-    Parameters
-    ----------
-    kriging : xarray.Dataset
-        Kind ``kriging``.
     """
     from hpcclear.statistics.surrogate.stored import models_in  # loads the compiler
 

@@ -9,10 +9,7 @@ from hpcclear.results.content import Results
 
 @style.drawn
 def timing_figure(timing: Results) -> "style.Figure":
-    """How every rank spent its time, and how much of it each stage took.
-
-    Of a dataset of kind ``timing``.
-    """
+    """How every rank spent its time, and how much of it each stage took (kind ``timing``)."""
     shown = min(timing.sizes["rank"], 64), timing.sizes["stage"]
     sizes = [max(3, size) for size in shown]
     figure, axes = style.grid(2, 1, 40.0 + 5.0 * sum(sizes), height_ratios=sizes)

@@ -10,10 +10,8 @@ from hpcclear.results.content import Results
 
 @style.drawn
 def fan_figure(wear: Results) -> "style.Figure":
-    """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them.
-
-    Of a dataset of kind ``wear``.
-    """
+    """Clearance of every worn joint, and f, against revolutions: median, quartiles, 5 and 95 %; single lives behind them
+    (kind ``wear``)."""
     joints = [str(name) for name in wear["joint"].to_numpy()]
     figure, axes = style.grid(len(joints) + 1, 1, 30.0 + 45.0 * (len(joints) + 1))
     cycles = wear["cycle"].to_numpy()
@@ -40,9 +38,7 @@ def fan_figure(wear: Results) -> "style.Figure":
 
 @style.drawn
 def survival_figure(wear: Results) -> "style.Figure":
-    """Share of lives that are not over against revolutions, with 95 % confidence intervals.
-
-    Of a dataset of kind ``wear``.
+    """Share of lives that are not over against revolutions, with 95 % confidence intervals (kind ``wear``).
 
     Raises
     ------
@@ -78,9 +74,7 @@ AGES = 4
 
 @style.drawn
 def profile_figure(wear: Results) -> "style.Figure":
-    """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives.
-
-    Of a dataset of kind ``wear``.
+    """Depth of wear around bearing and journal of every worn joint at several ages, medians over lives (kind ``wear``).
 
     Raises
     ------
