@@ -16,7 +16,7 @@ from hpcclear.base.verdict import Verdict
 from hpcclear.report import constraints
 from hpcclear.report.answer import answer
 from hpcclear.results import dataset
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, each
 from hpcclear.scene.cases import Constraint
 from hpcclear.scene.stages import Verification
 from hpcclear.study import goals, verdicts
@@ -195,7 +195,7 @@ def test_verdicts_of_a_study_agree_with_the_truth(done):
         assert not (verdict == Verdict.FAILS and share < 0.001)
     unseen = done["constraint_true"].to_numpy() == 0.0
     assert (done["constraint_upper"].to_numpy()[unseen] > 0.0).all()
-    for verdict, one in zip(verdicts, Results.of(done).each("design"), strict=True):
+    for verdict, one in zip(verdicts, each(Results.of(done), "design"), strict=True):
         assert f": {constraints.WORDS[verdict]}" in "; ".join(constraints.worded(one))
     best = done.sel(design="light alpha")
     assert best["constraint_verdict"].item() == Verdict.HOLDS

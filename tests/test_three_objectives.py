@@ -23,7 +23,7 @@ from hpcclear.report.constraints import worded
 from hpcclear.report.html import designs, picture
 from hpcclear.report.html.content import read
 from hpcclear.report.html.page import write_report
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, each
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.study import run_study
@@ -221,7 +221,7 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
     names = [str(name) for name in five["design"].to_numpy()]
     assert {f"five {end}" for end in (*ENDS, "delta", "epsilon")} <= set(names)
     assert "plain gamma" not in found["design"].to_numpy()
-    for one, mass in zip(Results.of(five).each("design"), five["m2"].to_numpy(), strict=True):
+    for one, mass in zip(each(Results.of(five), "design"), five["m2"].to_numpy(), strict=True):
         assert [*worded(one)] == [
             f"m2 = {mass:.4g}, at most 0.3: {'satisfied' if mass <= 0.3 else 'violated'}"
         ]

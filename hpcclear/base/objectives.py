@@ -166,7 +166,7 @@ class Objective:
         places = self.joints or self.places
         return found[:, list(places)] if found.ndim > 1 and places else found
 
-    def _value_of(self, row: tuple[Any, ...]) -> float:
+    def _value_of(self, row: tuple[Array, ...]) -> float:
         try:
             return float(np.max(row[0]) if self.value is None else self.value(*row))
         except Exception as error:

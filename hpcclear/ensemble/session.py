@@ -341,7 +341,7 @@ def timing_of(ranks: Ranks, attributes: Mapping[str, str] | None = None) -> Resu
     empty = np.zeros((ranks.size, len(COLUMNS)))
     seconds = np.stack([ranks.stage_seconds.get(stage, empty) for stage in stages], axis=1)
     data = {name: seconds[:, :, k] for k, name in enumerate(COLUMNS)}
-    coords = {"rank": np.arange(ranks.size), "stage": stages}
+    coords = {"rank": np.arange(ranks.size), "stage": np.array(stages, str)}
     return dataset.dataset("timing", coords, {**data, "command": command_line()}, attributes)
 
 

@@ -35,7 +35,7 @@ MOST_POINTS = 4000
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ComparedSignal:
     """One quantity, measured and simulated at the measured points; SI."""
 
     name: str
@@ -90,7 +90,7 @@ class Comparison:
     """Which of them, from 1, the first measured point was compared with."""
     series_x: Array
     """Measured angle, rad, or time, s, of the whole simulated series; shape (t,)."""
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[ComparedSignal, ...]
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the norms of each quantity, SI."""
@@ -153,7 +153,7 @@ def compare(
     others = span / turns * (np.arange(turns) + 1 - revolution)
     every = _every(place, at)
     quantities = tuple(
-        Quantity(
+        ComparedSignal(
             one.name,
             one.label,
             one.unit,

@@ -6,7 +6,7 @@ import numpy as np
 
 from hpcclear.base.verdict import Verdict, together
 from hpcclear.report.figures.labels import between, quantity
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, each
 
 ABSENT = 3
 """Code of ``constraint_verdict`` where a case has fewer constraints than another."""
@@ -39,7 +39,7 @@ def worded(one: Results) -> Iterator[str]:
     """Yield constraints of a design: "probability of f above 3 N = 0.01 (95 % CI 0.009 to 0.011), at most 0.05: satisfied"."""
     if "constraint_verdict" not in one:
         return
-    for own in one.each("constraint"):
+    for own in each(one, "constraint"):
         if int(own["constraint_verdict"]) == ABSENT:
             continue
         unit = str(own["constraint_unit"].item())

@@ -135,7 +135,7 @@ def statistics(
     return table
 
 
-def _columns(lines: spread.Lines, units: Units) -> dict[str, list[Any]]:
+def _columns(lines: spread.Lines, units: Units) -> dict[str, list[object]]:
     """Label and unit, then value and interval of each samples; lines without numbers are left out."""
     rows = {
         (label, line.estimate.unit): units.chosen(line.estimate.unit)
@@ -144,7 +144,7 @@ def _columns(lines: spread.Lines, units: Units) -> dict[str, list[Any]]:
         if line.estimate.known
     }
     shown = [unit or si for (_, si), unit in rows.items()]
-    columns: dict[str, list[Any]] = {"statistic": [label for label, _ in rows], "unit": shown}
+    columns: dict[str, list[object]] = {"statistic": [label for label, _ in rows], "unit": [*shown]}
     for name, own in lines.items():
         for k, end in enumerate(spread.Estimate._fields[:3]):
             cells = columns[f"{name} {end}"] = []
@@ -257,7 +257,7 @@ class _Exact(float):
         return repr(float(self))
 
 
-def _book(sheets: Mapping[str, Iterable[Sequence[Any]]]) -> bytes:
+def _book(sheets: Mapping[str, Iterable[Sequence[object]]]) -> bytes:
     """An Excel file of sheets by name: numbers, and text that is never a formula, below a row of headings.
 
     Numbers that are not finite are empty cells, for Excel has none.

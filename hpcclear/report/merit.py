@@ -6,7 +6,7 @@ from hpcclear.base.objectives import ORDINALS, Usual
 from hpcclear.base.verdict import Verdict, best
 from hpcclear.report.constraints import verdict_of
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, each
 
 SPAN = 2.0
 """Standard deviations above the mean that designs are compared by: some 98 of 100 machines stay below."""
@@ -25,7 +25,7 @@ def goals_of(one: Results) -> list[str]:
 
 def leading_goals(verified: Results) -> list[str]:
     """Objectives of the case that the answer is about, in words; none if no design was verified or the file lacks them."""
-    if not any(map(counts, verified.each("design"))):
+    if not any(map(counts, each(verified, "design"))):
         return []
     first = ours_of(verified).isel(design=0)
     return [str(first[f"{name}_goal"].item()) for name in goals_of(first)]
@@ -46,7 +46,7 @@ def is_plain(one: Results) -> bool:
 
 def ours_of(verified: Results) -> Results:
     """Designs of the case in which most is random, the baseline design among them, without those of a publication."""
-    rows = [k for k, one in enumerate(verified.each("design")) if counts(one)]
+    rows = [k for k, one in enumerate(each(verified, "design")) if counts(one)]
     if "case" in verified:
         cases = [str(case) for case in verified["case"].to_numpy()]
         chosen = cases[max(rows, key=lambda k: (_random_inputs(verified, k), k))]
@@ -66,7 +66,7 @@ def counts(one: Results) -> bool:
 
 def baseline_of(ours: Results) -> Results | None:
     """The baseline design, if it is among them."""
-    every = ours.each("design")
+    every = each(ours, "design")
     return next((d for d in every if str(d["design"].item()).split(" ")[-1] == "original"), None)
 
 
@@ -79,8 +79,8 @@ def judged(ours: Results) -> np.ndarray:
     """Merit of the designs of a case, (designs,): infinite for those that satisfy its constraints less well than others."""
     if is_plain(ours.isel(design=0)):
         return ours["mean_true"].to_numpy() + SPAN * ours["deviation_true"].to_numpy()
-    each = [verdict_of(one) for one in ours.each("design")]
-    found, level = best([Verdict.HOLDS if one is None else one for one in each])
+    verdicts = map(verdict_of, each(ours, "design"))
+    found, level = best([Verdict.HOLDS if one is None else one for one in verdicts])
     merit = ours["first_true"].to_numpy()
     if found is not Verdict.HOLDS and "constraint_excess" in ours:
         # none is surely within: the nearest

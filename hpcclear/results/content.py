@@ -184,10 +184,6 @@ class Results:
         """Return what stands at labels of coordinates, one or several of each; raises KeyError where there are none."""
         return self.isel({dim: place_of(self.labels[dim], one) for dim, one in labels.items()})
 
-    def each(self, dim: str) -> list[Results]:
-        """Return what stands at each place along a dimension."""
-        return [self.isel({dim: k}) for k in range(self.sizes[dim])]
-
     def assign_attrs(self, **attrs: object) -> Results:
         """Return these results with further global attributes."""
         return Results(self.variables, {**self.attrs, **attrs}, tuple(self.labels))
@@ -207,3 +203,8 @@ class Results:
 
     def __getitem__(self, name: str) -> Variable:
         return self.variables[name]
+
+
+def each(content: Results, dim: str) -> list[Results]:
+    """Return what stands at each place along a dimension."""
+    return [content.isel({dim: k}) for k in range(content.sizes[dim])]

@@ -36,7 +36,7 @@ from hpcclear.results.names import (
     LIMIT,
     ROLE,
 )
-from hpcclear.results.rows import Column, Kind
+from hpcclear.results.rows import FileVariable, Kind
 
 CONVENTIONS = "CF-1.11"
 
@@ -119,7 +119,9 @@ def dataset(
     return Results(variables, {**fixed, **(attributes or {})})
 
 
-def _variable(name: str, row: Column, values: ArrayLike, sizes: Mapping[str, int]) -> Variable:
+def _variable(
+    name: str, row: FileVariable, values: ArrayLike, sizes: Mapping[str, int]
+) -> Variable:
     words = row.dtype == "text" and not isinstance(values, np.ndarray)
     array = np.array(values, str) if words else np.asarray(values)
     expected = tuple(sizes[dim] for dim in row.dims)
@@ -147,7 +149,7 @@ def _design_row(
     units: Mapping[str, str],
     words: Mapping[str, str],
     table: Kind,
-) -> tuple[Column, dict[str, str]]:
+) -> tuple[FileVariable, dict[str, str]]:
     """Row and further attributes of a design variable, or of a limit of one."""
     dims, base, start, role = table.design_dims, name, "", ROLE
     if table.limit_dims is not None and name.endswith(("_lower", "_upper")) and name[:-6] in data:
@@ -157,7 +159,7 @@ def _design_row(
     unit = "1" if unit == "" else unit
     if unit is None or dims is None:
         raise ValueError(f"{name!r} is not in the table and is no design variable with a unit")
-    return Column(dims, unit, start + words.get(base, long_name), "f8"), {
+    return FileVariable(dims, unit, start + words.get(base, long_name), "f8"), {
         "role": role,
         "scene_path": base,
     }

@@ -5,7 +5,7 @@ import numpy as np
 from hpcclear.base.outcome import JUDGED, NUMBERS, Status
 from hpcclear.results.content import Results
 from hpcclear.results.names import KINDS, LIMIT, ROLE, designs_in
-from hpcclear.results.rows import Column
+from hpcclear.results.rows import FileVariable
 
 
 def fault_of(content: Results, kind: str | None) -> str | None:
@@ -28,7 +28,7 @@ def fault_of(content: Results, kind: str | None) -> str | None:
                 return f"it holds {name}, which {found} has not"
             if not isinstance(variable.attrs.get("scene_path"), str):
                 return f"{name} does not say which scene path it is"
-            row = Column(dims, "", "", "f8")
+            row = FileVariable(dims, "", "", "f8")
         if variable.dims != row.dims:
             return f"{name} has dimensions {variable.dims}, not {row.dims}"
         kinds = {"f8": "f", "i8": "i", "i1": "i", "text": "U"}

@@ -1,7 +1,7 @@
 """What a kind of result file declares, a row of its table, and rows that several of them share.
 
 ``objective`` in the place of a unit, and ``objective^2``, stand for the unit of the study's objective, ``rate`` for that of
-what is made of its rate (`Column.of`).
+what is made of its rate (`FileVariable.of`).
 Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
 """
 
@@ -17,7 +17,7 @@ from hpcclear.base.outcome import FIELDS, JUDGED, ON_REQUEST, Flag, Regime, Stat
 Dims = tuple[str, ...]
 
 
-class Codes(NamedTuple):
+class FlagCodes(NamedTuple):
     """What the codes of a flag mean, in the attributes of CF."""
 
     values: tuple[int, ...]
@@ -26,7 +26,7 @@ class Codes(NamedTuple):
     """Whether they are bits of one number."""
 
     @classmethod
-    def of(cls, codes: type[IntEnum] | str) -> "Codes":
+    def of(cls, codes: type[IntEnum] | str) -> "FlagCodes":
         """Those of an enumeration, or of words from 0 on, separated by blanks."""
         if isinstance(codes, str):
             return cls(tuple(range(len(codes.split()))), tuple(codes.split()))
@@ -41,7 +41,7 @@ class Codes(NamedTuple):
         return {entry: np.array(self.values, np.int8), "flag_meanings": " ".join(self.words)}
 
 
-class Column(NamedTuple):
+class FileVariable(NamedTuple):
     """A row of the table: what one variable of a file is."""
 
     dims: Dims
@@ -49,7 +49,7 @@ class Column(NamedTuple):
     long_name: str
     dtype: str  # "f8", "i8", "i1" or "text"
     required: bool = False
-    codes: Codes | None = None  # of a flag
+    codes: FlagCodes | None = None  # of a flag
     label: str = ""  # short words, where the name is none; see `in_words`
 
     def in_words(self, name: str) -> str:
@@ -62,14 +62,14 @@ class Column(NamedTuple):
             return f"{objective}^2" if objective.isalpha() else f"({objective})^2"
         return {"objective": objective, "rate": rate}.get(self.units, self.units)
 
-    def of(self, objective: Objective) -> "Column":
+    def of(self, objective: Objective) -> "FileVariable":
         """The row in a file of results for that objective: its unit, and its words in place of the mean gap's."""
         words = self.long_name.replace(MEAN_GAP.words, objective.words)
         unit = self.unit(objective.unit or "1", objective.unit_of_rate or "1")
         return self._replace(units=unit, long_name=words)
 
 
-Columns = dict[str, Column]
+FileVariables = dict[str, FileVariable]
 
 
 class Kind(NamedTuple):
@@ -82,8 +82,8 @@ class Kind(NamedTuple):
     order: int
     """Place among the kinds, on the reference page and on that of a study."""
     title: str
-    coords: Columns
-    data: Columns
+    coords: FileVariables
+    data: FileVariables
     required: frozenset[str]
     """Data variables that every file has."""
     optional: frozenset[str]
@@ -105,7 +105,7 @@ def kind_of(
     title: str,
     rows: Dims,
     *,
-    table: Columns,
+    table: FileVariables,
     design_dims: Dims | None = None,
     limit_dims: Dims | None = None,
     optional: Collection[str] = (),
@@ -131,41 +131,41 @@ def kind_of(
 
 def number(
     dims: Dims, units: str, long_name: str, label: str = "", *, required: bool = False
-) -> Column:
+) -> FileVariable:
     """A number of double precision."""
-    return Column(dims, units, long_name, "f8", required, label=label)
+    return FileVariable(dims, units, long_name, "f8", required, label=label)
 
 
-def count(dims: Dims, long_name: str, *, required: bool = False) -> Column:
+def count(dims: Dims, long_name: str, *, required: bool = False) -> FileVariable:
     """A whole number."""
-    return Column(dims, "1", long_name, "i8", required)
+    return FileVariable(dims, "1", long_name, "i8", required)
 
 
 def flag(
     dims: Dims, long_name: str, codes: type[IntEnum] | str, *, required: bool = False
-) -> Column:
-    """A small code, whose meanings (`Codes.of`) are attributes."""
-    return Column(dims, "", long_name, "i1", required, Codes.of(codes))
+) -> FileVariable:
+    """A small code, whose meanings (`FlagCodes.of`) are attributes."""
+    return FileVariable(dims, "", long_name, "i1", required, FlagCodes.of(codes))
 
 
-def text(dims: Dims, long_name: str, *, required: bool = False) -> Column:
+def text(dims: Dims, long_name: str, *, required: bool = False) -> FileVariable:
     """Words."""
-    return Column(dims, "", long_name, "text", required)
+    return FileVariable(dims, "", long_name, "text", required)
 
 
 _CODES = {
-    "latched": Codes((0, 1), ("free", "latched")),
-    "regime": Codes.of(Regime),
-    "status": Codes.of(Status),
-    "flags": Codes.of(Flag),
+    "latched": FlagCodes((0, 1), ("free", "latched")),
+    "regime": FlagCodes.of(Regime),
+    "status": FlagCodes.of(Status),
+    "flags": FlagCodes.of(Flag),
 }
 """Of the codes in a record."""
 
 
-def outcome(*per_sample: str) -> Columns:
+def outcome(*per_sample: str) -> FileVariables:
     """What one simulation comes to, in a file with these dimensions."""
     return {
-        name: Column(
+        name: FileVariable(
             (*per_sample, *one.per.split()), one.unit, one.words, one.kind, one.required, _CODES.get(name)
         )
         for name, one in FIELDS.items()
@@ -182,7 +182,7 @@ def estimate(
     level: str = "",
     *,
     required: bool = False,
-) -> Columns:
+) -> FileVariables:
     """A number, called NAME and `true`, and the ends of its confidence interval of some `level`, NAME_lower and NAME_upper.
 
     `required`: the number itself."""
@@ -195,7 +195,9 @@ def estimate(
     return {f"{name}{true}": number(dims, units, words, required=required)} | ends
 
 
-def with_error(name: str, dims: Dims, units: str, words: str, *, required: bool = False) -> Columns:
+def with_error(
+    name: str, dims: Dims, units: str, words: str, *, required: bool = False
+) -> FileVariables:
     """A number, `required` or not, and its standard error as NAME_error."""
     error = number(dims, units, f"standard error of {name}")
     return {name: number(dims, units, words, required=required), f"{name}_error": error}

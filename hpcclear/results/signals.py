@@ -19,7 +19,7 @@ from hpcclear.results.names import KINDS
 
 
 @dataclass(frozen=True)
-class Derived:
+class DerivedSignal:
     """A signal that is made of a series of joints or points."""
 
     source: str
@@ -45,11 +45,11 @@ def _beginnings(time: Array, depth: Array) -> Array:
 
 
 DERIVED = {
-    "acceleration_x": Derived("point_x", "m/s^2", "x acceleration", _second_derivative),
-    "acceleration_y": Derived("point_y", "m/s^2", "y acceleration", _second_derivative),
-    "impacts": Derived("penetration", "1", "impacts", _beginnings, counted=True),
+    "acceleration_x": DerivedSignal("point_x", "m/s^2", "x acceleration", _second_derivative),
+    "acceleration_y": DerivedSignal("point_y", "m/s^2", "y acceleration", _second_derivative),
+    "impacts": DerivedSignal("penetration", "1", "impacts", _beginnings, counted=True),
 }
-"""Derived signals by name."""
+"""DerivedSignal signals by name."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Signal:
     time: Array
     series: Array
     """Of the response (t,): the signal, or what it is made of."""
-    derived: Derived | None = None
+    derived: DerivedSignal | None = None
 
     @property
     def counted(self) -> bool:
@@ -88,7 +88,9 @@ def signals_in(response: Results) -> dict[str, Signal]:
     time, table = response["time"].to_numpy(), KINDS["response"].data
     found: dict[str, Signal] = {}
 
-    def add(name: str, label: str, variable: Variable, derived: Derived | None = None) -> None:
+    def add(
+        name: str, label: str, variable: Variable, derived: DerivedSignal | None = None
+    ) -> None:
         others = [dim for dim in variable.dims if dim != "time"]
         if "time" not in variable.dims or len(others) > 1:
             return

@@ -10,7 +10,7 @@ from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
 if TYPE_CHECKING:
-    from hpcclear.report.compare import Quantity
+    from hpcclear.report.compare import ComparedSignal
 
 
 @cli.command("look", "Compare a response with measurements.")
@@ -67,7 +67,7 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
     return Exit.DONE
 
 
-def _norms(one: "Quantity") -> list[tuple[str, str]]:
+def _norms(one: "ComparedSignal") -> list[tuple[str, str]]:
     """Error norms of a quantity in the unit of its measurement."""
     from hpcclear.report.figures.compared import scale
 

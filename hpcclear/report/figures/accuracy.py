@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -270,10 +269,14 @@ def total_figure(found: Results) -> "style.Figure":
         panel.dataLim
     )  # wide enough for a tick: 1, 2 or 5 of the time, a power of ten of the error
     panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
-    for way, aims, mark in zip(*_recommended(panel, found), _TARGET_MARKS, strict=False):
+    best_for: dict[targets.Way, list[str]] = {}
+    for aim in targets.TARGETS:
+        if (way := targets.cheapest(found, aim)) is not None:
+            best_for.setdefault(way, []).append(f"{aim * 100:g}")
+    for (way, aims), mark in zip(best_for.items(), "*Dp", strict=False):
         panel.plot(
-            1e3 * way.seconds, way.error, ls="none", marker=mark, ms=_MARK, color="black", mfc="white",
-            label="for " + ", ".join(f"{aim * 100:g}" for aim in aims) + " %", zorder=5,
+            1e3 * way.seconds, way.error, ls="none", marker=mark, ms=6.0, color="black", mfc="white",
+            label=f"for {', '.join(aims)} %", zorder=5,
         )  # fmt: skip
     panel.set(xlabel="core time of one design (ms)", ylabel="relative error of $f$ (–)")
     _decades(panel.yaxis)
@@ -283,36 +286,11 @@ def total_figure(found: Results) -> "style.Figure":
     return figure
 
 
-_TARGET_MARKS, _MARK = "*Dp", 6.0
-"""Marks of recommended settings, and their size in points."""
-
-
-def _recommended(
-    panel: "style.Axes", found: Results
-) -> tuple[list[targets.Way], list[list[float]]]:
-    """Recommended settings and the targets of each; settings whose marks would cover each other are one, the more accurate."""
-    kept: list[targets.Way] = []
-    aims: list[list[float]] = []
-    for target in reversed(targets.TARGETS):
-        way = targets.cheapest(found, target)
-        if way is None:
-            continue
-        if kept:
-            places = panel.transData.transform([(1e3 * w.seconds, w.error) for w in (way, kept[0])])
-            apart = np.hypot(*(places[1] - places[0])) * 72.0 / panel.figure.dpi
-            if apart < 1.5 * _MARK:
-                aims[0].insert(0, target)
-                continue
-        kept.insert(0, way)
-        aims.insert(0, [target])
-    return kept, aims
-
-
 def _total_caption(found: Results) -> str:
     return f"Total error of f of one design against core time. {targets.caption(found)}"
 
 
-_FIGURES: tuple[tuple[Callable[..., Any], tuple[str, ...], str | Callable[..., str]], ...] = (
+_FIGURES: tuple[tuple[Callable[..., "style.Figure"], tuple[str, ...], str | Callable[..., str]], ...] = (
     (total_figure, ("spent_error", "averaging_error"), _total_caption),
     (spending_figure, ("spent_error",), "Error of a steady mean against run time by tolerance, and the bias of each."),
     (integration_figure, ("error",), "Error of one revolution against run time and force evaluations, by integrator."),

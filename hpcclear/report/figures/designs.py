@@ -4,7 +4,7 @@ import itertools
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, each
 
 
 @style.drawn
@@ -107,7 +107,7 @@ def _asked(one: Results, name: str, words: str, unit: str) -> _Goal:
     return _Goal(label, name, name.removeprefix("searched_"), scale)
 
 
-def _runs(panel: Any, one: Results, x: _Goal, y: _Goal) -> None:
+def _runs(panel: "style.Axes", one: Results, x: _Goal, y: _Goal) -> None:
     """The solutions of every run of a case."""
     for k, run in enumerate(one["run"].to_numpy()):
         row = one.sel(run=run)
@@ -118,10 +118,10 @@ def _runs(panel: Any, one: Results, x: _Goal, y: _Goal) -> None:
 
 
 def _verified(
-    panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, *, all_designs: bool
+    panel: "style.Axes", verification: Results, case: str, x: _Goal, y: _Goal, *, all_designs: bool
 ) -> None:
     """Simulated designs of a case, ours or all, each joined to its prediction by the surrogate."""
-    for one in verification.each("design"):
+    for one in each(verification, "design"):
         label, marker = _mark(one)
         if ("case" in one and str(one["case"].item()) != case) or not (
             all_designs or marker == "o"
@@ -145,7 +145,9 @@ def _place(one: Results, x: _Goal, y: _Goal, end: str) -> tuple[float, float]:
     return across, up
 
 
-def _ends(panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, count: int) -> None:
+def _ends(
+    panel: "style.Axes", verification: Results, case: str, x: _Goal, y: _Goal, count: int
+) -> None:
     """The Greek letters of the ends; of more than two each at a place of its own, as some may lie on each other."""
     from matplotlib.patheffects import withStroke
 
@@ -156,7 +158,7 @@ def _ends(panel: Any, verification: Results, case: str, x: _Goal, y: _Goal, coun
         for ends, widen in ((panel.get_xlim(), panel.set_xlim), (panel.get_ylim(), panel.set_ylim)):
             least = NEAREST * max(map(abs, ends))
             if ends[1] - ends[0] < least:  # all have the same but for round-off
-                widen(np.mean(ends) - 0.5 * least, np.mean(ends) + 0.5 * least)
+                widen(0.5 * (sum(ends) - least), 0.5 * (sum(ends) + least))
     for end, letter, side in zip(ENDS, _GREEK, sides, strict=False):
         if f"{case} {end}" in names:
             one = verification.isel(design=names.index(f"{case} {end}"))

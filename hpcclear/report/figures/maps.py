@@ -2,7 +2,6 @@
 
 import itertools
 import textwrap
-from typing import Any
 
 import numpy as np
 
@@ -56,7 +55,7 @@ def _plane(cells: Results, names: list[str]) -> "style.Figure":
         "norm": boundaries(np.arange(count + 1) + 0.5, count),
     }
     regime = np.where(cells["status"].to_numpy() == Status.OK, cells["regime"].to_numpy(), np.nan)
-    panels: tuple[tuple[str, Array, dict[str, Any]], ...] = (
+    panels: tuple[tuple[str, Array, style.Look], ...] = (
         (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -most, "vmax": most}),
         (_PERIOD, cells["period"].to_numpy().T, {"cmap": "viridis", "norm": boundaries(_PERIODS, 256)}),
         ("regime", regime.T, by_regime),

@@ -1,7 +1,5 @@
 """Figures of responses (kind ``response``) over the crank angle, frequency and clearance, and of their energies."""
 
-from typing import Any
-
 from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
@@ -14,7 +12,7 @@ def _joints(axes: "style.Axes", response: Results, name: str, unit: labels.Scale
         axes.plot(motion.turns(response), values, label=label, **_curve(row))
 
 
-def _curve(row: int) -> dict[str, Any]:
+def _curve(row: int) -> style.Look:
     """Style of a joint's curve; later ones are thinner, since they lie on top."""
     return {"color": style.CYCLE[row % 7], "lw": max(0.8 - 0.2 * row, 0.4)}
 

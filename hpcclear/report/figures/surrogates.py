@@ -1,10 +1,11 @@
 """Figures of sensitivities and surrogates (kinds ``sensitivity`` and ``kriging``)."""
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.report.figures import fits, labels, style
 from hpcclear.report.parts import FigureOf
@@ -182,7 +183,7 @@ def surfaces_figure(kriging: Results) -> "style.Figure":
     return figure
 
 
-def _fields(model: "Piecewise", main: int) -> tuple[Any, Any, Any, Any]:
+def _fields(model: "Piecewise", main: int) -> tuple[Array, Array, Array, Array]:
     """Predictions over the two inputs that are not the clearance: grids (n,), values (2, n, n), clearances (2,)."""
     lower, upper = model.lower, model.upper
     x, y = (np.linspace(lower[i], upper[i], 41) for i in range(3) if i != main)
