@@ -9,8 +9,7 @@ files of plain arrays. Every file carries the key of its run, and only the same 
 import re
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -140,8 +139,11 @@ class Checkpoint:
         self._clock = clock
         self._parts: list[_Part] = []
         self._buffer: list[tuple[np.ndarray, np.ndarray]] = []
-        with self._watch.running(), self._refusing():
-            self._number = self._open()
+        try:
+            with self._watch.running():
+                self._number = self._open()
+        except OSError as error:
+            raise refused(directory, error) from None
         self._written = clock()
 
     @property
@@ -334,13 +336,6 @@ class Checkpoint:
             return
         records = recast(dataset.records(content), self.record)
         self._keep(level, path, records, self._designs(content))
-
-    @contextmanager
-    def _refusing(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise refused(self.directory, error) from None
 
 
 def _join(

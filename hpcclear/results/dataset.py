@@ -36,7 +36,7 @@ from hpcclear.results.names import (
     LIMIT,
     ROLE,
 )
-from hpcclear.results.rows import FileVariable, Kind
+from hpcclear.results.rows import FileVariable, ResultKind
 
 CONVENTIONS = "CF-1.11"
 
@@ -94,7 +94,7 @@ def dataset(
         A design variable whose name cannot be one.
     """
     table = KINDS[kind]
-    least = set(table.coords) - table.optional if whole else set()
+    least = set(table.coords) - {*table.optional} if whole else set()
     if not least <= set(coords) <= set(table.coords):
         raise ValueError(f"{kind} has coordinates {sorted(table.coords)}, not {sorted(coords)}")
     missing = table.required - set(data)
@@ -148,7 +148,7 @@ def _design_row(
     data: Mapping[str, ArrayLike],
     units: Mapping[str, str],
     words: Mapping[str, str],
-    table: Kind,
+    table: ResultKind,
 ) -> tuple[FileVariable, dict[str, str]]:
     """Row and further attributes of a design variable, or of a limit of one."""
     dims, base, start, role = table.design_dims, name, "", ROLE
@@ -220,7 +220,7 @@ def samples_dataset(
     Returns
     -------
     Results
-        Kind ``samples``.
+        ResultKind ``samples``.
 
     Raises
     ------

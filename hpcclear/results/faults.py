@@ -16,7 +16,7 @@ def fault_of(content: Results, kind: str | None) -> str | None:
     if kind is not None and found != kind:
         return f"it holds {found}, not {kind}"
     table = KINDS[found]
-    missing = (table.required | (set(table.coords) - table.optional)) - set(content.variables)
+    missing = (table.required | (set(table.coords) - {*table.optional})) - set(content.variables)
     if missing:
         return f"it lacks {', '.join(sorted(missing))}"
     for name, variable in content.variables.items():

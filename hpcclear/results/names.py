@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcclear.results import kinds
 from hpcclear.results.content import Results
-from hpcclear.results.rows import Kind
+from hpcclear.results.rows import ResultKind
 
 DESIGN_VARIABLES = {
     "m1": ("kg", "mass of the crank", "crank mass $m_1$"),
@@ -35,13 +35,13 @@ ALL_ON = "all on"
 """Name of the whole scene there."""
 
 
-class _Kinds(Mapping[str, Kind]):
+class _Kinds(Mapping[str, ResultKind]):
     """The kinds by their names, those of the files of `hpcclear.results.kinds`; each is loaded when it is first used."""
 
-    def __getitem__(self, name: str) -> Kind:
+    def __getitem__(self, name: str) -> ResultKind:
         if name not in _names():
             raise KeyError(name)
-        kind: Kind = import_module(f"{kinds.__name__}.{name}").KIND
+        kind: ResultKind = import_module(f"{kinds.__name__}.{name}").KIND
         return kind
 
     def __iter__(self) -> Iterator[str]:
@@ -56,7 +56,7 @@ def _names() -> frozenset[str]:
     return frozenset(one.name for one in pkgutil.iter_modules(kinds.__path__))
 
 
-KINDS: Mapping[str, Kind] = _Kinds()
+KINDS: Mapping[str, ResultKind] = _Kinds()
 """Every kind of result file by its name, in their order."""
 
 ROLE = "design_variable"  # value of the attribute `role` of design variables

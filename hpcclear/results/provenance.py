@@ -20,28 +20,21 @@ def provenance(scene: str, scene_hash: str, references: str = "") -> dict[str, s
     references : str
         Published work that its numbers are taken from; "" leaves the attribute out.
     """
-    version = _version()
     return {
-        "source": f"hpcclear {version}",
-        "history": f"written by hpcclear {version}",
         **({"references": references} if references else {}),
-        "scene": scene,
-        "scene_hash": scene_hash,
-        "hpcclear_version": version,
-        "versions": _versions(),
-        "processor": _processor(),
-    }
+        "scene": scene, "scene_hash": scene_hash, **program(),
+    }  # fmt: skip
 
 
 @functools.cache
-def _version() -> str:
-    return _version_of("hpcclear")
-
-
-@functools.cache
-def _versions() -> str:
-    found = [f"python {platform.python_version()}"]
-    return ", ".join(found + [f"{name} {_version_of(name)}" for name in _PACKAGES])
+def program() -> dict[str, str]:
+    """Return what is said of the program, the packages that it uses and the processor."""
+    version, python = _version_of("hpcclear"), f"python {platform.python_version()}"
+    return {
+        "source": f"hpcclear {version}", "history": f"written by hpcclear {version}", "hpcclear_version": version,
+        "versions": ", ".join([python, *(f"{name} {_version_of(name)}" for name in _PACKAGES)]),
+        "processor": host.processor(),
+    }  # fmt: skip
 
 
 def _version_of(package: str) -> str:
@@ -49,8 +42,3 @@ def _version_of(package: str) -> str:
     said = metadata.distribution(package).read_text("METADATA") or ""
     found = re.search(r"^Version: (\S+)", said, re.M)
     return found[1] if found else metadata.version(package)
-
-
-@functools.cache
-def _processor() -> str:
-    return host.processor()

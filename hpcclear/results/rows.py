@@ -5,8 +5,9 @@ what is made of its rate (`FileVariable.of`).
 Units are written so that UDUNITS (CF), pint and cf-xarray all read them ("kg m^2", not "kg m2").
 """
 
-from collections.abc import Collection
+from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +73,8 @@ class FileVariable(NamedTuple):
 FileVariables = dict[str, FileVariable]
 
 
-class Kind(NamedTuple):
+@dataclass(frozen=True)
+class ResultKind:
     """A kind of result file.
 
     Its figures, its section of the page and its sentences are declared in one file of `hpcclear.report` (see
@@ -82,51 +84,40 @@ class Kind(NamedTuple):
     order: int
     """Place among the kinds, on the reference page and on that of a study."""
     title: str
-    coords: FileVariables
-    data: FileVariables
-    required: frozenset[str]
-    """Data variables that every file has."""
-    optional: frozenset[str]
-    """Coordinates that only some files have."""
     rows: Dims
     """Dimensions along which the rows of an exported table go."""
-    design_dims: Dims | None
+    table: FileVariables
+    """All variables; coordinates are named as their only dimension."""
+    design_dims: Dims | None = None
     """Dimensions of its design variables; None: it has none."""
-    limit_dims: Dims | None
+    limit_dims: Dims | None = None
     """Dimensions of their bounds, NAME_lower and NAME_upper."""
-    absent: str
+    optional: Dims = ()
+    """Coordinates that only some files have."""
+    whole: bool = False
+    """Whether only what is made on request may be missing; else all that is not `FileVariable.required`."""
+    absent: str = ""
     """What the page of a study says where there is no such file; "" for nothing."""
-    alone: bool
+    alone: bool = False
     """Whether a command of its own writes it, into a directory that needs nothing else."""
 
+    @cached_property
+    def coords(self) -> FileVariables:
+        """Coordinates of the table."""
+        return {name: row for name, row in self.table.items() if row.dims == (name,)}
 
-def kind_of(
-    order: int,
-    title: str,
-    rows: Dims,
-    *,
-    table: FileVariables,
-    design_dims: Dims | None = None,
-    limit_dims: Dims | None = None,
-    optional: Collection[str] = (),
-    whole: bool = False,
-    absent: str = "",
-    alone: bool = False,
-) -> Kind:
-    """Declare a kind by its table, whose coordinates are rows named as their only dimension; see `Kind`.
+    @cached_property
+    def data(self) -> FileVariables:
+        """Data variables of the table."""
+        return {name: row for name, row in self.table.items() if name not in self.coords}
 
-    Of a `whole` one only what is made on request may be missing.
-    """
-    coords = {name: row for name, row in table.items() if row.dims == (name,)}
-    data = {name: row for name, row in table.items() if name not in coords}
-    least = (
-        set(data) - {*ON_REQUEST, *JUDGED, "label"}
-        if whole
-        else {name for name, row in data.items() if row.required}
-    )
-    return Kind(
-        order, title, coords, data, frozenset(least), frozenset(optional), rows, design_dims, limit_dims, absent, alone
-    )  # fmt: skip
+    @cached_property
+    def required(self) -> set[str]:
+        """Data variables that every file has."""
+        asked = {*ON_REQUEST, *JUDGED, "label"}
+        return {
+            n for n, row in self.data.items() if (n not in asked if self.whole else row.required)
+        }
 
 
 def number(

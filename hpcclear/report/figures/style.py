@@ -88,12 +88,12 @@ RC: dict[str, Any] = {
     "mathtext.fontset": "dejavusans",
 }
 
-_MARKS = {
-    "png": b"Software\x00hpcclear",
-    "svg": b"<dc:title>hpcclear</dc:title>",
-    "pdf": b"/Creator (hpcclear)",
-}
-"""What distinguishes our figures from a user's, by kind: where the metadata of `render` come to stand."""
+_STAMPS: dict[str, tuple[bytes, dict[str, str | None]]] = {
+    "png": (b"Software\x00hpcclear", {"Software": "hpcclear"}),
+    "svg": (b"<dc:title>hpcclear</dc:title>", {"Date": None, "Creator": "hpcclear"}),
+    "pdf": (b"/Creator (hpcclear)", {"CreationDate": None, "Creator": "hpcclear", "Producer": None}),
+}  # fmt: skip
+"""By kind what distinguishes our figures from a user's, and the metadata that it stands in."""
 
 
 def matplotlib() -> Any:
@@ -240,17 +240,12 @@ def _laid_out(figure: "Figure", dpi: int) -> Iterator[None]:
 
 def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
     """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes."""
-    stamp: object = {
-        "png": {"Software": "hpcclear"},
-        "svg": {"Date": None, "Creator": "hpcclear"},
-        "pdf": {"CreationDate": None, "Creator": "hpcclear", "Producer": None},
-    }[kind]
     buffer = io.BytesIO()
     with (
         matplotlib().rc_context(RC),
         _laid_out(figure, dpi) if kind == "png" else contextlib.nullcontext(),
     ):
-        figure.savefig(buffer, format=kind, dpi=dpi, metadata=stamp)
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=_STAMPS[kind][1])
     return buffer.getvalue()
 
 
@@ -276,12 +271,8 @@ def save(figure: "Figure", path: str | Path) -> Path:
     """
     place = Path(path)
     kind = place.suffix.lower().removeprefix(".")
-    if kind not in _MARKS:
-        raise InputError(
-            "figure",
-            str(place),
-            "figures are png, svg or pdf",
-            "End the name in .png, .svg or .pdf",
-        )
-    files.write_bytes(place, render(figure, kind), _MARKS[kind])
+    if kind not in _STAMPS:
+        remedy = "End the name in .png, .svg or .pdf"
+        raise InputError("figure", str(place), "figures are png, svg or pdf", remedy)
+    files.write_bytes(place, render(figure, kind), _STAMPS[kind][0])
     return place

@@ -1,8 +1,8 @@
 """Errors against run time."""
 
-from hpcclear.results.rows import count, estimate, kind_of, number, text, with_error
+from hpcclear.results.rows import ResultKind, count, estimate, number, text, with_error
 
-KIND = kind_of(
+KIND = ResultKind(
     180, "Accuracy against run time", ("integrator", "rung"),
     absent="the cost of accuracy was not measured (`hpcclear accuracy`)", alone=True,
     table={

@@ -1,9 +1,9 @@
 """One value for each revolution, against an entry of the scene."""
 
 from hpcclear.base.objectives import MEAN_GAP
-from hpcclear.results.rows import count, kind_of, number
+from hpcclear.results.rows import ResultKind, count, number
 
-KIND = kind_of(
+KIND = ResultKind(
     30, "One value for each revolution, against an entry of the scene", ("value", "crossing"),
     design_dims=("value",), alone=True,
     table={

@@ -1,8 +1,8 @@
 """Scatter of designs by perturbations of their initial conditions."""
 
-from hpcclear.results.rows import count, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     80, "Sensitivity of the designs to initial conditions", ("design",),
     table={
         "design": text(("design",), "name of the design"),

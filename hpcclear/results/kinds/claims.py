@@ -1,8 +1,8 @@
 """The claims of the paper."""
 
-from hpcclear.results.rows import count, flag, kind_of, text
+from hpcclear.results.rows import ResultKind, count, flag, text
 
-KIND = kind_of(
+KIND = ResultKind(
     110, "Claims of the paper, tested on these results", ("claim",),
     table={
         "claim": count(("claim",), "number of the claim"),

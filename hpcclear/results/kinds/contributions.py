@@ -1,8 +1,8 @@
 """Contributions of random inputs to the variance of designs."""
 
-from hpcclear.results.rows import count, flag, kind_of, number, text, with_error
+from hpcclear.results.rows import ResultKind, count, flag, number, text, with_error
 
-KIND = kind_of(
+KIND = ResultKind(
     90, "Contributions to the scatter of designs", ("design", "input"),
     table={
         "design": text(("design",), "name of the design"),

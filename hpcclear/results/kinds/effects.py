@@ -1,9 +1,9 @@
 """Variants without some effects, against the complete scene."""
 
 from hpcclear.base.objectives import MEAN_GAP
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, flag, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     150, "Effect screening: effects that can be neglected", ("variant",), alone=True,
     table={
         "variant": count(("variant",), "number of the variant; 0 is the complete scene"),

@@ -1,9 +1,9 @@
 """Pareto fronts of all runs of the optimiser."""
 
 from hpcclear.base.objectives import ORDINALS
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, flag, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     60, "Pareto fronts, by the surrogate", ("case", "run", "solution"),
     design_dims=("case", "run", "solution"), absent="nothing was optimised (`hpcclear run`)",
     table={

@@ -1,17 +1,11 @@
 """Unknowns of a machine from measured signals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from hpcclear.results.content import Results
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, flag, number, text
 
-if TYPE_CHECKING:
-    pass
-
-KIND = kind_of(
+KIND = ResultKind(
     160, "Unknowns of a machine from measured signals", ("unknown",),
     optional=("record", "particle", "feature", "candidate", "revolutions"), alone=True,
     table={

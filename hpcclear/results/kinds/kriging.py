@@ -1,8 +1,8 @@
 """Surrogates, with all that a prediction takes."""
 
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, flag, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     50, "Kriging models of the objective", ("model", "point"),
     design_dims=("model", "point"), limit_dims=("model",), absent="no surrogate (`hpcclear run`)",
     table={

@@ -1,8 +1,8 @@
 """Designs of the paper under interpretations of its text."""
 
-from hpcclear.results.rows import count, kind_of, number, text, with_error
+from hpcclear.results.rows import ResultKind, count, number, text, with_error
 
-KIND = kind_of(
+KIND = ResultKind(
     120, "Designs of the paper under interpretations of its text", ("reading", "design"),
     table={
         "reading": text(("reading",), "interpretation of the text of the paper"),

@@ -1,9 +1,9 @@
 """Time series of one simulation, with its outcome."""
 
 from hpcclear.base.outcome import IMPACTS
-from hpcclear.results.rows import estimate, kind_of, number, outcome, text
+from hpcclear.results.rows import ResultKind, estimate, number, outcome, text
 
-KIND = kind_of(
+KIND = ResultKind(
     10, "Response of a mechanism with clearance joints", ("time",),
     optional=("body", "point", "mode", "pin", "guide", "revolution", "order", "band"),
     table={

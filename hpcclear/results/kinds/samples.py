@@ -1,8 +1,8 @@
 """Designs and the outcomes of their simulations."""
 
-from hpcclear.results.rows import count, kind_of, number, outcome, text
+from hpcclear.results.rows import ResultKind, count, number, outcome, text
 
-KIND = kind_of(
+KIND = ResultKind(
     20, "Samples of a mechanism with clearance joints", ("sample",),
     design_dims=("sample",), whole=True, optional=("wave", "band"), absent="no design was sampled (`hpcclear sample` or `run`)",
     table={

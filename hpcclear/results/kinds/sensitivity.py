@@ -1,8 +1,8 @@
 """Slopes of response surfaces and Sobol indices."""
 
-from hpcclear.results.rows import count, flag, kind_of, number, text, with_error
+from hpcclear.results.rows import ResultKind, count, flag, number, text, with_error
 
-KIND = kind_of(
+KIND = ResultKind(
     40, "Sensitivity of the objective against clearance", ("surface", "interval", "clearance", "parameter"),
     absent="no sensitivities (`hpcclear run` of a study with `study.sensitivity.groups`)",
     table={

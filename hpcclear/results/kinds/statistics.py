@@ -1,9 +1,9 @@
 """Sums and histograms of samples that are not stored."""
 
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, flag, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     130, "Statistics of many samples", ("bin",),
     table={
         "joint": text(("joint",), "joint"),

@@ -1,8 +1,8 @@
 """How the ranks spent their time."""
 
-from hpcclear.results.rows import count, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     170, "Run time of the ranks", ("rank", "stage"), absent="the time of the ranks is not known",
     table={
         "rank": count(("rank",), "MPI rank"),

@@ -1,9 +1,9 @@
 """Designs verified by simulation."""
 
 from hpcclear.base.objectives import ORDINALS, Usual
-from hpcclear.results.rows import count, estimate, flag, kind_of, number, text, with_error
+from hpcclear.results.rows import ResultKind, count, estimate, flag, number, text, with_error
 
-KIND = kind_of(
+KIND = ResultKind(
     70, "Simulated designs with confidence intervals", ("design",),
     design_dims=("design",), optional=("rival", "constraint"), absent="no design was verified (`hpcclear run`)",
     table={

@@ -2,9 +2,9 @@
 
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.results.rows import count, estimate, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, estimate, flag, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     140, "Service lives of a mechanism with wear", ("life", "cycle"), design_dims=("life",), optional=("angle",), alone=True,
     table={
         "life": count(("life",), "number of the service life"),

@@ -1,8 +1,8 @@
 """Largest objective within the bounds of the random inputs."""
 
-from hpcclear.results.rows import count, flag, kind_of, number, text
+from hpcclear.results.rows import ResultKind, count, flag, number, text
 
-KIND = kind_of(
+KIND = ResultKind(
     100, "Worst case of designs", ("design", "input"),
     table={
         "design": text(("design",), "name of the design"),
