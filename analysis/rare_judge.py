@@ -27,6 +27,7 @@ import numpy as np
 import regret
 from directly import run_of
 
+from hpcclear.report.constraints import worded
 from hpcclear.report.merit import recommended
 from hpcclear.results import dataset
 from hpcclear.scene import Scene, load_scene
@@ -143,13 +144,14 @@ def judged(scene: Scene, place: Path, simulations: int) -> dict[str, Any]:
         for k in range(REPEATS)
     ])  # fmt: skip
     reach = student(0.95, REPEATS - 1) * each.std(ddof=1) / REPEATS**0.5
-    print(f"allowed {case.kept[0].most:g}; study: {best['constraints'].item()}")
+    stated = "; ".join(worded(best))
+    print(f"allowed {case.kept[0].most:g}; study: {stated}")
     first = float(best["first_true"])
     given = (first - best_allowed(scene, choice, float(each.mean()), simulations)) / abs(first)
     print(f"  judge {each.mean():.3g} ± {reach:.2g} (95 %); first objective {first:.4f}; {choice.design}")  # fmt: skip
     print(f"  given away {given:.2%}; {count} simulations, {seconds:.0f} s of one core", flush=True)
     row = {
-        "f": scene.objective.name, "most": case.kept[0].most, "stated": best["constraints"].item(),
+        "f": scene.objective.name, "most": case.kept[0].most, "stated": stated,
         "judge": f"{each.mean():.3g}", "error": f"{reach:.2g}", "objective": f"{first:.5g}",
         "given_away": f"{given:.4f}", "simulations": count, "seconds": round(seconds, 1),
     }  # fmt: skip
