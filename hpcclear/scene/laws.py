@@ -11,7 +11,8 @@ from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import at
 from hpcclear.laws import laws, names
-from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
+from hpcclear.laws.declared import Geometry, Law, Parameter
+from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS, Registry
 from hpcclear.scene.curves import Pairs
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, hint, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
@@ -78,7 +79,7 @@ def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
     return _on(law, shape if rows is None else shape.of_rows(rows))
 
 
-def _with_entries(kind: str) -> Iterator[Any]:
+def _with_entries(kind: str) -> Iterator[Law | Geometry]:
     """All of this package that has entries in a law's table: laws, and for contact the geometries."""
     yield from laws(kind).values()
     if kind == "contact":
@@ -94,13 +95,13 @@ def known_laws(kind: str) -> dict[str, Any]:
     return {**laws(kind), **others}
 
 
-def quantity_of(parameter: Any) -> Quantity:
+def quantity_of(parameter: Parameter) -> Quantity:
     """Of a law's parameter."""
     p = parameter
     return Quantity(p.unit, above=p.above, below=p.below, least=p.least, most=p.most)
 
 
-def _declare(kind: str, parameter: Any) -> None:
+def _declare(kind: str, parameter: Parameter) -> None:
     """Make an entry of a user's law known by its path."""
     quantity = quantity_of(parameter)
     ENTRIES.setdefault(f"effects.{kind}.{parameter.name}", {})[quantity.unit] = quantity
@@ -173,7 +174,7 @@ class LawTable(Table):
         return law
 
     @classmethod
-    def registry(cls) -> Any:
+    def registry(cls) -> Registry:
         """Where laws of users are found."""
         return CONTACT_LAWS if cls.kind == "contact" else FRICTION_LAWS
 
@@ -199,7 +200,7 @@ class LawTable(Table):
         return law
 
     @classmethod
-    def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
+    def _refuse_unknown(cls, data: Mapping[str, object], law: Law | None) -> None:
         others = {p.name: p for one in _with_entries(cls.kind) for p in one.parameters}
         entries = {} if law is None else {p.name: p for p in law.parameters}
         for key in data:
@@ -224,7 +225,7 @@ class LawTable(Table):
             )
 
     @classmethod
-    def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
+    def _converted(cls, data: Mapping[str, object], law: Law) -> dict[str, Any]:
         """Values of the law's parameters, defaults filled in."""
         found = {}
         theirs = law.name not in laws(cls.kind)
@@ -278,7 +279,7 @@ class LawTable(Table):
         every = {one.name: one for one in _with_entries(cls.kind)}
         for law in every.values():
             for p in law.parameters:
-                made["properties"].setdefault(p.name, _schema(p, law, every))
+                made["properties"].setdefault(p.name, _schema(p, every))
         words = made["properties"]["law"].get("description")
         made["properties"]["law"] = {
             "anyOf": [{"enum": [*laws(cls.kind)]}, {"type": "string", "pattern": PATTERN}],
@@ -310,7 +311,7 @@ def _curve(data: Mapping[str, object]) -> Any:
     return rows
 
 
-def _schema(parameter: Any, law: Any, every: Mapping[str, Any]) -> dict[str, Any]:
+def _schema(parameter: Parameter, every: Mapping[str, Law | Geometry]) -> dict[str, Any]:
     entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
     whose = [
         name for name, one in every.items() if parameter.name in {p.name for p in one.parameters}
@@ -327,11 +328,11 @@ def _schema(parameter: Any, law: Any, every: Mapping[str, Any]) -> dict[str, Any
     }
 
 
-def _an(parameter: Any) -> str:
+def _an(parameter: Parameter) -> str:
     return f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"
 
 
-def _value(parameter: Any, value: Any) -> Any:
+def _value(parameter: Parameter, value: object) -> Any:
     """A parameter's value in SI; an error for validators names its entry."""
     quantity = quantity_of(parameter)
     if parameter.count > 1:
