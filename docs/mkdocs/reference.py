@@ -332,11 +332,40 @@ def files(page: str = "files") -> Iterator[str]:
             "| name | dimensions | unit | meaning |",
             "| --- | --- | --- | --- |",
         )
-        for name, row in {**table.coords, **table.data}.items():
-            unit = _cell(row.unit("that of the objective"))
-            dims = ", ".join(f"`{one}`" for one in row.dims)
-            yield f"| `{name}` | {dims} | {unit} | {_cell(row.long_name)} |"
+        for names, dims, unit, meaning in _alike({**table.coords, **table.data}):
+            yield f"| {names} | {dims} | {unit} | {meaning} |"
         yield ""
+
+
+ORDINALS = "first|second|third|fourth|fifth"
+
+
+def _alike(rows: dict[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+    """Variables of a file: those of several objectives, both ends of an interval, and half-widths are a row each."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    meanings: dict[tuple[str, ...], str] = {}
+    differs = rf"(?<![a-z])({ORDINALS}|lower|upper)(?![a-z])"
+    for name, row in rows.items():
+        dims = ", ".join(f"`{one}`" for one in row.dims)
+        unit, meaning = _cell(row.unit("that of the objective")), _cell(row.long_name)
+        key = re.sub(differs, "", name), dims, unit, re.sub(differs, "", meaning)
+        interval = "half-width of the 95 % confidence interval of "
+        if meaning == interval + name.removesuffix("_limit"):
+            meaning = f"{interval}the variable without `_limit`"
+            key = "", dims, "as there", meaning
+        groups.setdefault(key, []).append(name)
+        meanings.setdefault(key, meaning)
+    for key, names in groups.items():
+        meaning = meanings[key]
+        if names[1:] and names[0].endswith("_lower"):
+            meaning = meaning.replace("lower", "lower and upper")
+        several = [
+            re.search(rf"(?<![a-z])({ORDINALS})(?![a-z])", one) for one in (names[0], names[-1])
+        ]
+        if len(names) > 2 and all(several):
+            words = " to ".join(one[0] for one in several if one)
+            meaning = re.sub(rf"\b({ORDINALS})\b", words, meaning)
+        yield ", ".join(f"`{name}`" for name in names), key[1], key[2], meaning
 
 
 def _cell(text: str) -> str:
