@@ -205,6 +205,15 @@ def test_more_coordinates_than_there_is_room_for_are_one_message():
         linkage_of(many(at.MAX_COORDINATES + 1))
 
 
+def test_a_chain_that_is_too_long_is_refused_before_its_text_is_written():
+    """Each of its bodies is coupled with all others: it needs more room than as many bodies beside each other."""
+    content = many(40).resolved()
+    for k in range(1, 40):
+        content["mechanism"]["joints"][f"pin_rod{k}"]["bearing"] = f"rod{k - 1}.b"
+    with pytest.raises(InputError, match="shorter chains"):
+        linkage_of(load_scene(content))
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("method", ["auto", "radau"])
 def test_sixty_four_coordinates_move_as_each_by_itself(method):

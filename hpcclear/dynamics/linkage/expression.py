@@ -7,6 +7,9 @@ in which the generator did, which decides the last bits. Names are read where th
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from hpcclear.base.errors import InputError
+from hpcclear.dynamics import layout as at
+
 _BINDS = {"+": 1, "*": 2, "/": 2, "name": 3}  # how tightly
 
 
@@ -240,6 +243,13 @@ class Writer:
             self.read.add(name)
             row = self.rows.setdefault(name, self.free)
             self.free = max(self.free, row + 1)
+            if self.free > at.WAVES:  # said at once: the rest of such a text takes minutes
+                count = f"more than {at.WAVES - at.OWN}"
+                reason = f"need too many products of lengths and masses: {count}"
+                remedy = (
+                    "Use fewer bodies, or shorter chains of them: each is coupled with all others"
+                )
+                raise InputError("mechanism.bodies", None, reason, remedy)
             comment = f"  # {self.derived[name]}" if name in self.derived else ""
             self.lines.append(f"{name} = par[{row} * W + i]{comment}")
 

@@ -7,6 +7,7 @@ coordinates every body is free, and every ideal joint and prescribed angle is a 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
@@ -66,11 +67,13 @@ class Forest:
     """Whether every body is a tree by itself."""
 
     def index(self, kind: str, body: str) -> int | None:
-        """Which coordinate it is, if it is one."""
-        for k, one in enumerate(self.coordinates):
-            if one.kind == kind and one.body == body:
-                return k
-        return None
+        """Which coordinate it is, if it is one; of several modes the first."""
+        return self._numbers.get((kind, body))
+
+    @cached_property
+    def _numbers(self) -> dict[tuple[str, str], int]:
+        numbered = enumerate(self.coordinates)
+        return {(one.kind, one.body): k for k, one in reversed(list(numbered))}
 
     def turning(self, frame: str) -> bool:
         """Whether a frame ever turns."""
