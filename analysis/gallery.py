@@ -15,24 +15,12 @@ from recorded import record
 
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report import save, sketch_figure
-from hpcclear.report.answer import answer
-from hpcclear.results import dataset
+from hpcclear.report.html.content import read
+from hpcclear.report.screens import screen_of
 from hpcclear.scene import load_scene
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "how-to" / "gallery.md"
-SHOWN = (
-    "recommended",
-    "values",
-    "mean",
-    "std. deviation",
-    "equivalent",
-    "active bounds",
-    "contact model",
-)
-"""Lines of the answer that the page repeats."""
-
-
 LINES = {
     "four_stroke": {"big_end": "24 mm", "small_end": "22 mm"},
     "three_rrr": dict.fromkeys(("knee0", "knee1", "knee2"), "16 mm"),
@@ -51,20 +39,21 @@ def run(name: str, place: Path, *sets: str) -> None:
 
 
 def lines_of(place: Path) -> dict[str, str]:
-    """What the answer of a study says, by its labels."""
-    found = {kind: dataset.read(place / f"{kind}.nc", kind) for kind in ("samples", "verification")}
-    return {line.label: line.text for line in answer(found, "") if line.label in SHOWN}
+    """What the first screen of a study says: headline, figures with their intervals, values of the design."""
+    first = screen_of(read(place))
+    assert first is not None
+    shown = {"recommended": first.headline, "doubt": first.doubt}
+    shown |= {
+        tile.label: f"{tile.value} {tile.within} {tile.change}".strip() for tile in first.tiles
+    }
+    return shown | {row.label: row.cells[-1] for row in first.rows}
 
 
 def table_of(columns: dict[str, dict[str, str]]) -> list[tuple[str, ...]]:
     """Answers beside each other, by their headings."""
-    rows = [("line", *columns)]
-    rows += [
-        (label, *(one.get(label, "") for one in columns.values()))
-        for label in SHOWN
-        if any(label in one for one in columns.values())
-    ]
-    return rows
+    labels = dict.fromkeys(label for one in columns.values() for label in one)
+    rows = [(label, *(one.get(label, "") for one in columns.values())) for label in labels]
+    return [("line", *columns), *rows]
 
 
 def main(results: Path) -> None:

@@ -9,7 +9,7 @@ import report_data as data
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.outcome import Flag, Status
-from hpcclear.cli.response import describe_response
+from hpcclear.cli.printing import describe_response
 from hpcclear.report import bearings
 from hpcclear.report.html import loads
 from hpcclear.report.html.content import Content
@@ -72,14 +72,14 @@ def test_a_peak_between_instants_has_no_angle(tmp_path, capsys):
     made = response()
     made["peak_contact_force"][:] = 3.0 * made["contact_force"].to_numpy().max(axis=0)
     assert {bearings.degrees(one) for one in bearings.bearings(made)} == {"–"}
-    describe_response(made, tmp_path / "a.nc")
+    describe_response(made, tmp_path / "a.nc", details=True)
     assert "angle not known" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize("flag", [Flag.LATCHED, Flag.BEYOND_HERTZ, Flag.TARGET_MISSED])
 def test_page_and_terminal_print_the_same_numbers_and_warnings(tmp_path, capsys, flag):
     made = response(flags=int(flag))
-    describe_response(made, tmp_path / "a.nc")
+    describe_response(made, tmp_path / "a.nc", details=True)
     shown = " ".join(capsys.readouterr().out.split())
     cells, texts = page_of(made)
     for one in bearings.bearings(made):
@@ -94,7 +94,7 @@ def test_page_and_terminal_print_the_same_numbers_and_warnings(tmp_path, capsys,
 
 def test_a_failed_simulation_has_no_loads(tmp_path, capsys):
     made = response(status=np.int8(Status.STEP_CAP))
-    describe_response(made, tmp_path / "a.nc")
+    describe_response(made, tmp_path / "a.nc", details=True)
     shown = capsys.readouterr().out
     assert "peak force" not in shown
     cells, texts = page_of(made)
@@ -137,7 +137,7 @@ def test_the_mean_torque_is_the_work_over_the_angle_whatever_the_instants(tmp_pa
     assert bearings.torque(made).mean == pytest.approx(force)
     made["crank_angle"][:] = np.sin(angle)  # it swings
     assert np.isnan(bearings.torque(made).mean)
-    describe_response(made, tmp_path / "a.nc")
+    describe_response(made, tmp_path / "a.nc", details=True)
     assert "largest 814 N m, mean" not in capsys.readouterr().out
 
 

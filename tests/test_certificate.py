@@ -18,7 +18,7 @@ from scipy.interpolate import PchipInterpolator
 from hpcclear.base.asking import answered
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
-from hpcclear.cli.effects import tolerance_of
+from hpcclear.cli.commands.effects import tolerance_of
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.ensemble.certificate import (
     Certificate,

@@ -45,19 +45,22 @@ def test_check_names_the_method_that_is_asked_for():
 
 
 def test_check_says_what_would_be_simulated():
-    done = hpcclear("check", "jobs/slider_crank.toml", *SHORT)
+    done = hpcclear("check", "jobs/slider_crank.toml", "--details", *SHORT)
     assert done.returncode == 0, done.stderr
     for word in (
         "effect 1",
         "lankarani-nikravesh",
         "8 (positions",
-        "force evaluations",
-        "ms on one core",
+        "evaluations",
+        "ms per sample on one core",
     ):
         assert word in done.stdout
     assert "Warning" in done.stdout  # the paper's own rod
     assert "\x1b" not in done.stdout  # no colours in a pipe
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
+    brief = hpcclear("check", "jobs/quickstart.toml", "--no-cost").stdout.splitlines()
+    assert len(brief) <= 24
+    assert max(map(len, brief)) <= 80
 
 
 @pytest.mark.mpi

@@ -80,7 +80,14 @@ def test_python_m_drops_the_directory_that_python_put_first(theirs):
     for name in BEFORE:
         (theirs / f"{name}.py").unlink(missing_ok=True)
     done = start(
-        theirs, sys.executable, "-m", "hpcclear", "check", "slider_crank.toml", "--no-cost"
+        theirs,
+        sys.executable,
+        "-m",
+        "hpcclear",
+        "check",
+        "slider_crank.toml",
+        "--no-cost",
+        "--details",
     )
     assert done.returncode == 0, done.stderr
     assert "scene hash" in done.stdout

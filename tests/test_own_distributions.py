@@ -153,7 +153,7 @@ def test_a_package_s_is_found_and_its_version_kept(tmp_path, monkeypatch):
 
 
 def test_check_prints_the_parameters(scene_file):
-    done = _command("check", str(scene_file), "--no-cost", "--set", FALLING)
+    done = _command("check", str(scene_file), "--no-cost", "--details", "--set", FALLING)
     assert done.returncode == 0, done.stderr
     printed = " ".join(done.stdout.split())
     assert "mylaws:Falling(start = 0.0004, width = 0.0003), 0.0004" in printed

@@ -13,8 +13,7 @@ from own_engine import engine
 
 import hpcclear
 from hpcclear.base.objectives import OURS
-from hpcclear.cli.printing import describe_samples, describe_statistics
-from hpcclear.cli.response import describe_response
+from hpcclear.cli.printing import describe_response, describe_run
 from hpcclear.cli.terminal import quantity
 from hpcclear.ensemble.samples import run_sample
 from hpcclear.ensemble.session import Options
@@ -106,8 +105,9 @@ def test_streamed_statistics_are_of_the_objective_asked_for(tmp_path):
     assert float(found.content["objective_mean"]) == pytest.approx(mean, rel=1e-12)
     assert found.content["objective_mean"].attrs["units"] == "N"
     assert int(found.content["objective_spread_count"]) == 0
-    describe_statistics(found)
-    describe_samples(run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet")))
+    describe_run(found, "statistics")
+    again = run_sample(scene, tmp_path / "a.nc", alone(), options=Options(style="quiet"))
+    describe_run(again, "samples", details=True)
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_a_response_holds_the_load_that_was_applied(more):
 
 def test_a_peak_between_the_instants_of_the_series_is_said_to_be_one(tmp_path, capsys):
     response = hpcclear.simulate(engine("output.instants_per_revolution=12", study=False))
-    describe_response(response, tmp_path / "response.nc")
+    describe_response(response, tmp_path / "response.nc", details=True)
     told = " ".join(capsys.readouterr().out.split())
     for joint in range(2):
         peak = float(response.peak_contact_force[joint])
@@ -190,9 +190,11 @@ def test_a_free_cranks_speed_and_its_drift_are_told(tmp_path, capsys):
         "effects.slider_load=none",
         "numerics.averaged_revolutions=3",
     )
-    describe_response(hpcclear.simulate(engine(*more, study=False)), tmp_path / "a.nc")
+    describe_response(
+        hpcclear.simulate(engine(*more, study=False)), tmp_path / "a.nc", details=True
+    )
     told = " ".join(capsys.readouterr().out.split())
     found = re.search(r"crank speed 3000 rpm at the start.* revolution ([+-][\d.]+) rpm", told)
     assert float(found[1]) == pytest.approx(0.5 * 30 / np.pi, rel=0.1)
-    describe_response(hpcclear.simulate(engine(study=False)), tmp_path / "b.nc")
+    describe_response(hpcclear.simulate(engine(study=False)), tmp_path / "b.nc", details=True)
     assert "crank speed" not in capsys.readouterr().out

@@ -13,7 +13,7 @@ from test_figures import _other_goals
 from hpcclear import report
 from hpcclear.base.objectives import Usual
 from hpcclear.cli import cli
-from hpcclear.cli.response import describe_response
+from hpcclear.cli.printing import describe_response
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.report.answer import answer
 from hpcclear.report.figures import labels, motion
@@ -173,7 +173,7 @@ def test_the_stored_peak_is_one_of_the_averaged_revolutions(tmp_path, capsys):
     response["contact_force"][:] = force[:, None]
     response["peak_contact_force"][:] = 1500.0
     response.attrs["transient_turns"] = 2
-    describe_response(response, tmp_path / "a.nc")
+    describe_response(response, tmp_path / "a.nc", details=True)
     shown = " ".join(capsys.readouterr().out.split())
     assert "largest stored value of the averaged revolutions 1 kN" in shown
     assert "2 kN" not in shown

@@ -131,7 +131,7 @@ def simulated(tmp_path: Path, *changes: str) -> str:
 def test_a_chaotic_response_is_printed_with_the_half_width_that_its_replicas_give(tmp_path: Path):
     """As shipped it has 20.9 um by one method and 18.6 um by another; other pairs and tolerances are the oracle."""
     shown = simulated(tmp_path)
-    f, half_width = map(float, re.search(r"objective f ([\d.]+) ± ([\d.]+)", shown).groups())
+    f, half_width = map(float, re.search(r"objective f ([\d.]+) \S+ ± ([\d.]+)", shown).groups())
     assert half_width > 0.01 * f
     assert "sensitive to initial conditions" in shown
     scene = scene_of("linkages/quick_return.toml")
@@ -156,12 +156,12 @@ def test_a_regular_response_is_printed_without_a_warning(tmp_path: Path):
     done = CliRunner().invoke(
         cli, ["simulate", scene, "-o", str(tmp_path / "r.nc"), *words], standalone_mode=False
     )
-    assert re.search(r"objective f +[\d.]+ (±|\+-) [\d.]+", done.stdout)
+    assert re.search(r"objective f +[\d.]+ \S+ +(±|\+-) [\d.]+", done.stdout)
     assert "sensitive" not in done.stdout
 
 
 def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Path, capsys):
-    from hpcclear.cli.printing import describe_samples
+    from hpcclear.cli.printing import describe_run
 
     for error, words in ((None, "not checked"), (0.3, "median")):
         scene = load_scene(JOBS / "quickstart.toml").with_(
@@ -173,7 +173,7 @@ def test_samples_say_that_nobody_checked_them_or_how_sure_they_are(tmp_path: Pat
         )
         same = found.content["objective_uncertainty"].to_numpy()
         np.testing.assert_array_equal(same, found.content.get("objective_limit", np.nan * same))
-        describe_samples(found)
+        describe_run(found, "samples", details=True)
         line = next(x for x in capsys.readouterr().out.splitlines() if "half-width of f" in x)
         assert words in line
 

@@ -147,7 +147,7 @@ AFTER = [
     "call hpcclear.ranks.progress:Progress.add 5",
     "call hpcclear.results.checkpoint:Checkpoint.finish",
     "call hpcclear.ensemble.session:timing_of",
-    "call hpcclear.cli.printing:describe_samples",
+    "call hpcclear.cli.printing:describe_run",
 ]
 CASES = [(case, 0) for case in BEFORE + DURING + AFTER] + [(case, 1) for case in DURING]
 STUDY_CASES = [

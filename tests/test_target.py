@@ -13,7 +13,7 @@ from hpcclear import simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Regime
 from hpcclear.cli import cli
-from hpcclear.cli.response import describe_response
+from hpcclear.cli.printing import describe_response
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.evaluation.steady import procedure
 from hpcclear.dynamics.evaluation.steady.copies import perturbed, scales
@@ -235,9 +235,9 @@ def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys):
     found = simulate(scene)
     assert found["mean_gap"].shape == (1,)
     assert float(found["objective"]) == float(found["mean_gap"][0]) > 0.0
-    describe_response(found, tmp_path / "a.nc")
-    steady = re.search(r"f, steady mean +([0-9.]+)", capsys.readouterr().out)
-    assert float(steady[1]) == pytest.approx(1e6 * float(found["objective"]), rel=0.1)
+    describe_response(found, tmp_path / "a.nc", details=True)
+    steady = re.search(r"objective f +([0-9.]+)", capsys.readouterr().out)
+    assert float(steady[1]) == pytest.approx(1e3 * float(found["objective"]), rel=0.1)
 
 
 @pytest.mark.parametrize("changes", [{"numerics.objective": "peak-contact-force"}, {"study": None}])

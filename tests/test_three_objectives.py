@@ -17,12 +17,12 @@ from patience import crowded
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer
-from hpcclear.report.beside import beside_original
+from hpcclear.report import beside
 from hpcclear.report.constraints import worded
 from hpcclear.report.html import designs, picture
-from hpcclear.report.html.content import read
+from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.page import write_report
+from hpcclear.report.screens import screen_of
 from hpcclear.results.content import Results, each
 from hpcclear.scene import Scene, load_scene
 from hpcclear.statistics.search.certainty import Compared
@@ -252,22 +252,15 @@ def test_cases_with_other_numbers_of_goals_stand_beside_each_other(tmp_path: Pat
 
 def test_the_answer_has_a_column_for_each_end(study: Path) -> None:
     found = verified(study)
-    ((case, designs, lines),) = beside_original(found)
-    assert case == "three"
-    assert [name.removesuffix(", recommended") for name in designs][:4] == [
+    shown = beside.roles(found)["three"]
+    assert [role.words.removesuffix(", recommended") for role in shown][:4] == [
         "baseline",
         "lowest mean (alpha)",
         "lowest std. dev. (beta)",
         f"lowest {THIRD} (gamma)",
     ]
-    rows = {line[0]: line[1:] for line in lines}
-    assert set(map(len, rows.values())) == {len(designs)}
-    assert rows[THIRD][3] == "0"
-    told = [
-        line.text for line in answer({"verification": found}, "out") if line.label == "objective"
-    ]
-    assert len(told) == 1  # mean and deviation have lines anyway
-    assert told[0].startswith(THIRD)
+    first = screen_of(Content(study, {"verification": found}, {}))
+    assert THIRD in [tile.label for tile in first.tiles]
 
 
 def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
@@ -281,13 +274,14 @@ def test_the_page_shows_any_two_of_the_three(study: Path) -> None:
     assert [THIRD, "0"] in gamma["direct"]
     part = designs.designs(content)
     assert part is not None
-    assert part["tables"][0].header[-4:] == [
+    table = next(one for one in part if not isinstance(one, str))
+    assert table.header[-4:] == [
         "objective 1",
         "objective 2",
         "objective 3",
         "constraints",
     ]
-    assert any(row[0] == f"lowest {THIRD} (gamma)" for row in part["tables"][0].rows)
+    assert any(row[0] == f"lowest {THIRD} (gamma)" for row in table.rows)
 
 
 _CHOOSE = """

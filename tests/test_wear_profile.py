@@ -358,7 +358,7 @@ def test_an_angular_life_of_a_turning_journal(tmp_path):
     }
     file = tmp_path / "rotor.toml"
     file.write_text(tomli_w.dumps(content), encoding="utf-8")
-    code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc")], 0)
+    code, output = commands.run(["wear", str(file), "-o", str(tmp_path / "out.nc"), "--details"], 0)
     assert code == 0, output
     assert "with uniform wear" in " ".join(output.split())
     found = opened.read(tmp_path / "out.nc", "wear")

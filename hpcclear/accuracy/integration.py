@@ -19,11 +19,10 @@ from hpcclear.accuracy.methods import (
 )
 from hpcclear.accuracy.profile import Profile
 from hpcclear.base.arrays import Array
+from hpcclear.report.html.costs import MARGIN
 from hpcclear.scene import Scene
 
 REFERENCE_RTOL = 1e-13
-MARGIN = 100.0
-"""The reference must be this many times better than what is measured against it."""
 LOST = 10.0
 """Error of the position, in lengths of the crank, above which a method has lost the motion: its errors are not reported."""
 

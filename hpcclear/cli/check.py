@@ -1,14 +1,16 @@
 """What the command `check` prints: effects, states, the study, and the measured run time of a sample."""
 
+import textwrap
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.cli.options import place_of, show
-from hpcclear.cli.terminal import console, quantity, remark, table
+from hpcclear.cli.options import detailed, place_of, show
+from hpcclear.cli.terminal import WIDTH, console, quantity, remark, table
 from hpcclear.dynamics.evaluation.steady.wording import in_a_line
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
@@ -17,6 +19,20 @@ from hpcclear.scene.plugged import files_run
 
 if TYPE_CHECKING:
     from hpcclear.ranks.team import Ranks
+
+
+MOST_WARNINGS = 3
+"""Warnings that are printed without ``--details``."""
+
+
+def show_rows(title: str, rows: list[tuple[str, str]]) -> None:
+    """Print what and its value in two columns, with ``--details`` under a title."""
+    if detailed():
+        console().print(table(title, rows))
+        return
+    for label, text in rows:
+        for k, line in enumerate(textwrap.wrap(text, WIDTH - 17) or [""]):
+            console().print(f"{'' if k else label:15}  {line}", soft_wrap=True)
 
 
 def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:
@@ -35,35 +51,53 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
     states = 2 * (coordinate_count(scene) - scene.bristles)
     bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
     open_joints = len(scene.contact_labels())
-    rows = [(f"effect {k}", text) for k, text in enumerate(scene.effects_on(), 1)]
-    method = integrator_of(scene)
-    rows += [
-        (
-            "states",
-            f"{states} (positions and velocities){bristles} + {open_joints} integrals of the gaps",
-        ),
-        ("method", f"{method}, rtol {scene.numerics.rtol:g}"),
-        (
-            "revolutions",
-            f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged",
-        ),
-        ("time series", sizing.words(scene)),
-        *_speeds(scene),
-        *_assembly(scene),
-        *_tables(scene),
-        ("scene hash", scene.hash[:16]),
-        ("MPI", _mpi(ranks)),
-    ]
-    out.print(table("Model", rows))
+    method = f"{integrator_of(scene)}, rtol {scene.numerics.rtol:g}"
+    turns = f"{scene.numerics.transient_revolutions} transient + {scene.numerics.averaged_revolutions} averaged"
+    effects = scene.effects_on()
+    if detailed():
+        rows = [
+            *((f"effect {k}", text) for k, text in enumerate(effects, 1)),
+            (
+                "states",
+                f"{states} (positions and velocities){bristles} + {open_joints} integrals of the gaps",
+            ),
+            ("method", method),
+            ("revolutions", turns),
+            ("time series", sizing.words(scene)),
+            *_speeds(scene),
+            *_assembly(scene),
+            *_tables(scene),
+            ("scene hash", scene.hash[:16]),
+            ("MPI", _mpi(ranks)),
+        ]
+    else:
+        _assembly(scene)  # refuses what does not close
+        rows = [
+            ("effects", _few(effects)),
+            ("method", f"{method}; {turns} revolutions"),
+            *_speeds(scene)[:2],
+            ("MPI", _mpi(ranks)),
+        ]
+    show_rows("Model", rows)
     for text in (*files_run(scene.plugins), *scene.readings):
         out.print(remark("Note", text))
-    for warning in (*locked, *_cautions(scene), *scene.warnings):
+    warned = [*locked, *_cautions(scene), *scene.warnings]
+    most = len(warned) if detailed() else MOST_WARNINGS
+    for warning in warned[:most]:
         out.print(remark("Warning", warning))
+    if len(warned) > most:
+        out.print(remark("Warning", f"{len(warned) - most} more (--details)"))
     if scene.study is not None:
-        out.print(table("Study", _study_rows(scene)))
+        show_rows("Study", _study_rows(scene))
     if cost and not locked:
-        out.print(table("Run time of a sample on this machine", _cost_rows(scene)))
+        show_rows("Run time of a sample on this machine", _cost_rows(scene))
     return not locked
+
+
+def _few(texts: Sequence[str], most: int = 6) -> str:
+    """The first texts, and how many more there are."""
+    more = f"; and {len(texts) - most} more (--details)" if len(texts) > most else ""
+    return "; ".join(texts[:most]) + more
 
 
 def draw(scene: Scene, sketch: Path) -> None:
@@ -159,6 +193,11 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
         ("samples", f"{study.samples} ({spread.DRAWN[study.method]}), seed {study.seed}"),
         ("objective", f"{study.objective}: {scene.objective.words}"),
     ]
+    if not detailed():
+        names = _few([one.name for one in study.variables], 20).replace(";", ",")
+        rows += [("variables", names)] if names else []
+        names = _few([row.name for row in (*study.random, *study.worn)], 20).replace(";", ",")
+        return [*rows, *([("random", names)] if names else [])]
     for variable in study.variables:
         loads = "" if variable.over is None else f" (load cases, {_over(variable.over)})"
         if variable.rows:
@@ -223,8 +262,8 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     evaluations = int(record["rhs_evaluations"])
     rows = [("f, steady mean", in_a_line(record))] if record["regime"] else []
     rows += [
-        ("force evaluations", f"{evaluations}"),
-        ("run time per sample", f"{each * 1e3:.3g} ms on one core ({DEFAULT_LANES} per batch)"),
+        ("run time", f"{each * 1e3:.3g} ms per sample on one core ({DEFAULT_LANES} per batch)"),
+        ("evaluations", f"{evaluations} of the forces"),
         ("compilation", f"{max(first - each * DEFAULT_LANES, 0.0):.1f} s (stored for later runs)"),
     ]
     if scene.study is None:

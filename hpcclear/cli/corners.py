@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from hpcclear.cli.terminal import console, fitting, table
+from hpcclear.cli.check import show_rows
+from hpcclear.cli.terminal import fitting
 from hpcclear.ensemble.corners import MOST, CornerOutcomes, tried
 from hpcclear.report.failures import Sampled, sentences, where
 from hpcclear.scene import Scene
@@ -12,7 +13,7 @@ def describe(scene: Scene, simulate: bool) -> None:
     """Print which corners of the ranges make no mechanism, and which fail in two revolutions, where, and what to do."""
     found = tried(scene, simulate)
     rows = [(label, fitting(text)) for label, text in lines(found, simulate)]
-    console().print(table("Corners of the study's ranges", rows))
+    show_rows("Corners of the study's ranges", rows)
 
 
 def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
@@ -26,7 +27,7 @@ def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
     bad = len(found.refused) + int((found.status > 0).sum())
     does = "can be assembled and complete two revolutions" if simulate else "can be assembled"
     which = "all corners" if total < MOST or total == 2 ** len(columns) else "a balanced selection"
-    rows = [("tried", f"{total} ({which}): {total - bad} {does}")]
+    rows = [("corners", f"{total} ({which}): {total - bad} {does}")]
     for reason in dict.fromkeys(found.refused.values()):
         hit = np.array([found.refused.get(row) == reason for row in range(total)])
         place = where(hit, columns)

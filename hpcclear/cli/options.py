@@ -183,6 +183,25 @@ class Command(click.Command):
         return left
 
 
+DETAILED = f"{__name__}.details"
+"""Key of the context's `meta`: whether ``--details`` was given."""
+
+
+def _note(context: click.Context, option: click.Parameter, given: bool) -> None:
+    context.meta[DETAILED] = given
+
+
+def detailed() -> bool:
+    """Whether the user asked for all results; not outside of a command."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(DETAILED))
+
+
+DETAILS = click.option(
+    "--details", is_flag=True, expose_value=False, callback=_note, help="Print all results, not the first screen only."
+)  # fmt: skip
+
+
 def command(group: str, words: str, ranks: bool = False) -> Callable[[Callable[..., int]], Command]:
     """Make a command of a function; its name is that of the function's file.
 
@@ -192,6 +211,7 @@ def command(group: str, words: str, ranks: bool = False) -> Callable[[Callable[.
     def declared(function: Callable[..., int]) -> Command:
         name = function.__module__.rpartition(".")[2]
         work = function if ranks else _of_root(function)
+        work = DETAILS(work) if group == "compute" else work
         made = click.command(name, cls=Command, short_help=words)(work)
         made.group, made.ranks = group, ranks
         return made

@@ -1,181 +1,184 @@
-"""What the commands that simulate many designs print."""
+"""What commands print of results: the first screen of the page, in at most 24 lines of 80 columns; all of them on request."""
 
-from collections.abc import Sequence
+import contextlib
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
-from hpcclear.base.outcome import Regime, Status
-from hpcclear.cli.terminal import console, counted, fitting, objective_of, quantity, remark, table
-from hpcclear.ranks.progress import duration
-from hpcclear.report import spread
-from hpcclear.report.answer import answer
-from hpcclear.report.beside import beside_original
-from hpcclear.report.failures import explained
-from hpcclear.report.figures import labels
-from hpcclear.report.parts import LinesOf, declared
+from hpcclear.base.errors import InputError
+from hpcclear.cli.options import detailed
+from hpcclear.cli.terminal import WIDTH, console, fitting
+from hpcclear.report.html.content import Content
+from hpcclear.report.screen import Level, Screen
+from hpcclear.report.screens import screen_of
+from hpcclear.report.spread import Line
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from hpcclear.ensemble.session import Finished
 
+LINES = 24
+"""Lines of a terminal, all of a command's answer."""
 
-def _load(found: "Finished") -> list[tuple[str, str]]:
-    """Wall time, and how every rank spent it."""
-    words = "busy {:.2f} s, idle {:.2f} s, compile {:.2f} s, write {:.2f} s"
-    ranks = [(f"rank {rank}", words.format(*row)) for rank, row in enumerate(found.spent)]
-    return [("wall time", f"{found.seconds:.1f} s"), *ranks]
+_COLOURS = {Level.RED: "bold red", Level.AMBER: "yellow", Level.GREEN: "green"}
 
 
-def describe_statistics(found: "Finished") -> None:
-    """Print mean and standard deviation of f, the error of the mean, failures and load of a streamed Monte Carlo."""
-    out, content = console(), found.content
-    by_status = content["samples_by_status"]
-    total, good = int(np.sum(by_status)), int(by_status.sel(outcome=int(Status.OK)))
-    rows = [("simulated", f"{good} of {total} without failure")]
-    if int(content["objective_count"]) > 1:
-        mean, deviation = (float(content[f"objective_{n}"]) for n in ("mean", "deviation"))
-        error = deviation / int(content["objective_count"]) ** 0.5
-        words, unit = objective_of(content)
-        rows.append(("f", words))
-        shown = f"{quantity(mean, unit, 6)}, standard error {quantity(error, unit, 2)}"
-        rows.append(("mean of f", shown))
-        rows.append(("std. deviation of f", quantity(deviation, unit)))
-        rows.append(("half-width of a single f", labels.NOT_CHECKED))
-    out.print(table("Statistics", rows))
-    out.print(table("Run", _load(found)))
-    out.print(f"statistics {found.output}")
+def describe(
+    content: Content, *written: Path, asked: Sequence[Line] = (), details: bool | None = None
+) -> None:
+    """Print the first screen of results, then the files that were written.
 
-
-def describe_study(place: Path) -> None:
-    """Print the ends of its fronts beside the baseline, the answer of a finished study, its run time, and its files."""
-    kinds = {"timing", *(kind for part in declared(LinesOf) for kind in part.kinds)}
-    paths = {kind: place / f"{kind}.nc" for kind in kinds}
-    found = {kind: dataset.read(path, kind) for kind, path in paths.items() if path.exists()}
-    out = console()
-    level = float(found["verification"].attrs.get("confidence", 0.95))
-    for case, designs, rows in beside_original(found["verification"]):
-        beside = Table(
-            title=f"Case {case}: simulated designs against the baseline (± {level:.0%} half-width)",
-            title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False,
-        )  # fmt: skip
-        beside.add_column(
-            "", min_width=11 if len(designs) > 4 else None
-        )  # "constraints" in one line
-        for header in designs:
-            beside.add_column(header)
-        for row in rows:
-            beside.add_row(*(fitting(text) for text in row))
-        out.print(beside)
-    lines = [(line.label, fitting(line.text)) for line in answer(found, str(place))]
-    timing = found["timing"]
-    spent = np.sum(
-        [timing[name].to_numpy().sum(1) for name in ("busy", "idle", "compile", "write")], axis=0
-    )
-    lines.append(("run time", f"{duration(float(spent.max()))} on {counted(timing.sizes['rank'])}"))
-    out.print(table("Result", lines))
-    out.print(f"designs  {place / 'verification.nc'}", soft_wrap=True)
-
-
-def describe_samples(found: "Finished", thresholds: Sequence[spread.Beyond] = ()) -> None:
-    """Print throughput, range and statistics of f, failures, warnings and load of a batch of samples.
-
-    `thresholds`: values whose exceedance is printed.
+    `asked`: lines that the user asked for besides. `details`: whether all sections of the page follow; by default as the option
+    ``--details`` says.
     """
-    out, samples = console(), found.content
-    f = samples["objective"].to_numpy()
-    status = samples["status"].to_numpy()
-    good = f[status == Status.OK]
-    made = f"{len(good)} of {len(f)}"
-    rows = [("simulated", f"{made} without failure")]
-    rows += [("failed", fitting(text)) for text in explained(samples)]
-    if len(good):
-        words, unit = objective_of(samples)
-        low, high, middle = (quantity(x, unit) for x in (good.min(), good.max(), np.median(good)))
-        rows += [("f", words), ("range of f", f"{low} to {high}, median {middle}")]
-        rows.append(("half-width of f", _half_widths(samples)))
-        in_time = samples["objective_spread"].to_numpy()[status == Status.OK] / good
-    if len(good) and np.isfinite(in_time).any():
-        rows.append(
-            (
-                "cycle-to-cycle std. dev.",
-                f"median {np.median(in_time):.2%}, largest {in_time.max():.2%} of f",
-            )
+    out = console()
+    details = detailed() if details is None else details
+    files = [f"written  {path}" for path in written if path.exists()]
+    more = [line for one in asked for line in _labelled(one.label, one.text)]
+    if (first := screen_of(content)) is not None:
+        for line in [*fitted(first, LINES - len(files) - len(more) - 1), *more]:
+            out.print(line)
+    if details:
+        from hpcclear.report.html.page import sections  # loads all that can be printed
+
+        troubles: list[str] = []
+        for part, parts in sections(content, troubles):
+            out.print(Text(f"\n{part.title}", "bold"))
+            for one in parts:
+                _print(out, one)
+        for text in troubles:
+            out.print(text)
+    elif first is not None and files:
+        files[-1] += "    (--details prints all)"
+    for place in files:
+        out.print(place, soft_wrap=True)
+
+
+def describe_run(
+    found: "Finished", kind: str, asked: Sequence[Line] = (), details: bool | None = None
+) -> None:
+    """Print what a run on all ranks found, of this kind; further arguments as for `describe`."""
+    own = {kind: found.content}
+    with contextlib.suppress(InputError):  # it may be written over by another command
+        own["timing"] = dataset.read(found.timing, "timing")
+    content = Content(found.output.parent, own, {})
+    describe(content, found.output, asked=asked, details=details)
+
+
+def describe_response(response: Results, output: Path, details: bool | None = None) -> None:
+    """Print one response (kind ``response``) and its file."""
+    describe(Content(output.parent, {}, {}, {"response": response}), output, details=details)
+
+
+def fitted(first: Screen, most: int) -> list[Text]:
+    """Return a first screen in at most so many lines: rows of the table go first, then what is surely right, then advice."""
+    rows, trust, steps = len(first.rows), len(first.trust), min(len(first.steps), 2)
+    while True:
+        lines = list(_lines(first, rows, trust, steps))
+        if len(lines) <= most or (rows <= 1 and trust <= 1 and not steps):
+            return lines[:most]
+        if rows > 3:
+            rows -= 1
+        elif trust > 1 and first.trust[trust - 1].level is Level.GREEN:
+            trust -= 1
+        elif steps:
+            steps -= 1
+        elif rows > 1:
+            rows -= 1
+        else:
+            trust -= 1
+
+
+def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
+    """The lines of a first screen with so many rows, lines on trust and steps."""
+    for line in _wrapped(first.headline):
+        yield Text(line, "bold")
+    if first.doubt:
+        yield from (Text(line, "bold red") for line in _wrapped(f"Indicative only: {first.doubt}"))
+    yield from map(Text, _wrapped("; ".join(filter(None, first.about))))
+    yield Text("")
+    numbers = [[one.label, one.before, one.value, one.change, one.within] for one in first.tiles]
+    table = [
+        [
+            row.label,
+            *row.cells,
+            "",
+            f"{row.span.bound} bound" if row.span and row.span.bound else "",
+        ]
+        for row in first.rows[:rows]
+    ]
+    if first.header[1:2] == ("today",):
+        yield from _columns([["", *first.header[1:], "change", "95 %"], *numbers, *table])
+    else:
+        yield from _columns([[row[0], *row[2:]] for row in numbers])
+        yield from _columns([first.header, *table] if table else [])
+    if rows < len(first.rows):
+        yield Text(f"and {len(first.rows) - rows} more")
+    yield Text("")
+    for one in first.trust[:trust]:
+        label = "trust" if one is first.trust[0] else ""
+        lines = _wrapped(fitting(one.text), 14)
+        yield Text.assemble(
+            f"{label:6}", (f"{one.level.name.lower():6}", _COLOURS[one.level]), f"  {lines[0]}"
         )
-    if "target_error_reached" in samples.attrs:
-        rows.append(("target error", str(samples.attrs["target_error_reached"])))
-    speed, busy = [], found.spent[:, 0]
-    evaluations = int(np.sum(samples["rhs_evaluations"]))
-    if busy.sum() > 0.0:
-        throughput = f"{len(f) / busy.sum():.0f} samples per second and core"
-        if evaluations:  # without clearance there is nothing to integrate
-            throughput += f", {busy.sum() / evaluations * 1e9:.1f} ns per force evaluation"
-        speed = [("throughput", throughput)]
-    out.print(table("Samples", rows))
-    if lines := spread.statistics(samples, thresholds):
-        rows = [(line.label, fitting(line.text)) for line in lines]
-        out.print(table("Statistics, with 95 % confidence intervals", rows))
-    for text in spread.remarks(samples):
-        out.print(remark("Warning", text))
-    out.print(table("Run", speed + _load(found)))
-    for what, path in (("samples", found.output), ("timing", found.timing)):
-        if path.exists():  # what was merged has its times beside the parts
-            out.print(f"{what:8} {path}")
+        yield from (Text(" " * 14 + line) for line in lines[1:])
+    for label, text in (("scatter", first.causes), ("note", first.remark)):
+        yield from _labelled(label, text.replace("Orange: active bound.", "").strip())
+    for k, text in enumerate(first.steps[:steps]):
+        yield from _labelled("" if k else "next", text)
 
 
-def _half_widths(samples: Results) -> str:
-    """Median and largest half-width of f over f, or "not checked"."""
-    name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
-    good = samples["status"].to_numpy() == Status.OK
-    shares = (samples[name].to_numpy() / abs(samples["objective"].to_numpy()))[good]
-    if not np.isfinite(shares).any():
-        if "objective" in samples.attrs:
-            return f"{labels.NOT_CHECKED}; a response has one (hpcclear simulate)"
-        return f"{labels.NOT_CHECKED}; set numerics.target_error to estimate it for each sample"
-    return f"median {np.nanmedian(shares):.2%}, largest {np.nanmax(shares):.2%} of f"
+def _labelled(label: str, text: str) -> Iterator[Text]:
+    for k, line in enumerate(_wrapped(fitting(text), 8) if text else []):
+        yield Text(f"{'' if k else label:8}{line}")
 
 
-def describe_map(found: "Finished") -> None:
-    """Print how many cells are of which kind, and the load."""
-    out, content = console(), found.content
-    good = content["status"].to_numpy() == Status.OK
-    rows = [("cells", f"{int(good.sum())} of {len(good)} without failure")]
-    for regime in Regime:
-        count = int(((content["regime"].to_numpy() == regime) & good).sum())
-        if count and regime is not Regime.UNJUDGED:
-            name, _, meaning = regime.meaning.partition(": ")
-            rows.append((name, f"{count} cells: {meaning}"))
-    periods, counts = np.unique(content["period"].to_numpy()[good], return_counts=True)
-    parts = [
-        f"{p:.0f} in {n} cells" for p, n in zip(periods, counts, strict=True) if np.isfinite(p)
-    ]
-    rows.append(("period, revolutions", ", ".join(parts) or "none found"))
-    growth = content["lyapunov_exponent"].to_numpy()[good]
-    if len(growth):
-        text = f"{growth.min():.3g} to {growth.max():.3g} per revolution"
-        rows.append(("largest Lyapunov exponent", text))
-    out.print(table("Map", rows))
-    out.print(table("Run", _load(found)))
-    out.print(f"map      {found.output}")
+def _wrapped(text: str, margin: int = 0) -> list[str]:
+    return textwrap.wrap(fitting(text), WIDTH - margin)
 
 
-def describe_bifurcation(found: "Finished") -> None:
-    """Print what was observed, its range, failures and load."""
-    out, seen = console(), found.content["observed"]
-    count, crossings = seen.shape
-    failed = int(np.isnan(seen).all(axis=1).sum())
-    rows = [
-        ("values", f"{count - failed} of {count} without failure"),
-        ("observed", f"{seen.attrs['long_name']}, {crossings} revolutions each"),
-    ]
-    if failed < count:
-        unit = str(seen.attrs["units"])
-        low, high = (quantity(float(end), unit) for end in (np.nanmin(seen), np.nanmax(seen)))
-        rows.append(("range", f"{low} to {high}"))
-    out.print(table("Bifurcation", rows))
-    out.print(table("Run", _load(found)))
-    out.print(f"written  {found.output}")
+def _columns(rows: Sequence[Sequence[str]]) -> Iterator[Text]:
+    """Rows in columns that fit the terminal; labels that are too long are cut, and lines that still are too long are folded."""
+    filled = [[fitting(cell) for cell in row] for row in rows]
+    count = max(map(len, filled), default=0)
+    filled = [[*row, *[""] * (count - len(row))] for row in filled]
+    widths = [max(len(row[k]) for row in filled) for k in range(count)]
+    if filled:
+        rest = sum(widths[1:]) + 2 * sum(width > 0 for width in widths[1:])
+        widths[0] = min(widths[0], max(WIDTH - rest, 14))
+    for row in filled:
+        row[0] = textwrap.shorten(row[0], widths[0], placeholder="..")
+        line = "  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True) if w)
+        if len(line := line.rstrip()) <= WIDTH:
+            yield Text(line)
+        else:
+            yield from map(Text, textwrap.wrap(line, WIDTH, subsequent_indent="    "))
+
+
+def _print(out: Any, part: object) -> None:
+    """Print a part of a section of the page: a text, a table, text whose lines stay, or parts that are folded there."""
+    if isinstance(part, str):
+        out.print(fitting(part))
+    elif isinstance(part, Mapping):
+        for one in part.get("parts", ()):
+            _print(out, one)
+        if "text" in part:
+            out.print(part["text"], soft_wrap=True)
+    else:
+        made = Table(title=part.caption, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)  # type: ignore[attr-defined]
+        for head in part.header:  # type: ignore[attr-defined]
+            made.add_column(fitting(str(head)), overflow="fold")
+        for row in part.rows:  # type: ignore[attr-defined]
+            made.add_row(
+                *(
+                    fitting(str(cell["words"] if isinstance(cell, Mapping) else cell))
+                    for cell in row
+                )
+            )
+        out.print(made)

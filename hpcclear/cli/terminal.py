@@ -11,7 +11,6 @@ from rich.text import Text
 
 from hpcclear.base.plain import plain
 from hpcclear.report.figures import labels
-from hpcclear.results.content import Results
 
 WIDTH = 80
 
@@ -58,12 +57,6 @@ def fitting(text: str) -> str:
     if "utf" in (sys.stdout.encoding or "").lower():
         return text
     return text.replace("µ", "u").replace("²", "^2").replace("–", "-").replace("±", "+-")
-
-
-def objective_of(content: Results) -> tuple[str, str]:
-    """What f is in a file of results, in words, and its unit."""
-    f = content["objective" if "objective" in content else "objective_mean"]
-    return labels.objective(content), str(f.attrs["units"])
 
 
 def counted(ranks: int) -> str:

@@ -186,33 +186,6 @@ def _evenly(
     }
 
 
-def doubts(content: Results) -> list[str]:
-    """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
-    state."""
-    texts = []
-    unsure = int((content["flags"].to_numpy() == Flag.TARGET_MISSED).sum())
-    if unsure:
-        texts.append(
-            f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
-        )
-    drift = content["drift"].to_numpy()
-    moving = int((drift > content.attrs["tolerance"]).sum())
-    if moving:
-        count = f"{moving} service {'life' if moving == 1 else 'lives'}"
-        texts.append(
-            f"{count} had not reached steady state ({drift.max():.1%} change with a longer transient); "
-            "raise numerics.transient_revolutions"
-        )
-    if "sharpest" in content:
-        narrow = int((content["sharpest"].to_numpy() > 1.0).sum())
-        if narrow:
-            texts.append(
-                f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges; "
-                "lower wear.harmonics"
-            )
-    return texts
-
-
 def _stacked(found: list[Curves], name: str) -> Array:
     return np.stack([getattr(one, name) for one in found])
 

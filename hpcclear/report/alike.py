@@ -16,23 +16,6 @@ NAMED = 3
 """Designs named before the rest is counted."""
 
 
-def words(ours: Results, best: Results) -> str:
-    """Return the designs that are equivalent to the best and satisfy the constraints, and the range of their variables."""
-    twins = others(ours, best)
-    if not satisfies(best):
-        return "none: the constraints are not shown to be satisfied"
-    if not twins:
-        left = (
-            ""
-            if all(map(satisfies, _each(ours)))
-            else " or is not shown to satisfy the constraints"
-        )
-        return f"none: every other design differs significantly{left}"
-    shown = f"{_listed(twins)}: statistically indistinguishable, choose by cost"
-    spans = _spans(ours.isel(design=np.isin(ours["design"], [best["design"].item(), *twins])))
-    return f"{shown} ({spans})" if spans else shown
-
-
 FLAT = 0.01
 """Relative difference of merit up to which other designs are listed beside the best."""
 
@@ -49,8 +32,8 @@ def flat(ours: Results, best: Results, merit: np.ndarray) -> str:
         return ""
     together = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names]))
     text = f"{_listed(names)}: criterion within {FLAT:.0%} of the recommended design"
-    if spans := _spans(together):
-        text += f"; they differ in {spans}"
+    if found := spans(ours, best, names):
+        text += f"; they differ in {found}"
     same = [
         f"{labels.words(one)} = {labels.value(one.isel(design=0))}"
         for one in labels.design_variables(together)
@@ -139,9 +122,9 @@ def _twins(ours: Results, best: Results) -> list[str]:
     return [name for name, one in zip(names, alike, strict=True) if one and name != own]
 
 
-def _spans(alike: Results) -> str:
-    """Ranges of the variables in which these designs differ."""
-    texts = []
+def spans(ours: Results, best: Results, names: list[str]) -> str:
+    """Return the ranges of the variables in which these designs and the best differ."""
+    alike, texts = ours.isel(design=np.isin(ours["design"], [best["design"].item(), *names])), []
     for variable in labels.design_variables(alike):
         low, high = float(np.min(variable)), float(np.max(variable))
         if high - low > SAME * abs(high):

@@ -11,6 +11,7 @@ from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
+from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.joints import length_path
@@ -98,6 +99,12 @@ def bearings(response: Results) -> list[Bearing]:
     return found
 
 
+def named(joint: str) -> str:
+    """Return a joint as tables name it: "crank_rod (O12)"."""
+    short = JOINT_NAMES.get(joint)
+    return f"{joint} ({short})" if short else joint
+
+
 def torque(response: Results) -> Torque:
     """Return the torque of the drive; NaN if no averaged revolution is stored."""
     inside = averaged(response)
@@ -114,13 +121,6 @@ def torque(response: Results) -> Torque:
         return Torque(peak, np.nan)
     mean = work / angle
     return Torque(peak, mean if abs(mean) > ROUNDING * peak else 0.0)
-
-
-def torque_words(drive: Torque) -> str:
-    """Return the torque of the drive in words, without a mean that is not known."""
-    largest = f"largest {labels.quantity(drive.peak, 'N m')}"
-    known = np.isfinite(drive.mean)
-    return f"{largest}, mean {labels.quantity(drive.mean, 'N m')}" if known else largest
 
 
 def _means(response: Results, k: int, inside: Booleans) -> tuple[float, float]:

@@ -1,37 +1,16 @@
 """Designs of each case to compare, each distinct design once: baseline, ends of the front, recommended, lightest."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from hpcclear.base.objectives import ENDS, ORDINALS, Usual
+from hpcclear.base.objectives import ENDS, ORDINALS
 from hpcclear.report import alike
-from hpcclear.report.answer import bounds, unit_of
-from hpcclear.report.constraints import WORDS, verdict_of
-from hpcclear.report.figures import labels
-from hpcclear.report.merit import (
-    counts,
-    goals_of,
-    recommended,
-    usual_of,
-)
+from hpcclear.report.merit import counts, recommended
 from hpcclear.results.content import Results
-
-BESIDE = ("original", *ENDS[:2])
-"""Designs that every case with a baseline has."""
 
 LIGHTER = 0.01
 """Relative difference of the varied masses above which another design is called the lightest."""
-
-_ROWS = {
-    "mean": "mean_true",
-    "std. deviation": "deviation_true",
-    "95th percentile": "percentile",
-    "mean, own wear": "life_mean",
-    "std. dev., own wear": "life_deviation",
-}
-"""Lines of the table of a case, and the variables they show."""
 
 
 class Role(NamedTuple):
@@ -118,54 +97,3 @@ def _lightest(verified: Results, case: str, chosen: list[str]) -> str:
     light = min(known, key=lambda name: known[name])
     least = min((known[name] for name in chosen if name in known), default=np.inf)
     return light if known[light] < (1.0 - LIGHTER) * least else ""
-
-
-def beside_original(
-    verified: Results,
-) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """Yield each case with a baseline, the headers of its table, and its lines.
-
-    A line is a quantity and its value for each design of `roles`, with half-width and change from the baseline.
-    """
-    names = {str(name) for name in verified["design"].to_numpy()}
-    for case, shown in roles(verified).items():
-        if not {f"{case} {end}" for end in BESIDE} <= names:
-            continue
-        designs = [verified.sel(design=one.design) for one in shown]
-        lines = [
-            (words, *(_against(one, designs[0], name) for one in designs))
-            for words, name in _ROWS.items()
-            if name in verified or not name.startswith("life_")
-        ]
-        for name in _asked(designs[0]):
-            words = str(designs[0][f"{name}_goal"].item()).removesuffix(" of f")
-            lines.append((words, *(_against(one, designs[0], f"{name}_true") for one in designs)))
-        if "first_goal" in verified:
-            found = map(verdict_of, designs)
-            lines.append(("constraints", *("none" if v is None else WORDS[v] for v in found)))
-        lines.append(("active bounds", "", *(bounds(one) for one in designs[1:])))
-        yield case, tuple(one.words for one in shown), lines
-
-
-def _against(one: Results, original: Results, name: str) -> str:
-    """A simulated value, its half-width, and its change from the baseline's."""
-    if name not in one or not np.isfinite(float(one[name])):
-        return "not known"
-    value, stem = float(one[name]), name.removesuffix("_true")
-    unit = unit_of(one, name)
-    text = labels.quantity(value, unit)
-    if not unit:  # a share or a formula
-        ends = [float(one[f"{stem}_{end}"]) for end in ("lower", "upper")]
-        return text if ends[0] == ends[1] else f"{text} ({ends[0]:.2g} to {ends[1]:.2g})"
-    if f"{stem}_upper" in one and value:
-        half = (float(one[f"{stem}_upper"]) - float(one[f"{stem}_lower"])) / 2.0
-        text += f" ±{abs(half / value):.2%}" if np.isfinite(half) else ", interval not known"
-    if one["design"].item() == original["design"].item():
-        return text
-    before = float(original[name])
-    return f"{text} {value / before - 1.0:+.0%}" if before else text
-
-
-def _asked(one: Results) -> list[str]:
-    """Objectives of the case of a design that have no line anyway: "first", "second"."""
-    return [name for name in goals_of(one) if usual_of(one, name) is Usual.OTHER]

@@ -103,4 +103,4 @@ def _lines(of: Recommended) -> Iterator[Line]:
         yield from (Line("failed", text) for text in explained(samples))
 
 
-PARTS = (LinesOf(70, ("samples",), _lines),)
+PARTS = (LinesOf(70, _lines),)

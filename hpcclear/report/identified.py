@@ -34,8 +34,8 @@ def lines(content: Results) -> list[Line]:
     return [*found, *_growth(content), *_advice(content)]
 
 
-def _short(name: object) -> str:
-    """A scene path without its first table, to leave space on a terminal."""
+def short(name: object) -> str:
+    """Return a scene path without its first table, to leave space on a terminal."""
     return str(name).removeprefix("mechanism.").removeprefix("joints.").removesuffix(".clearance")
 
 
@@ -44,7 +44,7 @@ def _records(content: Results) -> list[Line]:
     for k, record in enumerate(content["record"].to_numpy()):
         before = f"{Path(str(record)).name}: " if content.sizes["record"] > 1 else ""
         for u, name in enumerate(content["unknown"].to_numpy()):
-            found.append(Line(_short(name), before + interval(content, k, u)))
+            found.append(Line(short(name), before + interval(content, k, u)))
         if content.sizes["unknown"] > 1 and int(content["explained"][k]):
             found.append(Line("together", before + _together(content, k)))
         found.append(Line("calibration", before + _calibration(content, k)))
@@ -68,7 +68,7 @@ def _together(content: Results, record: int) -> str:
     related = float(content["correlation"][record])
     if abs(related) <= TOGETHER:
         return f"identified separately (correlation {related:.2f})"
-    names = [_short(name) for name in content["unknown"].to_numpy()]
+    names = [short(name) for name in content["unknown"].to_numpy()]
     units = set(content["unit"].to_numpy().astype(str))
     text = f"not identified separately (correlation {related:.2f})"
     if len(units) > 1:
@@ -114,13 +114,13 @@ def _growth(content: Results) -> list[Line]:
         unit = str(content["unit"].to_numpy()[u])
         low, middle, high = (rounded(float(one) * DAY, unit) for one in content["rate"][:, u])
         found.append(
-            Line(f"growth, {_short(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
+            Line(f"growth, {short(name)}", f"{middle} per day (95 % interval {low} to {high}){of}")
         )
         if "limit" in content.attrs:
             days = [_days(float(one)) for one in content["time_to_limit"][:, u]]
             limit = quantity(float(content.attrs["limit"]), unit)
             text = f"{days[1]} (95 % interval {days[0]} to {days[2]}), if it grows as before"
-            found.append(Line(f"time to {limit}, {_short(name)}", text))
+            found.append(Line(f"time to {limit}, {short(name)}", text))
     return found
 
 
@@ -142,7 +142,7 @@ def _advice(content: Results) -> list[Line]:
                 f"{rounded(float(width), unit)} ({count})"
                 for width, count in zip(widths, counts, strict=True)
             )
-            parts.append(f"{_short(unknown)} ± {shown}")
+            parts.append(f"{short(unknown)} ± {shown}")
         if len(parts) > 1:
             related = float(content["expected_correlation"][k, -1])
             parts.append(f"correlation of errors {related:.2f} ({counts[-1]})")

@@ -5,7 +5,7 @@ declared in `hpcclear.results.kinds`.
 """
 
 import pkgutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
@@ -39,8 +39,6 @@ class FigureOf(NamedTuple):
     """Kind of another file that it takes; "" for none."""
     along: str = ""
     """A dimension that the file must have; "" for none."""
-    apart: bool = False
-    """Whether it stands in another section than that of the figures."""
 
     @property
     def place(self) -> tuple[int, int]:
@@ -60,29 +58,19 @@ class FigureOf(NamedTuple):
 
 
 class SectionOf(NamedTuple):
-    """A section of the page."""
+    """A section of the page, which commands print with ``--details``."""
 
     place: int
     """Among all sections."""
+    subject: str
+    """Of the page, under which it is folded."""
     name: str
     title: str
     """name and title: its anchor, and its heading."""
-    template: str
-    """File in ``templates`` that shows its content."""
-    make: Callable[..., object]
-    """From the results to its content, None where there is nothing to show; with `piecewise` also from the list of troubles."""
-    folded: bool = False
-    """Whether it opens on request only."""
-    of_samples: bool = False
-    """Whether it is on samples alone."""
+    make: "Callable[[Content], Sequence[object] | None]"
+    """From the results to its parts: texts, tables, and text whose lines stay; None where there is nothing to show."""
     each: bool = False
     """Whether each of several samples has one by itself."""
-    piecewise: bool = False
-    """Whether its parts are tried one by one; else it is there as a whole or not at all."""
-
-    def content(self, results: Content, troubles: list[str]) -> object:
-        """Its content; None where there is nothing to show."""
-        return self.make(results, troubles) if self.piecewise else self.make(results)
 
 
 class Recommended(NamedTuple):
@@ -110,8 +98,6 @@ class LinesOf(NamedTuple):
 
     place: int
     """Among all lines."""
-    kinds: tuple[str, ...]
-    """Files that they are made of."""
     lines: Callable[[Recommended], Iterable[Line]]
     steps: Callable[[Recommended], Iterable[str]] = _no_steps
 

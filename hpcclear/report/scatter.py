@@ -8,6 +8,7 @@ import numpy as np
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
+from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from hpcclear.statistics.sensitivity.contributions import Falls
@@ -35,20 +36,9 @@ def lines(of: Recommended) -> Iterator[Line]:
     own = of.of_best("contributions")
     if own is None:
         return
-    rows = np.flatnonzero(np.isfinite(own["contribution"].to_numpy()))
-    if not len(rows):
+    parts = shares(own)
+    if not parts:
         return
-    names = own["input"].to_numpy()[rows]
-    groups = (own["group"] if "group" in own else own["together"]).to_numpy()[rows]
-    shares, falls = (
-        (own[kind].to_numpy()[rows], own[f"{kind}_error"].to_numpy()[rows])
-        for kind in ("contribution", "halved")
-    )
-    parts = [(str(names[k]), *(one[k] for one in shares)) for k in np.flatnonzero(groups == 0)]
-    for group in dict.fromkeys(groups[groups > 0].tolist()):
-        its = groups == group
-        joined = "+".join(map(str, names[its])) + " (correlated)"
-        parts.append((joined, *(one[its][0] for one in shares)))
     text = (
         f"random inputs to the variance of f at this design (± 95 % half-width): {_listed(parts)}"
     )
@@ -58,18 +48,45 @@ def lines(of: Recommended) -> Iterator[Line]:
             "motion"
         )
     yield Line("contributions", text)
-    each = [(str(names[k]), *(one[k] for one in falls)) for k in range(len(rows))]
+    names, falls, errors, _ = _inputs(own, "halved")
+    each = [(*one[:2], HALF_WIDTH * one[2]) for one in zip(names, falls, errors, strict=True)]
     yield Line(
         "tolerances",
         f"halving the scatter of one input lowers the standard deviation of f by: {_listed(each)}",
     )
+    yield from (Line("tighten first", text) for text in tighten(own))
+
+
+def _inputs(own: Results, kind: str) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
+    """Names of the random inputs that are known, a number of each, its standard error, and their rows, each (n,)."""
+    rows = np.flatnonzero(np.isfinite(own["contribution"].to_numpy()))
+    values, errors = (own[f"{kind}{end}"].to_numpy()[rows] for end in ("", "_error"))
+    return [str(name) for name in own["input"].to_numpy()[rows]], values, errors, rows
+
+
+def shares(own: Results) -> list[tuple[str, float, float]]:
+    """Return the random inputs of a design (of kind ``contributions``) with their shares of the variance and half-widths, the
+    largest first; correlated inputs have one together."""
+    names, values, errors, rows = _inputs(own, "contribution")
+    groups = (own["group"] if "group" in own else own["together"]).to_numpy()[rows]
+    parts = []
+    for k, group in enumerate(groups.tolist()):
+        its = np.flatnonzero(groups == group) if group > 0 else [k]
+        if k == its[0]:
+            joined = "+".join(names[i] for i in its) + (" (correlated)" if group > 0 else "")
+            parts.append((joined, float(values[k]), HALF_WIDTH * float(errors[k])))
+    return sorted(parts, key=lambda one: -one[1])
+
+
+def tighten(own: Results) -> Iterator[str]:
+    """Yield which inputs of a design (of kind ``contributions``) to tighten first, where there are several."""
+    names, falls, errors, rows = _inputs(own, "halved")
     prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
         joint = [float(own.get(f"halved_together{end}", np.nan)) for end in ("", "_error")]
         from hpcclear.statistics.sensitivity.contributions import Falls  # loads SciPy
 
-        singly = Falls.of(falls[0], lambda _: (joint[0], joint[1]))
-        yield Line("tighten first", _first(list(map(str, names)), singly, falls[1], prices))
+        yield _first(names, Falls.of(falls, lambda _: (joint[0], joint[1])), errors, prices)
 
 
 def to_tighten(
@@ -123,7 +140,7 @@ def _worst(of: Recommended) -> Iterator[Line]:
 
 def _listed(parts: list[tuple[str, float, float]]) -> str:
     """Names with shares and half-widths, the largest first."""
-    ranked = [(n, v, HALF_WIDTH * e) for n, v, e in sorted(parts, key=lambda one: -one[1])]
+    ranked = sorted(parts, key=lambda one: -one[1])
     small = [name for name, value, width in ranked if value + width < SMALL]
     shown = [share(*one) for one in ranked if one[0] not in small]
     return ", ".join([*shown, *[f"{', '.join(small)} below {SMALL:.1%}"] * bool(small)])
@@ -185,9 +202,16 @@ def _indices(of: Recommended) -> Iterator[Line]:
     if little.any():
         hardly = ", ".join(names[k] for k in order if little[k])
         yield Line("negligible", f"{hardly} (total Sobol index below {LITTLE:.0%}, error included)")
-    if any(HALF_WIDTH * float(np.nanmax(error)) > UNSURE for _, error in indices.values()):
+    if half_width(found) > UNSURE:
         text = f"Sobol indices are known to ± {UNSURE:.0%} or worse: raise study.sensitivity.sobol_samples"
         yield Line("warning", text)
+
+
+def half_width(found: Results | None) -> float:
+    """Return the largest half-width of a Sobol index of a file (kind ``sensitivity``); 0 where it has none."""
+    names = [f"sobol_{kind}_error" for kind in ("first", "total")]
+    errors = [found[name].to_numpy() for name in names if found is not None and name in found]
+    return max((HALF_WIDTH * float(np.nanmax(one)) for one in errors if one.size), default=0.0)
 
 
 SOME = 0.05
@@ -221,8 +245,8 @@ def _steadier(of: Recommended) -> Iterator[str]:
 
 
 PARTS = (
-    LinesOf(20, ("contributions",), lines),
-    LinesOf(30, ("worst",), _worst),
-    LinesOf(40, ("sensitivity",), _indices),
-    LinesOf(80, ("chaos",), _chaos, _steadier),
+    LinesOf(20, lines),
+    LinesOf(30, _worst),
+    LinesOf(40, _indices),
+    LinesOf(80, _chaos, _steadier),
 )

@@ -163,13 +163,42 @@ def statistics(samples: Results, thresholds: Sequence[Beyond] = ()) -> list[Line
         peak = samples["peak_contact_force"].sel(joint=joint).to_numpy()
         if np.nanmax(peak, initial=0.0) > 0.0:
             lines.append(Line(f"P95 peak force, {joint}", *_quantile(peak, 0.95, "N", drawn)))
-    lines += [_share(samples, one, drawn) for one in thresholds]
+    lines += shares(samples, thresholds)
     lines += _length_of_peaks(samples)
     if len(known) < len(f):
         left_out = f"{len(f) - len(known)} of {len(f)}, left out of mean and standard deviation"
         lines.append(Line("failed", left_out))
     how = (INDEPENDENT if method == "monte-carlo" else USUALLY_WIDER) if drawn else CHOSEN
     return [*lines, Line("intervals", how)]
+
+
+def in_time(samples: Results) -> list[Line]:
+    """Return how well f is known in each sample: its half-width, and its standard deviation between revolutions."""
+    name = "objective_limit" if "objective_limit" in samples else "objective_uncertainty"
+    f, remedy = (
+        np.abs(samples["objective"].to_numpy()),
+        "set numerics.target_error for one of each sample",
+    )
+    if "objective" in samples.attrs:
+        remedy = "a response has one (hpcclear simulate)"
+    lines = []
+    for label, column in (
+        ("half-width of f", name),
+        ("cycle-to-cycle std. dev.", "objective_spread"),
+    ):
+        parts = samples[column].to_numpy() / f if column in samples else np.array([])
+        if np.isfinite(parts).any():
+            text = f"median {np.nanmedian(parts):.2%}, largest {np.nanmax(parts):.2%} of f"
+            lines.append(Line(label, text))
+        elif column == name:
+            lines.append(Line(label, f"{labels.NOT_CHECKED}; {remedy}"))
+    return lines
+
+
+def shares(samples: Results, thresholds: Sequence[Beyond]) -> list[Line]:
+    """Return the share of samples beyond each threshold."""
+    drawn = str(samples.attrs.get("sampling", "")) in DRAWN
+    return [_share(samples, one, drawn) for one in thresholds]
 
 
 def side_by_side(
@@ -279,13 +308,14 @@ def _share(samples: Results, one: Beyond, drawn: bool) -> Line:
         name += f" {one.joint or 'in any joint'}"
     label = f"{name} > {labels.quantity(one.value, str(samples[one.name].attrs['units']))}"
     share, low, high = above / (total - failed) if total > failed else np.nan, np.nan, np.nan
-    text = f"{_percent(share)} of the samples" if total > failed else "–"
+    text = f"{percent(share)} of the samples" if total > failed else "–"
     if drawn and total > failed:
         low = float(share_interval(above, total)[0])
         high = float(share_interval(above + failed, total)[1])
-        text = f"{text} ({_percent(low)} to {_percent(high)})"
+        text = f"{text} ({percent(low)} to {percent(high)})"
     return Line(label, text, Estimate(100.0 * share, 100.0 * low, 100.0 * high, "%"))
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """Return a share in per cent, three digits."""
     return f"{100.0 * share:.3g} %"

@@ -152,8 +152,12 @@ class ConsistentTables(SceneTables):
     def _check_profiles(self) -> None:
         oiled = [name for name in self.worn_joints() if name in self.films()]
         if self.wear is not None and self.wear.waves and oiled:
-            reason = f"joint {oiled[0]} has an oil film, which needs round surfaces"
-            raise invalid(reason, 'Set it to "uniform", or remove the film', "wear.profile")
+            raise invalid(
+                f"joint {oiled[0]} has an oil film, which needs round surfaces",
+                'Set it to "uniform", or remove the film',
+                key="wear.profile",
+                value=self.wear.profile,
+            )
 
     def _check_objective(self) -> None:
         chosen, key = self.numerics.objective_joints, "numerics.objective_joints"
@@ -163,12 +167,17 @@ class ConsistentTables(SceneTables):
         if len(set(self._contacts_in(chosen))) < len(self._contacts_in(chosen)):
             raise invalid("a joint is named twice", "Name each once", key=key)
         if self.study is not None and self.numerics.objective is not None:
-            reason = "a study names its objective itself"
-            raise invalid(reason, "Write study.objective instead", "numerics.objective")
+            raise invalid(
+                "a study names its objective itself",
+                "Write study.objective instead",
+                "numerics.objective",
+            )
         if chosen and not self.objective.of_joints:
-            reason = f'study.objective = "{self.objective.name}" is of no joint'
-            kinds = "mean-gap, mean-contact-force or peak-contact-force"
-            raise invalid(reason, f"Leave the joints out, or choose {kinds}", key)
+            raise invalid(
+                f'study.objective = "{self.objective.name}" is of no joint',
+                "Leave the joints out, or choose mean-gap, mean-contact-force or peak-contact-force",
+                key=key,
+            )
 
     def _check_target(self) -> None:
         if self.numerics.target_error is None or not self.clearance_joints():
@@ -186,7 +195,7 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
 
     def _check_pressures(self) -> None:
-        table = self.effects.contact
+        table: Any = self.effects.contact
         geometry = None if table is None else table.declared.geometry
         if geometry is not None and geometry.pressure is not None:
             return

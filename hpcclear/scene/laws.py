@@ -11,8 +11,7 @@ from pydantic_core import CoreSchema
 
 from hpcclear.base.errors import at
 from hpcclear.laws import laws, names
-from hpcclear.laws.declared import Geometry, Law, Parameter
-from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS, Registry
+from hpcclear.plugins import CONTACT_LAWS, FRICTION_LAWS
 from hpcclear.scene.curves import Pairs
 from hpcclear.scene.fields import Converted, Quantity, Table, check_table, hint, invalid, nearest
 from hpcclear.scene.plugged import as_invalid
@@ -79,7 +78,7 @@ def on_geometry(law: Any, name: str, rows: Any = None) -> Any:
     return _on(law, shape if rows is None else shape.of_rows(rows))
 
 
-def _with_entries(kind: str) -> Iterator[Law | Geometry]:
+def _with_entries(kind: str) -> Iterator[Any]:
     """All of this package that has entries in a law's table: laws, and for contact the geometries."""
     yield from laws(kind).values()
     if kind == "contact":
@@ -95,13 +94,13 @@ def known_laws(kind: str) -> dict[str, Any]:
     return {**laws(kind), **others}
 
 
-def quantity_of(parameter: Parameter) -> Quantity:
+def quantity_of(parameter: Any) -> Quantity:
     """Of a law's parameter."""
     p = parameter
     return Quantity(p.unit, above=p.above, below=p.below, least=p.least, most=p.most)
 
 
-def _declare(kind: str, parameter: Parameter) -> None:
+def _declare(kind: str, parameter: Any) -> None:
     """Make an entry of a user's law known by its path."""
     quantity = quantity_of(parameter)
     ENTRIES.setdefault(f"effects.{kind}.{parameter.name}", {})[quantity.unit] = quantity
@@ -174,7 +173,7 @@ class LawTable(Table):
         return law
 
     @classmethod
-    def registry(cls) -> Registry:
+    def registry(cls) -> Any:
         """Where laws of users are found."""
         return CONTACT_LAWS if cls.kind == "contact" else FRICTION_LAWS
 
@@ -200,7 +199,7 @@ class LawTable(Table):
         return law
 
     @classmethod
-    def _refuse_unknown(cls, data: Mapping[str, object], law: Law | None) -> None:
+    def _refuse_unknown(cls, data: Mapping[str, Any], law: Any) -> None:
         others = {p.name: p for one in _with_entries(cls.kind) for p in one.parameters}
         entries = {} if law is None else {p.name: p for p in law.parameters}
         for key in data:
@@ -225,7 +224,7 @@ class LawTable(Table):
             )
 
     @classmethod
-    def _converted(cls, data: Mapping[str, object], law: Law) -> dict[str, Any]:
+    def _converted(cls, data: Mapping[str, Any], law: Any) -> dict[str, Any]:
         """Values of the law's parameters, defaults filled in."""
         found = {}
         theirs = law.name not in laws(cls.kind)
@@ -279,7 +278,7 @@ class LawTable(Table):
         every = {one.name: one for one in _with_entries(cls.kind)}
         for law in every.values():
             for p in law.parameters:
-                made["properties"].setdefault(p.name, _schema(p, every))
+                made["properties"].setdefault(p.name, _schema(p, law, every))
         words = made["properties"]["law"].get("description")
         made["properties"]["law"] = {
             "anyOf": [{"enum": [*laws(cls.kind)]}, {"type": "string", "pattern": PATTERN}],
@@ -311,7 +310,7 @@ def _curve(data: Mapping[str, object]) -> Any:
     return rows
 
 
-def _schema(parameter: Parameter, every: Mapping[str, Law | Geometry]) -> dict[str, Any]:
+def _schema(parameter: Any, law: Any, every: Mapping[str, Any]) -> dict[str, Any]:
     entry = quantity_of(parameter).__get_pydantic_json_schema__({}, None)  # type: ignore[arg-type, typeddict-item]
     whose = [
         name for name, one in every.items() if parameter.name in {p.name for p in one.parameters}
@@ -328,11 +327,11 @@ def _schema(parameter: Parameter, every: Mapping[str, Law | Geometry]) -> dict[s
     }
 
 
-def _an(parameter: Parameter) -> str:
+def _an(parameter: Any) -> str:
     return f"two {parameter.name}" if parameter.count == 2 else f"a {parameter.title}"
 
 
-def _value(parameter: Parameter, value: object) -> Any:
+def _value(parameter: Any, value: Any) -> Any:
     """A parameter's value in SI; an error for validators names its entry."""
     quantity = quantity_of(parameter)
     if parameter.count > 1:

@@ -46,8 +46,15 @@ class BarBending(Table):
     """Structural damping of each mode, relative to critical damping."""
 
 
-def _check_bar(planar: "Planar", body: "PlanarBody") -> None:
-    """An error for validators unless a body that bends is a bar that pins alone hold, at both its ends."""
+def check_bars(planar: Any) -> None:
+    """An error for validators unless every body of a linkage that bends is a bar that pins alone hold, at both its ends."""
+    for body in planar.bodies:
+        if body.bending is not None:
+            with at(f"bodies.{body.name}.bending", None):
+                _check_bar(planar, body)
+
+
+def _check_bar(planar: Any, body: Any) -> None:
     if body.length is None:
         raise invalid(
             "only a bar can bend, and this body has no length",
@@ -269,10 +276,7 @@ class Planar(Table):
             if self.followed not in places:
                 raise invalid("is no point of a body", nearest(self.followed, places), "followed")
 
-        for body in self.bodies:
-            if body.bending is not None:
-                with at(f"bodies.{body.name}.bending", None):
-                    _check_bar(self, body)
+        check_bars(self)
         turns = turns_of(self) if self.drives else 1
         for table in ("drives", "loads"):
             for row in getattr(self, table):

@@ -26,46 +26,42 @@ _TESTED = np.array([1e-9, 1e-3, 0.5, 1 - 1e-3, 1 - 1e-9])
 """Probabilities whose quantiles a distribution must have."""
 
 
-Entries = Mapping[str, Any]
-"""Entries of a random input that are given, SI."""
-
-
 class Form(NamedTuple):
     """One of our distributions: entries that it needs, those that it may have, and its quantiles made of them."""
 
     needs: frozenset[str]
     may_have: frozenset[str]
-    law: Callable[[Entries], quantiles.Quantiles]
+    law: Callable[[Mapping[str, Any]], quantiles.Quantiles]
 
 
-def _ends(entries: Entries) -> tuple[float, float]:
+def _ends(entries: Mapping[str, Any]) -> tuple[float, float]:
     return entries.get("range", (-inf, inf))
 
 
-def _middle_and_reach(entries: Entries) -> tuple[float, float]:
+def _middle_and_reach(entries: Mapping[str, Any]) -> tuple[float, float]:
     if "range" in entries:
         lower, upper = entries["range"]
         return (lower + upper) / 2, (upper - lower) / 2
     return entries.get("mean", 0.0), entries.get("half_width", inf)
 
 
-def _normal(entries: Entries) -> quantiles.Quantiles:
+def _normal(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     middle, reach = _middle_and_reach(entries)
     return quantiles.Normal(middle, entries["deviation"], reach)
 
 
-def _beta(entries: Entries) -> quantiles.Quantiles:
+def _beta(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     middle, reach = _middle_and_reach(entries)
     return quantiles.beta(
         entries["shapes"], *entries.get("range", (middle - reach, middle + reach))
     )
 
 
-def _lognormal(entries: Entries) -> quantiles.Quantiles:
+def _lognormal(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     return quantiles.lognormal(entries["mean"], entries["deviation"], *_ends(entries))
 
 
-def _weibull(entries: Entries) -> quantiles.Quantiles:
+def _weibull(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     location = entries.get("location", 0.0)
     return quantiles.weibull(entries["scale"], entries["shape"], location, *_ends(entries))
 
@@ -159,7 +155,7 @@ def _of_scipy(
 
 
 def _of_plugin(
-    name: str, factory: Any, parameters: Mapping[str, float], entries: Entries
+    name: str, factory: Any, parameters: Mapping[str, float], entries: Mapping[str, Any]
 ) -> quantiles.Cut:
     try:
         whole = factory(**parameters)

@@ -174,8 +174,12 @@ class Wear(Table):
 
     def _check(self) -> None:
         if self.bearing is None and self.journal is None:
-            remedy = "Give one of them a coefficient"
-            raise invalid("neither bearing nor journal wears", remedy, "bearing", None)
+            raise invalid(
+                "neither bearing nor journal wears",
+                "Give one of them a coefficient",
+                "bearing",
+                None,
+            )
 
 
 class WearLimits(Table):
@@ -229,7 +233,9 @@ class Lives(Table):
 
     def _check(self) -> None:
         if self.most_copies < self.copies:
-            remedy = "Raise most_copies, or lower copies"
             raise invalid(
-                "copies is larger than most_copies", remedy, "most_copies", self.most_copies
+                "copies is larger than most_copies",
+                "Raise most_copies, or lower copies",
+                "most_copies",
+                self.most_copies,
             )

@@ -11,9 +11,9 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
-from hpcclear.ensemble.lives import doubts
 from hpcclear.ensemble.session import Options
 from hpcclear.ensemble.wear import check_worn, run_wear
+from hpcclear.report.screens.lives import doubts
 from hpcclear.scene import Scene
 from hpcclear.scene.random_inputs import RandomInput
 from hpcclear.statistics.random.replicates import moments, student

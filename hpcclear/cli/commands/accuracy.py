@@ -68,15 +68,17 @@ def _measure(
         scene = cli.read_scene(written)
         from hpcclear.accuracy.profile import PROFILES
         from hpcclear.accuracy.run import run_accuracy
-        from hpcclear.cli.accuracy import describe
+        from hpcclear.cli.printing import describe
         from hpcclear.ensemble.session import Options
+        from hpcclear.report.html.content import Content
 
         def notify(text: str) -> None:
             cli.say(f"accuracy: {text}")
 
         profile = PROFILES["quick" if quick else "full"]
         place = cli.place_of(output)
-        describe(*run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh)))
+        found, drawn = run_accuracy(scene, place, ranks, profile, notify, Options(fresh=fresh))
+        describe(Content(place, {"accuracy": found}, {}), *list(drawn.values())[:1])
 
 
 def _plan(written: cli.Written, error: float | None, workers: int | None) -> None:

@@ -20,6 +20,7 @@ from hpcclear.ranks.stopping import Exit
     metavar="FIGURE",
     help="Draw the mechanism with names, axes and signs to this file (png, svg, pdf).",
 )
+@cli.DETAILS
 def run(written: cli.Written, cost: bool, sketch: Path | None) -> int:
     """Validate an input file and estimate run time.
 

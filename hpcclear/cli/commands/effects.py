@@ -1,10 +1,11 @@
 """`effects`: which effects of a scene can be neglected."""
 
-import sys
 from pathlib import Path
 
 import click
 
+from hpcclear.base.errors import InputError
+from hpcclear.base.units import UnitError, to_si
 from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
 
@@ -54,7 +55,7 @@ def run(
 
     with cli.on_ranks(how.time_limit) as ranks:
         scene = cli.read_scene(written)
-        from hpcclear.cli.effects import describe, tolerance_of
+        from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.effects import run_effects
         from hpcclear.ensemble.trial import Wanted
         from hpcclear.study.extent import certificate_extent
@@ -70,10 +71,27 @@ def run(
             how.options(),
             Wanted(allowed, most, budget, forces),
         )
-        code = describe(found, scene, written.file)
+        describe_run(found, "effects")
         if reduced is not None:
             from hpcclear.results import files
 
             files.write_bytes(cli.place_of(reduced), found.content.attrs["reduced_scene"].encode())
-        sys.exit(code)
     return Exit.DONE
+
+
+def tolerance_of(words: str) -> float:
+    """A relative change: 0.01, or 1%.
+
+    Raises
+    ------
+    InputError
+        If it is no number.
+    """
+    try:
+        return float(words)
+    except ValueError:
+        pass
+    try:
+        return to_si(words, "")
+    except UnitError as error:
+        raise InputError("--tolerance", words, error.reason, "Write 1%, or 0.01") from None

@@ -1,16 +1,12 @@
 """`identify`: unknowns with their intervals, the fit, growth, and what to measure."""
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from hpcclear.cli import options as cli
 from hpcclear.ranks.stopping import Exit
-
-if TYPE_CHECKING:
-    from hpcclear.ensemble.session import Finished
 
 
 @cli.command("compute", "Identify clearances from a measured signal.", ranks=True)
@@ -75,25 +71,14 @@ def run(written: cli.Written, output: Path, how: cli.How, **settings: Any) -> in
 
     with cli.on_ranks(how.time_limit) as ranks:
         scene = cli.read_scene(written)
+        from hpcclear.cli.printing import describe_run
         from hpcclear.identify.answer import run_identify
         from hpcclear.identify.settings import Settings
 
         place, made = cli.place_of(output), Settings(**settings)
-        sys.exit(describe(run_identify(scene, place, ranks, made, how.options())))
+        found = run_identify(scene, place, ranks, made, how.options())
+        describe_run(found, "identify")
+        content = found.content
+        explained = "explained" not in content or bool(content["explained"].to_numpy().all())
+        return Exit.DONE if explained else Exit.TARGET_MISSED
     return Exit.DONE
-
-
-def describe(found: "Finished") -> int:
-    """Print what was identified; the exit code."""
-    from hpcclear.cli.printing import _load
-    from hpcclear.cli.terminal import console, fitting, remark, table
-    from hpcclear.report import identified
-
-    out, content = console(), found.content
-    rows = [(line.label, fitting(line.text)) for line in identified.lines(content)]
-    out.print(table("Identified", rows + _load(found)))
-    for text in identified.warnings(content):
-        out.print(remark("warning", fitting(text)))
-    out.print(f"written  {found.output}")
-    explained = "explained" not in content or bool(content["explained"].to_numpy().all())
-    return Exit.DONE if explained else Exit.TARGET_MISSED

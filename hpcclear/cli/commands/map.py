@@ -82,15 +82,16 @@ def run(
     cli.check_mode("--bifurcation", bifurcation, ("y",), observing)
     with cli.on_ranks(how.time_limit) as ranks:
         scene = cli.read_scene(written)
-        from hpcclear.cli.printing import describe_bifurcation, describe_map
+        from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.bifurcation import Observation, run_bifurcation
         from hpcclear.ensemble.maps import number_of, run_map
 
         place = cli.place_of(output)
         if bifurcation:
             seen = Observation(name, number_of("--section", section, "rad"), transient, revolutions)
-            describe_bifurcation(run_bifurcation(scene, x, place, ranks, seen, how.options()))
+            found = run_bifurcation(scene, x, place, ranks, seen, how.options())
+            describe_run(found, "bifurcation")
         else:
             axes = (x,) if y is None else (x, y)
-            describe_map(run_map(scene, axes, place, ranks, how.options()))
+            describe_run(run_map(scene, axes, place, ranks, how.options()), "map")
     return Exit.DONE

@@ -27,7 +27,8 @@ def run(
 
     with cli.on_ranks(time_limit, cli.STUDYING) as ranks:
         scene = cli.read_scene(written)
-        from hpcclear.cli.printing import describe_study
+        from hpcclear.cli.printing import describe
+        from hpcclear.report.html.content import read
         from hpcclear.study import run_study
 
         place = run_study(
@@ -38,5 +39,5 @@ def run(
             progress_style=progress,
             notify=lambda text: cli.say(text),
         )
-        describe_study(place)
+        describe(read(place), place / "verification.nc")
     return Exit.DONE

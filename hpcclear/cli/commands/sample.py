@@ -60,35 +60,34 @@ def run(
     with cli.on_ranks(how.time_limit) as ranks:
         _check_kind(points, statistics, raw, part, how.fresh, thresholds)
         scene = cli.read_scene(written)
-        from hpcclear.cli.printing import describe_samples, describe_statistics
+        from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.samples import run_sample
         from hpcclear.ensemble.split import Part
         from hpcclear.ensemble.statistics import run_statistics
-        from hpcclear.report.spread import beyond, units_of
+        from hpcclear.report.spread import beyond, shares, units_of
 
         chosen, place = None if part is None else Part.parse(part), cli.place_of(output)
         units, joints = units_of(scene.objective), scene.joint_labels
         levels = [beyond(units, words, joints) for words in thresholds]
         if statistics:
             kept = None if raw is None else cli.place_of(raw)
-            describe_statistics(
-                run_statistics(scene, place, ranks, raw=kept, options=how.options())
-            )
+            found = run_statistics(scene, place, ranks, raw=kept, options=how.options())
+            describe_run(found, "statistics")
         else:
             found = run_sample(
                 scene, place, ranks, table=points, part=chosen, options=how.options()
             )
-            describe_samples(found, levels)
+            describe_run(found, "samples", shares(found.content, levels))
     return Exit.DONE
 
 
 def _merge(written: cli.Written, output: Path, points: Path | None) -> int:
     scene = cli.read_scene(written)
-    from hpcclear.cli.printing import describe_samples
+    from hpcclear.cli.printing import describe_run
     from hpcclear.ensemble.samples import design, run_merge
     from hpcclear.ranks.boundary import alone
 
-    describe_samples(run_merge(scene, design(scene, points), output, alone()))
+    describe_run(run_merge(scene, design(scene, points), output, alone()), "samples")
     return Exit.DONE
 
 

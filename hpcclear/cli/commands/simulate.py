@@ -1,6 +1,5 @@
 """`simulate`: one response of one design."""
 
-import time
 from pathlib import Path
 
 import click
@@ -31,7 +30,7 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
         )
     scene = cli.read_scene(written)
     from hpcclear.base.outcome import Flag, Status
-    from hpcclear.cli.response import describe_response
+    from hpcclear.cli.printing import describe_response
     from hpcclear.dynamics import sizing
     from hpcclear.dynamics.evaluation.steady.wording import why_missed
     from hpcclear.dynamics.response import simulated
@@ -45,10 +44,9 @@ def run(written: cli.Written, output: Path, keep: int | None) -> int:
     with Session(place, {"command": "simulate"}, alone(), DEFAULT_OPTIONS):
         if output.exists():
             dataset.read(output, "response")  # an earlier response is replaced, and nothing else
-        began = time.perf_counter()
         response = simulated(scene)
         dataset.write(response, output)
-    describe_response(response, output, time.perf_counter() - began)
+    describe_response(response, output)
     status = Status(int(response["status"]))
     if status.valid and int(response["flags"]) & Flag.TARGET_MISSED:
         cli.say(f"Target missed: {why_missed(response, scene.numerics.target_error)}")

@@ -1,6 +1,5 @@
 """`wear`: service lives of joints that wear."""
 
-import sys
 from pathlib import Path
 
 from hpcclear.cli import options as cli
@@ -23,8 +22,13 @@ def run(written: cli.Written, output: Path, how: cli.How) -> int:
 
     with cli.on_ranks(how.time_limit) as ranks:
         scene = cli.read_scene(written)
-        from hpcclear.cli.wear import describe
+        from hpcclear.cli.printing import describe_run
         from hpcclear.ensemble.wear import run_wear
+        from hpcclear.report.screens.lives import followed
 
-        sys.exit(describe(run_wear(scene, cli.place_of(output), ranks, how.options())))
-    return Exit.DONE
+        found = run_wear(scene, cli.place_of(output), ranks, how.options())
+        describe_run(found, "wear")
+        if followed(found.content).any():
+            return Exit.DONE
+        cli.say("Error: every service life failed")
+    return Exit.FAILED

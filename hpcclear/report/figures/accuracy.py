@@ -307,6 +307,6 @@ MAIN = dict(zip(FIGURES, (shown for _, shown, _ in _FIGURES), strict=True))
 """The variables that each of them shows: it can be drawn as soon as the first is there, and again with each other one."""
 
 PARTS = tuple(
-    FigureOf("accuracy", f"accuracy-{name.replace('_', '-')}", draw, caption, k, apart=True)
+    FigureOf("accuracy", f"accuracy-{name.replace('_', '-')}", draw, caption, k)
     for k, (name, (draw, _, caption)) in enumerate(zip(FIGURES, _FIGURES, strict=True))
 )

@@ -57,13 +57,6 @@ class Saving(NamedTuple):
             return f"none significant ({sign}{share} % ± {half} %)"
         return f"none, it takes {share} % ± {half} % longer" if sign else f"{share} % ± {half} %"
 
-    @property
-    def speed_up(self) -> str:
-        """How many times as fast it is, between the ends of its confidence interval."""
-        half = self.half if np.isfinite(self.half) else 0.0
-        ends = [f"{1.0 / max(1.0 - self.share + off, 1e-9):.2g}" for off in (half, -half)]
-        return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
-
 
 def seconds_of(timing: Results | None) -> Times:
     """Processor times of a sample of each variant; empty where they were not measured."""

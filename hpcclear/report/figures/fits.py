@@ -70,7 +70,7 @@ def _poor(of: Recommended) -> Iterator[Line]:
             yield Line("warning", text)
 
 
-PARTS = (LinesOf(50, ("sensitivity", "kriging"), _poor),)
+PARTS = (LinesOf(50, _poor),)
 
 
 def mark(axes: "style.Axes", r2: float, height: float = 0.5) -> None:

@@ -34,5 +34,5 @@ def timing_figure(timing: Results) -> "style.Figure":
 
 
 PARTS = (
-    FigureOf("timing", "timing", timing_figure, "Time of the ranks, by rank and by stage.", apart=True),
+    FigureOf("timing", "timing", timing_figure, "Time of the ranks, by rank and by stage."),
 )  # fmt: skip

@@ -1,131 +1,103 @@
-"""The section of the page on accuracy against run time (kind ``accuracy``)."""
+"""The section on accuracy against run time (kind ``accuracy``): cheapest settings and their errors."""
 
 import numpy as np
 
 from hpcclear.report import targets
-from hpcclear.report.figures import accuracy as figures
-from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, folded
 from hpcclear.report.parts import SectionOf
-from hpcclear.results.content import Results
+from hpcclear.results.content import Results, Variable
 
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
 
+MARGIN = 100.0
+"""The reference must be this many times better than what is measured against it; smaller errors are not resolved."""
+
+Rows = list[list[object]]
+
 
 def accuracy(content: Content) -> list[object] | None:
-    """Cheapest settings for three errors in one figure and in words, then the sources of error, folded."""
+    """Cheapest settings for three errors in words, then tables; the figures show every other source of error."""
     found = content.get("accuracy")
     if found is None:
         return None
-    header = ["relative error of f", "integrator", "tolerance or step", "time of a revolution (ms)"]
-    cheapest = Table(
-        header, _cheapest(found), "Cheapest integrator for an error of f over one revolution"
-    )
-    rows = [*_steady(found), *_averaging(found), *_surrogates(found), *_moments(found)]
-    others = Table(
-        ["approximation", "relative error", "run time"],
-        rows,
-        "Errors of the other approximations, and their run time",
-    )
-    note = "Errors are relative to references with much tighter settings. Times are those of one core of this machine."
-    total, *drawn, ranks = (
-        gallery.picture(one.draw, found, one.captioned({"accuracy": found}))
-        for one in figures.PARTS
-    )
-    sources: list[object] = [cheapest, others, *(one for one in drawn if one)]
-    return [
-        *([total] if total else []),
-        *targets.sentences(found),
-        note,
-        folded("Sources of error, one by one", sources),
-        *([folded("Ranks", [ranks])] if ranks else []),
+    two, here = ["setting", "result"], "Cheapest integrator for an error of f over one revolution"
+    tables = [
+        _spending(found),
+        Table(
+            two, _cheapest(found), "Cheapest settings for a standard error of f as a steady mean"
+        ),
+        Table(two, advice(found), here),
     ]
+    measured = f"{found.attrs['repeats']}; f: {found.attrs['motion']}."
+    return [*targets.sentences(found), measured, folded("Integration and averaging", tables)]
 
 
-def _cheapest(found: Results) -> list[list[object]]:
+def _spending(found: Results) -> Table:
+    """A row a tolerance."""
+    rows: Rows = []
+    with np.errstate(invalid="ignore", divide="ignore"):
+        holds = found["spent_error"].to_numpy() / found["spent_model"].to_numpy()
+    for k, rtol in enumerate(found["tolerance"].to_numpy()):
+        known = holds[k][np.isfinite(holds[k])]
+        cells = (
+            _known(found["tolerance_bias"][k], "+.1e"),
+            _known(2.0 * found["tolerance_bias_error"][k], ".0e"),
+            f"{float(found['turn_variance'][k]):.1e}",
+            f"{1e3 * float(found['tolerance_seconds'][k]):.3g}",
+            f"{known.min():.2f} to {known.max():.2f}" if known.size else "",
+        )
+        rows.append([f"{rtol:.0e}", *map(Number, cells)])
+    header = ["rtol", "bias of f", "± 2 s.e.", "variance/rev.", "ms/rev.", "error/formula"]
+    title = "Steady mean: relative bias and variance of f, and run time, by tolerance"
+    return Table(header, rows, title)
+
+
+def _known(value: Variable, digits: str) -> str:
+    """A number, a dash where there is none: at the reference."""
+    return format(float(value), digits) if np.isfinite(float(value)) else "–"
+
+
+def _cheapest(found: Results) -> Rows:
+    wait = f"the {float(found['spin_up']):.0f} transient revolutions of {targets.REPLICAS} replicas"
+    rows: Rows = [[f"{aim:.1%}", cheapest(found, float(aim))] for aim in found["aim"].to_numpy()]
+    return [*rows, ["time", f"averaged revolutions and {wait}"]]
+
+
+def cheapest(found: Results, aim: float) -> str:
+    """Return tolerance, revolutions and core time that reach a relative standard error at the least cost."""
+    here = found.isel(aim=int(np.abs(found["aim"].to_numpy() - aim).argmin()))
+    seconds = float(here["cheapest_seconds"])
+    if not np.isfinite(seconds):
+        return "not resolved by the measured revolutions"
+    spent = int(here["cheapest_revolutions"])
+    count = f"{spent} revolution{'s' if spent > 1 else ''}"
+    return f"rtol {float(here['cheapest_tolerance']):.0e}, {count}, {seconds:.2g} s"
+
+
+def advice(found: Results) -> Rows:
+    """Return the cheapest method and setting for each target error of f, and what the reference resolves."""
     here = found.sel(quantity="objective")
     error, seconds = here["error"].to_numpy(), here["seconds"].to_numpy()
-    rows: list[list[object]] = []
+    rows: Rows = []
     for target in TARGETS:
         price = np.where(error <= target, seconds, np.inf)
-        if not np.isfinite(price).any():
-            rows.append([f"{target:.0e}", "not reached", Number("–"), Number("–")])
-            continue
-        k, level = np.unravel_index(int(price.argmin()), price.shape)
-        name = here["integrator"].to_numpy()[k]
-        setting = float(here["setting"].to_numpy()[k, level])
-        rows.append(
-            [
-                f"{target:.0e}",
-                name,
-                Number(f"{setting:.0e}"),
-                Number(f"{1e3 * price[k, level]:.3g}"),
-            ]
-        )
-    return rows
+        text = "not reached by the measured tolerances"
+        if np.isfinite(price).any():
+            m, r = np.unravel_index(price.argmin(), price.shape)
+            setting = float(here["setting"][m, r])
+            text = f"{here['integrator'].to_numpy()[m]}, {setting:.0e}: {1e3 * price[m, r]:.3g} ms"
+        rows.append([f"{target:.0e}", text])
+    return [*rows, ["reference", resolution(found)]]
 
 
-def _steady(found: Results) -> list[list[object]]:
-    rows: list[list[object]] = []
-    for aim in found["aim"].to_numpy():
-        one = found.sel(aim=aim)
-        if np.isfinite(float(one["cheapest_seconds"])):
-            spent, rtol = int(one["cheapest_revolutions"]), float(one["cheapest_tolerance"])
-            words = f"steady mean over {spent} revolutions after a spin-up, tolerance {rtol:.0e}"
-            rows.append([words, *_cells(float(aim), float(one["cheapest_seconds"]))])
-    return rows
+def resolution(found: Results, quantity: str = "objective") -> str:
+    """Return what the reference of one quantity can distinguish, in words."""
+    own = float(found["reference_error"].sel(quantity=quantity))
+    least = float(np.nanmin(found["error"].sel(quantity=quantity)))
+    if own * MARGIN <= least:
+        return f"its own error is {own:.0e}, {MARGIN:.0f} times below all errors shown"
+    return f"its own error is {own:.0e}: errors below {MARGIN * own:.0e} are not resolved"
 
 
-def _averaging(found: Results) -> list[list[object]]:
-    error = found["averaging_error"]
-    rows: list[list[object]] = []
-    for place in (0, -1):
-        one = error.isel(transient=-1, averaged=place)
-        count = int(found["averaged"][place])
-        cost = count * float(found["turn_seconds"])
-        rows.append([f"average over {count} revolutions", *_cells(float(one), cost)])
-    rows.append(
-        [
-            "scatter between replicas (lower bound of the averaging error)",
-            Number(f"{float(found['averaging_floor']):.1e}"),
-            "",
-        ]
-    )
-    return rows
-
-
-def _surrogates(found: Results) -> list[list[object]]:
-    each = float(found["sample_seconds"])
-    rows: list[list[object]] = []
-    for name in found["surrogate"].to_numpy():
-        one = found.sel(surrogate=name).isel(training=-1)
-        size = int(one["training"])
-        rows.append([f"{name}, {size} points: RMAE", *_cells(float(one["rmae"]), size * each)])
-    return rows
-
-
-def _moments(found: Results) -> list[list[object]]:
-    rows: list[list[object]] = []
-    for moment in found["moment"].to_numpy():
-        for estimate in found["estimate"].to_numpy():
-            error = found["moment_error"].sel(moment=moment, estimate=estimate).to_numpy()
-            known = np.flatnonzero(np.isfinite(error))
-            if known.size:
-                k = int(known[-1])
-                cost = float(found["moment_seconds"].sel(estimate=estimate).to_numpy()[k])
-                draws = int(found["draws"].to_numpy()[k])
-                words = f"{moment} by Monte Carlo, {estimate}, {draws} draws"
-                rows.append([words, *_cells(float(error[k]), cost)])
-        bias = float(found["moment_bias"].sel(moment=moment))
-        cost = float(found["quadrature_seconds"])
-        rows.append([f"{moment} by quadrature on the surrogate: bias", *_cells(abs(bias), cost)])
-    return rows
-
-
-def _cells(error: float, seconds: float) -> tuple[Number, Number]:
-    shown = f"{seconds:.3g} s" if seconds >= 0.1 else f"{1e3 * seconds:.3g} ms"
-    return Number(f"{error:.1e}"), Number(shown)
-
-
-PARTS = (SectionOf(90, "accuracy", "Accuracy and run time", "parts.html", accuracy),)
+PARTS = (SectionOf(10, "accuracy", "costs", "Accuracy and run time", accuracy),)

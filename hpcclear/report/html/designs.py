@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hpcclear.base.objectives import ORDINALS
-from hpcclear.report import alike, beside
+from hpcclear.report import beside
 from hpcclear.report.constraints import worded
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, number, quantity
+from hpcclear.report.html.markup import Number, Table, number
 from hpcclear.report.merit import is_plain
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
@@ -23,50 +23,29 @@ SIMULATED = (
 )
 """Variables of kind ``verification`` by simulation, and the heads of their columns."""
 
-_PREDICTED = (
-    ("mean_surrogate", "surrogate: mean"),
-    ("deviation_surrogate", "surrogate: std. deviation"),
-)
-"""The same by the surrogate."""
-
-_WORDS = (
-    "Values are by simulation, ± half-width of the 95 % confidence interval. f: {}. In brackets: the name of the design in "
-    "verification.nc, which also contains intermediate designs of the search."
-)
+_WORDS = "By simulation, ± half-width of the 95 % confidence interval. In brackets: the name in verification.nc."
 
 
-def designs(content: Content) -> dict[str, object] | None:
-    """What was found, a table a case with each distinct design once, and further designs folded; None without any."""
+def designs(content: Content) -> list[object] | None:
+    """What was found, a table a case with each distinct design once; None without any."""
     verified = content.get("verification")
     if verified is None:
         return None
     shown = beside.roles(verified)
     named = [one.design for each in shown.values() for one in each]
-    tables = [
+    tables: list[object] = [
         table_of(verified, {one.design: one.words for one in each}, SIMULATED, caption)
         for case, each in shown.items()
         if each and (caption := f"Case {case}: baseline and optimised designs".replace("  ", " "))
     ]
     if not named:
-        tables = [
-            table_of(verified, {name: name for name in names_in(verified)}, SIMULATED, "Designs")
-        ]
-    spread = [name for name in names_in(verified) if " front " in name]
+        every = {name: name for name in names_in(verified)}
+        tables = [table_of(verified, every, SIMULATED, "Designs")]
     remarks = str(verified.attrs.get("remarks", "none"))
-    columns = (*SIMULATED[:2], *_PREDICTED)
-    return {
-        "words": [_WORDS.format(labels.objective(verified)), *_findings(verified)],
-        "remarks": "" if remarks == "none" else remarks,
-        "tables": tables,
-        "variables": _variables(verified),
-        "more": [
-            table_of(
-                verified, {name: name for name in rest}, columns, "Simulated and predicted values"
-            )
-        ]
-        if (rest := _distinct(verified, [*named, *spread]))
-        else [],
-    }
+    parts: list[object] = [_WORDS, *tables, *([remarks] if remarks != "none" else [])]
+    if variables := _variables(verified):
+        parts.append(f"{variables}.")
+    return parts
 
 
 def _variables(verified: Results) -> str:
@@ -82,45 +61,6 @@ def _variables(verified: Results) -> str:
 def names_in(verified: Results) -> list[str]:
     """Return the names of all designs."""
     return [str(name) for name in verified["design"].to_numpy()]
-
-
-def _distinct(verified: Results, names: Sequence[str]) -> list[str]:
-    """Names without those of designs that an earlier one of the same case has already."""
-    kept: list[str] = []
-    for name in names:
-        twins = alike.again(verified, verified.sel(design=name))
-        if not any(one in twins and one.split()[0] == name.split()[0] for one in kept):
-            kept.append(name)
-    return kept
-
-
-def _findings(verified: Results) -> list[str]:
-    """A sentence for the lowest mean and the lowest standard deviation of each case."""
-    by_name = {name: verified.sel(design=name) for name in names_in(verified)}
-    words = []
-    for name, one in by_name.items():
-        case, _, letter = name.rpartition(" ")
-        base = by_name.get(f"{case} original")
-        if letter not in ("alpha", "beta") or base is None or not is_plain(one):
-            continue  # of another objective, which the answer has
-        what = "mean" if letter == "alpha" else "deviation"
-        printed = "mean" if letter == "alpha" else "standard deviation"
-        change = float(one[f"{what}_true"]) / float(base[f"{what}_true"]) - 1.0
-        value = quantity(float(one[f"{what}_true"]), str(one[f"{what}_true"].attrs["units"]))
-        within = _within_intervals(by_name, one, what)
-        words.append(
-            f"Design “{name}” has the lowest {printed} of f of all simulated designs{within}: {value}, "
-            f"{abs(change):.0%} {'below' if change < 0 else 'above'} the baseline design."
-        )
-    return words
-
-
-def _within_intervals(by_name: Mapping[str, Results], one: Results, what: str) -> str:
-    """A restriction, where another design of the case has a lower value that is statistically indistinguishable."""
-    case = str(one["case"].item()) if "case" in one else ""
-    rivals = (rival for rival in by_name.values() if not case or rival["case"].item() == case)
-    less = any(float(rival[f"{what}_true"]) < float(one[f"{what}_true"]) for rival in rivals)
-    return " (or is statistically indistinguishable from the lowest)" if less else ""
 
 
 def table_of(
@@ -176,4 +116,4 @@ def _cell(one: Results, name: str, scale: labels.Scale) -> str:
     return labels.paired(value, half) if np.isfinite([value, half]).all() else number(value)
 
 
-PARTS = (SectionOf(30, "designs", "Optimised designs", "designs.html", designs),)
+PARTS = (SectionOf(20, "designs", "optimised", "Optimised designs", designs),)

@@ -1,4 +1,4 @@
-"""Every figure that a directory of results allows, with its caption."""
+"""The figures of the page, each with its caption and the subject that it belongs to."""
 
 import base64
 import functools
@@ -12,60 +12,103 @@ from hpcclear.base.objectives import ENDS
 from hpcclear.report.figures import catalogue, designs, labels, motion, response, style
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
-from hpcclear.report.parts import FigureOf, SectionOf, declared
+from hpcclear.report.parts import FigureOf, declared
 from hpcclear.results.content import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SUBJECTS = {
+    "wear": "lives",
+    "identify": "identify",
+    "front": "designs",
+    "verification": "designs",
+    "response": "bearings",
+    "effects": "effects",
+    "accuracy": "accuracy",
+    "timing": "reproduce",
+    "map": "quality",
+    "bifurcation": "quality",
+}
+"""Subject of the page that a figure belongs to, by the kind of its file; of others sensitivities."""
 
-def figures(content: Content, troubles: list[str]) -> list[dict[str, str]] | None:
-    """All figures: their pictures (PNG, base64) and captions; in `troubles`, why one was left out."""
-    made = [attempt(f"The figure “{what}”", draw, troubles) for what, draw in _drawings(content)]
-    return [figure for figure in made if figure is not None] or None
+OF_RESPONSE = ("orbit", "noise")
+"""Figures of a response that the page has; `hpcclear plot` draws the others."""
+
+DPI = 150
+
+MOST_DRAWN = 4
+"""Files of samples whose own figures stand on a page: each takes a second and up to 1 MB."""
 
 
-Maker = Callable[[], dict[str, str] | None]
+def figures(content: Content, troubles: list[str]) -> list[dict[str, str]]:
+    """All figures: name, subject, picture (PNG, base64) and caption; in `troubles`, why one was left out."""
+    made = []
+    for name, kind, caption, draw in _drawings(content):
+        drawn = attempt(f"The figure “{caption}”", functools.partial(_png, draw), troubles)
+        if drawn:
+            subject = SUBJECTS.get(kind, "sensitivities")
+            made.append({"name": name, "subject": subject, "png": drawn, "caption": caption})
+    return made
 
 
-def _drawings(content: Content) -> Iterator[tuple[str, Maker]]:
-    """Every figure that there may be: what it shows, and what makes its picture and caption."""
-    for one in declared(FigureOf):
-        if one.kind in content.files and not one.apart:
-            about = one.captioned(content.files)
-            yield about, functools.partial(_tried, one.of(content.files), about)
-    found = content.responses
+def _drawings(content: Content) -> Iterator[tuple[str, str, str, "Callable[[], Figure]"]]:
+    """Every figure that there may be: name, kind of its file, caption, and what draws it."""
+    every = content.each_of_samples() if len(content.samples) <= MOST_DRAWN else iter(())
+    for before, one in [
+        *((f"{name}: ", own) for name, own in every),
+        *([] if content.samples else [("", content)]),
+    ]:
+        for figure in declared(FigureOf):
+            if figure.kind in one.files:
+                caption = before + figure.captioned(one.files)
+                yield figure.name, figure.kind, caption, figure.of(one.files)
+    yield from _of_responses(content.responses)
+
+
+def _of_responses(
+    found: Mapping[str, Results],
+) -> Iterator[tuple[str, str, str, "Callable[[], Figure]"]]:
     for first in range(0, len(ENDS), 2):  # two columns a picture
         pair = ENDS[first : first + 2]
         shown = {name: r for name, r in found.items() if designs.end_of(name) in ("", *pair)}
         asked = first == 0 or any(designs.end_of(name) for name in shown)
         if asked and len(shown) > 1:
-            yield "responses of the designs", functools.partial(_comparison, shown)
-    if found:
-        name = "original" if "original" in found else next(iter(found))
-        of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
-        if len(found) == 1:
-            yield "response", lambda: _response_alone(found[name])
-        for one in catalogue.of_response(found[name]):
+            caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
+            yield (
+                "comparison",
+                "response",
+                caption,
+                functools.partial(designs.comparison_figure, shown),
+            )
+    if not found:
+        return
+    name = "original" if "original" in found else next(iter(found))
+    of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
+    if len(found) == 1:
+        caption = f"Response over two revolutions{_clearances(found[name])}."
+        yield (
+            "response",
+            "response",
+            caption,
+            functools.partial(response.response_figure, found[name]),
+        )
+    for one in catalogue.of_response(found[name]):
+        if one.name in OF_RESPONSE:
             about = of + one.captioned({"response": found[name]})
-            about = f"{about[0].upper()}{about[1:]}."
-            yield about, functools.partial(picture, one.draw, found[name], about)
+            draw = functools.partial(one.draw, found[name])
+            yield one.name, "response", f"{about[0].upper()}{about[1:]}.", draw
 
 
-def _comparison(found: Mapping[str, Results]) -> dict[str, str]:
-    caption = f"Responses of the designs, two revolutions{_clearances(*found.values())}."
-    return _shown(designs.comparison_figure(found), caption)
-
-
-def _response_alone(found: Results) -> dict[str, str]:
-    caption = f"Response over two revolutions{_clearances(found)}."
-    return _shown(response.response_figure(found), caption)
-
-
-def _shown(figure: "Figure", caption: str) -> dict[str, str]:
-    """A picture with its caption, for the template."""
-    picture = base64.b64encode(style.render(figure, dpi=220)).decode("ascii")
-    return {"png": picture, "caption": caption}
+def _png(draw: "Callable[[], Figure]") -> str | None:
+    """A picture for the template; None if the file has not what it needs (no Sobol indices, say)."""
+    try:
+        made = draw()
+    except InputError as error:
+        if error.key == "matplotlib":
+            raise
+        return None
+    return base64.b64encode(style.render(made, dpi=DPI)).decode("ascii")
 
 
 def _clearances(*responses: Results) -> str:
@@ -77,23 +120,3 @@ def _clearances(*responses: Results) -> str:
         if len(shown) == 1:
             parts.append(f"{shown.pop()} in {name}")
     return f", at radial clearances of {' and '.join(parts)}" if parts else ""
-
-
-def picture(
-    draw: "Callable[[Results], Figure]", found: Results, caption: str
-) -> dict[str, str] | None:
-    """Draw a figure of one file with its caption; None if the file has not what it needs (no Sobol indices, say)."""
-    return _tried(functools.partial(draw, found), caption)
-
-
-def _tried(draw: "Callable[[], Figure]", caption: str) -> dict[str, str] | None:
-    try:
-        made = draw()
-    except InputError as error:
-        if error.key == "matplotlib":
-            raise
-        return None
-    return _shown(made, caption)
-
-
-PARTS = (SectionOf(100, "figures", "Figures", "figures.html", figures, each=True, piecewise=True),)

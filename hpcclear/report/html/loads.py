@@ -1,30 +1,33 @@
-"""The page's section on the loads of the bearings: the numbers and remarks that the terminal prints after `simulate`."""
+"""The section on the loads of the bearings in every stored response: all numbers and remarks of a simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from hpcclear.base.outcome import Status
+import numpy as np
+
+from hpcclear.base.outcome import Regime, Status
 from hpcclear.report import bearings, noise
-from hpcclear.report.figures import labels
-from hpcclear.report.figures.style import JOINT_NAMES
+from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import Number, Table, quantity
+from hpcclear.report.merit import recommended
 from hpcclear.report.parts import SectionOf
+from hpcclear.report.screens.response import half_width
 from hpcclear.results.content import Results
-
-_NO_ANGLE = "A dash instead of an angle: the peak lies between two stored instants, and the stored force there is lower."
 
 
 def loads(content: Content) -> list[object] | None:
     """Return tables of the bearings of every stored response, torque and validity, impacts, then remarks; None without any."""
-    valid = {
-        name: one for name, one in content.responses.items() if Status(int(one["status"])).valid
-    }
+    every = content.responses
+    verified = content.get("verification")
+    chosen = ("original", recommended(verified)) if verified is not None else ()
+    shown = {name: one for name, one in every.items() if name in chosen} or every
+    valid = {name: one for name, one in shown.items() if Status(int(one["status"])).valid}
     found = {name: bearings.bearings(one) for name, one in valid.items()}
     parts: list[object] = []
     if any(found.values()):
         parts.append(_bearings(found))
     if any(bearings.degrees(one) == "–" for each in found.values() for one in each):
-        parts.append(_NO_ANGLE)
+        parts.append("A dash instead of an angle: the peak lies between two stored instants.")
     if valid:
         header = ["response", "largest torque", "mean torque", "objective f", "contact model"]
         rows = [_whole(name, one) for name, one in valid.items()]
@@ -36,27 +39,30 @@ def loads(content: Content) -> list[object] | None:
     ]
     if impacts:
         parts.append(_table(["response", *noise.HEADER], impacts, noise.TITLE))
-        parts += [
-            f"{_title(name)}: " * (len(valid) > 1)
-            + "; ".join(f"{words} {text}" for words, text in frame)
-            + "."
-            for name, one in valid.items()
-            if (frame := noise.frame(one))
-        ]
-    for name, one in content.responses.items():
+    further = [
+        [_title(name), *row]
+        for name, one in valid.items()
+        for row in _further(one, len(valid) == 1)
+    ]
+    if further:
+        parts.append(_table(["response", "quantity", "value"], further, "Further results"))
+    for name, one in every.items():
         status = Status(int(one["status"]))
         if not status.valid:
             parts.append(f"{name}: failed, {status.message}. Remedy: {status.remedy}.")
-    return [*parts, *_remarks(content)] or None
+    if shown != every:
+        others = ", ".join(name for name in every if name not in shown)
+        parts.append(f"Further responses, in the folder `responses`: {others}.")
+    return [*parts, *_remarks(shown)] or None
 
 
-def _remarks(content: Content) -> list[str]:
+def _remarks(shown: Mapping[str, Results]) -> list[str]:
     """Every remark once, with the responses that it is on."""
     found: dict[tuple[str, str], list[str]] = {}
-    for name, one in content.responses.items():
+    for name, one in shown.items():
         for remark in bearings.remarks(one):
             found.setdefault(remark, []).append(name)
-    every = len(content.responses)
+    every = len(shown)
 
     def of(names: list[str]) -> str:
         where = "all responses" if len(names) == every else ", ".join(map(_title, names))
@@ -92,27 +98,69 @@ def _title(name: str) -> str:
 
 
 def _row(name: str, one: bearings.Bearing) -> list[object]:
-    short = JOINT_NAMES.get(one.joint)
-    joint = f"{one.joint} ({short})" if short else one.joint
     return [
-        _title(name), joint, quantity(one.peak, "N"), Number(bearings.degrees(one)), quantity(one.mean, "N"),
-        Number(bearings.share(one.contact)), quantity(one.gap, "m"),
+        _title(name), bearings.named(one.joint), quantity(one.peak, "N"), Number(bearings.degrees(one)),
+        quantity(one.mean, "N"), Number(bearings.share(one.contact)), quantity(one.gap, "m"),
     ]  # fmt: skip
 
 
 def _whole(name: str, found: Results) -> list[object]:
     drive = bearings.torque(found)
-    half_width = found["objective_limit" if "regime" in found else "objective_uncertainty"]
     f, unit = float(found["objective"]), str(found["objective"].attrs["units"])
-    shown = labels.with_half_width(f, float(half_width), unit)
     validity = bearings.validity(found) if bearings.bearings(found) else "no joint with clearance"
     return [
         _title(name),
         quantity(drive.peak, "N m"),
         quantity(drive.mean, "N m"),
-        Number(shown),
+        Number(labels.with_half_width(f, half_width(found), unit)),
         validity,
     ]
 
 
-PARTS = (SectionOf(60, "loads", "Loads of the bearings", "parts.html", loads),)
+def _further(response: Results, alone: bool) -> list[tuple[str, str]]:
+    """What else is known of a response; of one that stands alone all of it."""
+    rows = list(noise.frame(response))
+    if not alone:
+        return rows
+    rows += _crank(response)
+    if "transient_turns" in response.attrs:
+        rows += [
+            (
+                "peak between instants",
+                f"{one.joint}: angle not known; largest stored value of the averaged revolutions "
+                f"{labels.quantity(one.stored, 'N')} at {np.degrees(one.angle):.0f} deg. "
+                "Raise output.instants_per_revolution",
+            )
+            for one in bearings.bearings(response)
+            if one.between_instants
+        ]
+    if "regime" in response:
+        regime = Regime(int(response["regime"]))
+        period = float(response["period"])
+        known = f", period {period:.0f}" if np.isfinite(period) else ""
+        text = f"{regime.meaning}{known}; {int(response['steady_revolutions'])} revolutions"
+        rows.append(("motion", text))
+    unit, spread = str(response["objective"].attrs["units"]), float(response["objective_spread"])
+    rows.append(("objective f", labels.objective(response)))
+    if np.isfinite(spread):
+        rows.append(("cycle-to-cycle std. dev.", labels.quantity(spread, unit, 2)))
+    return [*rows, ("force evaluations", f"{int(response['rhs_evaluations'])}")]
+
+
+def _crank(response: Results) -> list[tuple[str, str]]:
+    """Speed of a free crank from start to end, and how it drifts from one revolution to the next."""
+    if "crank_speed" not in response:
+        return []
+    speed = response["crank_speed"].to_numpy() * 30.0 / np.pi
+    turns, time = motion.turns(response), response["time"].to_numpy()
+    if np.ptp(turns * time[-1] - turns[-1] * time) <= 1e-9 * turns[-1] * time[-1]:
+        return []  # it is prescribed
+    ends = np.interp(np.arange(np.ceil(turns[0]), turns[-1] + 1e-9), turns, time)
+    shown = f"{speed[0]:.5g} rpm at the start, {speed[-1]:.5g} rpm at the end"
+    means = 60.0 / np.diff(ends)
+    if len(means) > 1:
+        shown += f"; drift of the last revolution {means[-1] - means[-2]:+.2g} rpm"
+    return [("crank speed", shown)]
+
+
+PARTS = (SectionOf(10, "bearings", "loads", "Loads of the bearings", loads),)

@@ -3,9 +3,9 @@
 Sections of the page are plain content; how it looks is in the folder ``templates`` (jinja2).
 """
 
+import base64
 import functools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING
 
@@ -32,24 +32,15 @@ class Table:
         self.caption = caption
 
 
-@dataclass(frozen=True)
-class Section:
-    """A section of the page."""
-
-    name: str
-    title: str
-    """name and title: its anchor, and its heading."""
-    template: str
-    """File in ``templates`` that shows its content."""
-    content: object
-    """For the template; None where there is nothing to show."""
-    folded: bool = False
-    """Whether it opens on request only."""
-
-
 def preformatted(text: str) -> dict[str, object]:
     """Text whose lines stay as they are."""
     return {"text": text}
+
+
+def download(name: str, text: str) -> dict[str, object]:
+    """A text to save as a file."""
+    packed = base64.b64encode(text.encode("utf-8", "replace")).decode()
+    return {"name": name, "link": f"data:text/plain;charset=utf-8;base64,{packed}"}
 
 
 def folded(summary: str, parts: Sequence[object]) -> dict[str, object]:

@@ -1,57 +1,20 @@
-"""The sections of the page on where results come from: effects, time of the ranks, how to do it again."""
-
-from collections.abc import Iterator, Mapping
+"""The sections of the page on where results come from: scene, time of the ranks, how to do it again."""
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
-from hpcclear.report.figures import labels
-from hpcclear.report.figures import timing as figures
-from hpcclear.report.html import gallery
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, folded, number, preformatted
+from hpcclear.report.html.markup import Number, Table, download, number, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
-from hpcclear.scene.loading import parse
-from hpcclear.scene.paths import quantities
 
 _PARTS = ("busy", "idle", "compile", "write")
 """What a rank spends time on, variables of kind ``timing``."""
 
 
-def effects(content: Content) -> list[object] | None:
-    """Which effects the scene has on, and the scene itself."""
-    scene = content.attribute("scene")
-    if not scene:
-        return None
-    try:
-        entries = parse(scene, "scene")
-    except InputError:
-        first: list[object] = [
-            "The scene stored with the results is not readable as TOML; it is shown as it is."
-        ]
-    else:
-        shown = ("drive", "joints", "effects", "numerics")
-        rows = [row for name in shown for row in _flat(entries.get(name), name)]
-        words = "Effects that are not listed were disabled."
-        first = [words, Table(["entry", "value"], rows, "Settings of the model")]
-    return [*first, folded("The whole scene file", [preformatted(scene)])]
-
-
-def _flat(value: object, path: str) -> Iterator[list[object]]:
-    """Entries of nested tables, a row each."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _flat(inner, f"{path}.{key}")
-    elif value is not None:
-        yield [path, f"{value} {_unit(path, value)}".rstrip()]
-
-
-def _unit(path: str, value: object) -> str:
-    """SI unit of a plain number of a scene, "" where its text has one or it has none."""
-    plain = isinstance(value, int | float) and not isinstance(value, bool)
-    unit = quantities()[path].unit if plain and path in quantities() else ""
-    return labels.pretty(unit) if unit else ""
+def scene(content: Content) -> list[object] | None:
+    """The scene of the results."""
+    text = content.attribute("scene")
+    return [download("scene.toml", text)] if text else None
 
 
 def timing(content: Content) -> list[object] | None:
@@ -73,14 +36,7 @@ def timing(content: Content) -> list[object] | None:
         rows.append(row)
     header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
     header += ["samples"] if "samples" in found else []
-    parts: list[object] = [
-        *_fared(content, found),
-        Table(header, rows, "Time of each rank, all stages"),
-    ]
-    picture = gallery.picture(
-        figures.timing_figure, found, figures.PARTS[0].captioned({"timing": found})
-    )
-    return [*parts, picture] if picture else parts
+    return [*_fared(content, found), Table(header, rows, "Time of each rank, all stages")]
 
 
 def _fared(content: Content, found: Results) -> list[object]:
@@ -130,7 +86,7 @@ def reproduce(content: Content) -> list[object]:
 
 
 PARTS = (
-    SectionOf(120, "effects", "Effects and settings", "parts.html", effects, each=True),
-    SectionOf(130, "reproduce", "How to reproduce", "parts.html", reproduce, each=True),
-    SectionOf(150, "time", "Run time of the ranks", "parts.html", timing, folded=True),
+    SectionOf(10, "reproduce", "origin", "Versions and command", reproduce, each=True),
+    SectionOf(20, "reproduce", "scene", "Scene", scene, each=True),
+    SectionOf(30, "reproduce", "time", "Run time of the ranks", timing),
 )

@@ -203,7 +203,7 @@
       mark.addEventListener("mouseenter", () => describe(panel, p));
       mark.addEventListener("mouseleave", () => detail(panel, points[chosen]));
       mark.addEventListener("focus", () => move(k, false));
-      mark.addEventListener("click", () => choose(k));
+      mark.addEventListener("click", () => { choose(k); more.open = true; });
     }
     const halo = draw(svg, "circle", { r: 13, class: "halo" });
     let here = 0, chosen = 0;
@@ -224,6 +224,8 @@
       move(k, false);
       detail(panel, points[k]);
     }
+    const more = byId("front-more");
+    more.ontoggle = () => { if (more.open) detail(panel, points[chosen]); };  /* charts are as wide as there is room for */
     function further(step) {
       for (let k = here + step; k >= 0 && k < points.length; k += step) if (points[k].direct.length) return k;
       return here;
@@ -233,7 +235,7 @@
         ArrowRight: () => move(here + 1), ArrowLeft: () => move(here - 1),
         ArrowUp: () => move(further(-1)), ArrowDown: () => move(further(1)),
         Home: () => move(0), End: () => move(points.length - 1),
-        Enter: () => choose(here), " ": () => choose(here),
+        Enter: () => { choose(here); more.open = true; }, " ": () => choose(here),
       };
       if (!keys[event.key]) return;
       event.preventDefault();
@@ -362,6 +364,12 @@
   }
 
   /* a figure that is its page's target fills the screen; the way back stands in it, Escape takes it */
+  const opened = () => {  /* a link into a fold opens it */
+    const at = location.hash && document.getElementById(location.hash.slice(1));
+    for (let e = at; e; e = e.parentElement) if (e.tagName === "DETAILS") e.open = true;
+  };
+  window.addEventListener("hashchange", opened);
+  opened();
   const close = () => document.querySelector("figure:target .close")?.click();
   document.addEventListener("keydown", (event) => { if (event.key === "Escape") close(); });
   document.addEventListener("click", (event) => {

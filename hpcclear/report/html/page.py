@@ -1,25 +1,52 @@
 """One HTML file about a directory of results: works offline, loads nothing from the network, prints and tabs well."""
 
 import base64
-import functools
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from functools import partial
 from importlib import resources
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from hpcclear.report.answer import answer
-from hpcclear.report.html import picture, sections
+from hpcclear.report.html import gallery, picture
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
-from hpcclear.report.html.markup import Section, render
+from hpcclear.report.html.markup import Table, render
 from hpcclear.report.parts import SectionOf, declared
+from hpcclear.report.screen import Screen
+from hpcclear.report.screens import screen_of
 from hpcclear.results import files
 from hpcclear.results.names import KINDS
 
 NAME = "report.html"
 _MARK = b'<meta name="generator" content="hpcclear">'  # also stands in the template
+
+SUBJECTS = {
+    "lives": ("Service lives", "lives, clearances, causes"),
+    "identify": ("Identified machine", "unknowns, growth, what to measure"),
+    "designs": ("All designs", "simulated with intervals, fronts"),
+    "bearings": ("Bearings", "forces, contact, impacts, noise"),
+    "sensitivities": ("Sensitivities and surrogates", "contributions, Sobol indices, slopes, fits"),
+    "effects": ("Effects", "change and run time of each"),
+    "accuracy": ("Accuracy and run time", "sources of error, cheapest settings"),
+    "quality": ("Accuracy and data quality", "statistics, chaos, failures, warnings"),
+    "paper": ("Comparison with the paper", "claims, Table 4, readings"),
+    "reproduce": ("How to reproduce", "scene, versions, processor, run time, what is missing"),
+}
+"""Subjects of the page in their order: title, and what is inside."""
+
+
+class Subject(NamedTuple):
+    """A folded part of the page."""
+
+    name: str
+    title: str
+    hint: str
+    sections: list[tuple[str, str, Sequence[object]]]
+    """Name, title and parts of each section."""
+    figures: list[dict[str, str]]
 
 
 def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
@@ -54,19 +81,26 @@ def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
 def _page(content: Content) -> str:
     """The whole document."""
     troubles = list(content.troubles)
-    nothing = Content(content.directory, {}, {})
-    shown = attempt("What the page's script draws", lambda: _picture(content), troubles)
+    shown = attempt("What the page's script draws", partial(_picture, content), troubles)
+    opened = attempt("The first screen", partial(screen_of, content), troubles)
+    first = opened or Screen(f"Results in {_readable(content.directory.resolve().name)}")
+    drawn = gallery.figures(content, troubles)
+    subjects = _subjects(content, drawn, first, troubles)
     return render(
         "page.html",
         title=f"Report on {_readable(content.directory.resolve().name)}",
         policy=_policy(),
         style=_asset("page.css"),
         script=_asset("page.js"),
-        picture=picture.picture(nothing) if shown is None else shown,
+        picture=shown or {"front": {"points": []}, "responses": {}, "motions": {}},
         source=content.attribute("source") or "hpcclear",
-        sections=[
-            section for section in _sections(content, troubles) if section.content is not None
-        ],
+        screen=first,
+        spans=any(row.span for row in first.rows),
+        motions=bool(shown and shown["motions"]),
+        points=bool(shown and shown["front"]["points"]),
+        anchors=[one.name for one in subjects],
+        beside=[one for one in drawn if one["name"] in first.figures],
+        subjects=subjects,
     )
 
 
@@ -75,7 +109,7 @@ def _readable(name: str) -> str:
     return name.encode("utf-8", "replace").decode()
 
 
-def _picture(content: Content) -> dict[str, object]:
+def _picture(content: Content) -> dict[str, Any]:
     """What the script draws, if JSON can say it: it knows no NaN."""
     made = picture.picture(content)
     json.dumps(made, allow_nan=False)
@@ -100,75 +134,49 @@ def _policy() -> str:
     return "; ".join(rules)
 
 
-def _sections(
-    content: Content, troubles: list[str], wanted: Sequence[str] | None = None
-) -> Iterator[Section]:
-    """All sections in the page's order, or those wanted, those with nothing to show among them.
-
-    One that cannot be made or filled into its template is left out, and said in `troubles` and on the page.
-    """
-    if content.samples:
-        yield from _several(content, troubles)
-        content = replace(content, files={})
+def sections(content: Content, troubles: list[str]) -> Iterator[tuple[SectionOf, Sequence[object]]]:
+    """Yield each section that results have, and its parts; one that cannot be made or shown is named in `troubles`."""
     for part in declared(SectionOf):
-        if wanted is not None and part.name not in wanted:
-            continue
-        if content.samples and (part.of_samples or not content.responses):
-            continue
-        section = functools.partial(_section, part, content, troubles)
-        made = section() if part.piecewise else attempt(f"“{part.title}”", section, troubles)
-        if made is not None:
-            yield made
-    yield Section("missing", "Results not available", "list.html", _missing(content, troubles))
+
+        def made(part: SectionOf = part) -> Sequence[object] | None:
+            parts = part.make(content)
+            if parts:
+                render("parts.html", parts=parts)  # whether it can be shown
+            return parts
+
+        if parts := attempt(f"“{part.title}”", made, troubles):
+            yield part, parts
 
 
-MOST_DRAWN = 4
-"""Files of samples whose own figures stand on a page: each takes a second and up to 1 MB."""
-
-
-def _several(content: Content, troubles: list[str]) -> Iterator[Section]:
-    """The comparison of several samples, then the sections of each, which name its file."""
-    comparison = SectionOf(0, "comparison", "Comparison", "parts.html", sections.compared)
-    yield _section(comparison, content, troubles)
-    drawn = len(content.samples) <= MOST_DRAWN
-    if not drawn:
-        yield Section("figures", "Figures of single files", "parts.html", _on_demand(content))
-    each = [
-        one.name for one in declared(SectionOf) if one.each and (drawn or one.name != "figures")
-    ]
+def _subjects(
+    content: Content, drawn: list[dict[str, str]], first: Screen, troubles: list[str]
+) -> list[Subject]:
+    """The folded parts of the page, those with nothing inside left out."""
+    found: dict[str, list[tuple[str, str, Sequence[object]]]] = {name: [] for name in SUBJECTS}
+    for part, parts in sections(content, troubles):
+        found[part.subject].append((part.name, part.title, parts))
     for k, (name, one) in enumerate(content.each_of_samples(), 1):
-        for section in _sections(one, troubles, each):
-            if section.name in each:
-                heading = f"{name}: {section.title[0].lower()}{section.title[1:]}"
-                yield replace(section, name=f"{section.name}-{k}", title=heading)
+        for part, parts in sections(one, troubles):
+            if part.each:
+                title = f"{name}: {part.title[0].lower()}{part.title[1:]}"
+                found[part.subject].append((f"{part.name}-{k}", title, parts))
+    if absent := _missing(content, troubles):
+        found["reproduce"].append(("missing", "Results not available", absent))
+    made = []
+    for name, (title, hint) in SUBJECTS.items():
+        figures = [
+            one for one in drawn if one["subject"] == name and one["name"] not in first.figures
+        ]
+        if found[name] or figures:
+            made.append(Subject(name, title, hint, found[name], figures))
+    return made
 
 
-def _on_demand(content: Content) -> list[object]:
-    """How the figures of one of many files are drawn."""
-    first = Path(next(iter(content.samples)))
-    name = first if first.parent != Path() else content.directory / first
-    return [
-        f"The figures of single files are drawn for up to {MOST_DRAWN} files; here are {len(content.samples)}. "
-        f"To draw those of one file: hpcclear plot {name}.nc -o figures. "
-        f"To write a page of its own with them: hpcclear report {name}.nc -o {name}.html."
-    ]
-
-
-def _section(part: SectionOf, content: Content, troubles: list[str]) -> Section:
-    """A section whose content its template can show, which is tried."""
-    made = part.content(content, troubles)
-    section = Section(part.name, part.title, part.template, made, part.folded)
-    if section.content is not None:
-        render(part.template, content=section.content)
-    return section
-
-
-def _missing(content: Content, troubles: list[str]) -> list[str] | None:
-    if not content.whole or not set(content.files) - {"timing"}:
-        return troubles or None
+def _missing(content: Content, troubles: list[str]) -> list[str]:
     kinds = set(content.files) - {"timing"}
-    if len(kinds) == 1 and all(kind not in KINDS or KINDS[kind].alone for kind in kinds):
-        return troubles or None  # a directory of that command lacks nothing
+    alone = len(kinds) == 1 and all(kind not in KINDS or KINDS[kind].alone for kind in kinds)
+    if not content.whole or not kinds or alone:
+        return troubles  # a directory of that command lacks nothing
     words = [
         f"{name}.nc: {kind.absent}"
         for name, kind in KINDS.items()
@@ -178,9 +186,17 @@ def _missing(content: Content, troubles: list[str]) -> list[str] | None:
         words.append(
             "responses/: no response was stored, so there is no animation (`hpcclear simulate` or `run`)"
         )
-    return [*troubles, *words] or None
+    return [*troubles, *words]
 
 
-PARTS = (
-    SectionOf(10, "answer", "Result", "answer.html", lambda one: answer(one.files, "") or None),
-)
+_OPENED = ("contributions", "tighten first", "next steps", "warning", "negligible")
+"""Lines of the answer that the first screen has."""
+
+
+def _further(content: Content) -> list[object] | None:
+    """What else is known of the recommended design of a study, in lines."""
+    rows = [[one.label, one.text] for one in answer(content.files, "") if one.label not in _OPENED]
+    return [Table(["subject", "result"], rows, "Recommended design")] if rows else None
+
+
+PARTS = (SectionOf(10, "designs", "answer", "Recommended design", _further),)

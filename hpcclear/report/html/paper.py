@@ -1,5 +1,7 @@
 """The page's section on a paper: its claims, its designs, and how its text can be read."""
 
+import textwrap
+
 from hpcclear.base.objectives import ENDS
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import beside
@@ -14,6 +16,9 @@ _BADGES = {
     Verdict.FAILS: {"words": "✗ does not hold", "kind": "fails"},
     Verdict.UNDECIDED: {"words": "? undecided", "kind": "open"},
 }
+
+LONGEST = 120
+"""Letters of the numbers that decide a claim, on the page."""
 
 _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. deviation"))
 """Variables of kind ``verification``, and the heads of their columns."""
@@ -58,7 +63,8 @@ def claims(content: Content) -> list[object] | None:
     for k in range(found.sizes["claim"]):
         one = found.isel(claim=k)
         badge = _BADGES[Verdict(int(one["verdict"]))]
-        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, one["figure"].item()])
+        figure = textwrap.shorten(str(one["figure"].item()), LONGEST, placeholder=" … (claims.nc)")
+        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, figure])
     header = ["claim", "verdict", "the numbers that decide"]
     return [held, Table(header, rows, "Claims of the paper, tested on this data")]
 
@@ -89,4 +95,4 @@ def paper(content: Content) -> list[object] | None:
     return [one for part in parts for one in part or ()] or None
 
 
-PARTS = (SectionOf(140, "paper", "Comparison with the paper", "parts.html", paper, folded=True),)
+PARTS = (SectionOf(10, "paper", "claims", "Claims and printed designs", paper),)

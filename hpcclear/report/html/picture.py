@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.objectives import Usual
 from hpcclear.report.figures import labels, motion, moving
 from hpcclear.report.figures.designs import searched
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.markup import quantity
-from hpcclear.report.merit import goals_of, leading_goals, recommended, usual_of
-from hpcclear.report.parts import SectionOf
+from hpcclear.report.merit import goals_of, leading_goals, recommended
+from hpcclear.report.screens.study import simulated
 from hpcclear.results.content import Results
 
 _LEGEND = {
@@ -158,7 +157,7 @@ def _solutions(fronts: Results, verified: Results | None) -> list[dict[str, Any]
                 "case": case,
                 "design": _values(one),
                 "surrogate": _moments(one, "mean", "deviation"),
-                "direct": [] if direct is None else _direct(direct),
+                "direct": [] if direct is None else simulated(direct),
                 "response": "",
                 "goals": _usual(one, "") | _searched(one),
             }
@@ -192,7 +191,7 @@ def _design(one: Results) -> dict[str, Any]:
         "case": str(one["case"].item()) if "case" in one else "",
         "design": _values(one),
         "surrogate": surrogate,
-        "direct": _direct(one),
+        "direct": simulated(one),
         "response": "original" if is_original else name,
         "goals": _usual(one, "_true") | _verified(one),
     }
@@ -209,34 +208,6 @@ def _moments(one: Results, mean: str, deviation: str) -> list[list[str]]:
         [_WORDS[word], str(quantity(float(one[name]), str(one[name].attrs["units"])))]
         for word, name in (("mean", mean), ("deviation", deviation))
     ]
-
-
-def _direct(one: Results) -> list[list[str]]:
-    """Simulated moments with confidence intervals, surrogate errors, counts, and the values that the paper prints."""
-    rows = []
-    for word in ("mean", "deviation"):
-        units = str(one[f"{word}_true"].attrs["units"])
-        shown = str(quantity(float(one[f"{word}_true"]), units))
-        if f"{word}_lower" in one and np.isfinite(float(one[f"{word}_lower"])):
-            low, high = (float(one[f"{word}_{end}"]) for end in ("lower", "upper"))
-            shown += f" ({labels.between(low, high, units)})"
-        rows.append([_WORDS[word], shown])
-    for name in goals_of(one):
-        words, unit = (str(one[f"{name}_{what}"].item()) for what in ("goal", "unit"))
-        low, high = (float(one[f"{name}_{end}"]) for end in ("lower", "upper"))
-        if usual_of(one, name) not in (Usual.MEAN, Usual.DEVIATION):
-            known = f" ({labels.between(low, high, unit)})" if low < high else ""
-            rows.append([words, f"{quantity(float(one[f'{name}_true']), unit)}{known}"])
-    for word in ("mean", "deviation"):
-        if f"{word}_error" in one and np.isfinite(float(one[f"{word}_error"])):
-            rows.append([f"surrogate error, {_WORDS[word]}", f"{float(one[f'{word}_error']):+.2%}"])
-    rows += [[word, f"{int(one[word])}"] for word in ("samples", "failed") if word in one]
-    for word in ("mean", "deviation"):
-        if f"{word}_paper" in one and np.isfinite(float(one[f"{word}_paper"])):
-            rows.append(
-                [f"{_WORDS[word]} printed in the paper", f"{float(one[f'{word}_paper']):.4e} m"]
-            )
-    return rows
 
 
 def series(response: Results, most: int = 720) -> list[dict[str, Any]]:
@@ -296,11 +267,3 @@ def _digits(values: np.ndarray) -> Any:
     """Numbers for the page: six digits."""
     flat = [float(f"{value:.6g}") for value in np.ravel(values)]
     return np.reshape(flat, np.shape(values)).tolist()
-
-
-PARTS = (
-    SectionOf(
-        40, "pareto", "Pareto front", "pareto.html", lambda one: front(one)["points"] or None
-    ),
-    SectionOf(80, "motion", "Animation", "motion.html", lambda one: one.responses or None),
-)

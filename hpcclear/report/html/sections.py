@@ -1,106 +1,74 @@
-"""Sections of the page on samples, findings and data quality, made from what there is; None where nothing is."""
+"""Sections of the page on samples, effects and data quality, made from what there is; None where nothing is."""
+
+import json
+from collections.abc import Sequence
 
 import numpy as np
+import tomli_w
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, quantity
+from hpcclear.report.html.markup import Number, Table, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
-from hpcclear.scene.loading import scene_of_text
-from hpcclear.statistics.random.survival import order_interval, quantiles
-
-LIVED = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
-"""Endings of lives that count."""
+from hpcclear.scene.loading import parse, scene_of_text
 
 LISTED = 40  # samples listed by number before the rest is only counted
 
 
-def summary(content: Content) -> dict[str, object] | None:
-    """What was sampled and found, in plain words; None if other sections have it."""
-    words = [*_lives_words(content), *_samples_words(content), *_effects_words(content)]
-    if not words and not set(content.files) - {"timing"}:
-        words = ["These are responses of single designs; nothing was sampled or optimised."]
-    return {"words": words, "facts": _facts(content)} if words else None
-
-
-def _lives_words(content: Content) -> list[str]:
-    lives = content.get("wear")
-    if lives is None:
-        return []
-    last = lives.isel(cycle=-1)
-    cycles, failed = float(last["cycle"]), int((~np.isin(lives["ending"], LIVED)).sum())
-    early = int((lives["ended"].to_numpy() < cycles).sum()) - failed
-    words = [
-        f"{lives.sizes['life']} service lives of {'up to ' if early > 0 else ''}{cycles:.4g} revolutions were simulated; "
-        f"{_failures(failed)}."
+def screened(content: Content) -> list[object] | None:
+    """What each effect changes and saves, why others are kept, and the tables of the scene without what can be neglected."""
+    found = content.get("effects")
+    if found is None:
+        return None
+    seconds = effects.seconds_of(content.get("timing"))
+    kept = json.loads(found.attrs["kept"]).items()
+    return [
+        _changes(found, seconds),
+        *effects.statements(found, seconds),
+        *(f"{name} is kept: {reason}." for name, reason in kept),
+        *([preformatted(text)] if (text := _changed(found)) else []),
     ]
-    ends = lives["end_clearance"] if "end_clearance" in lives else lives["clearance"].isel(cycle=-1)
-    levels = quantiles(ends.to_numpy(), np.array([0.05, 0.95]))
-    for k, name in enumerate(lives["joint"].to_numpy()):
-        low, high = (str(quantity(float(value), "m")) for value in levels[:, k])
-        words.append(f"Final clearance of {name}, 5th to 95th percentile: {low} to {high}.")
-    if "lifetime_hours_quantile" in lives:
-        median = lives.sel(quantile=0.5)
-        turns, hours = float(median["lifetime_quantile"]), float(median["lifetime_hours_quantile"])
-        if np.isfinite(turns):
-            every = lives["lifetime"].to_numpy()
-            known = every[~np.isnan(every)]
-            least, most = order_interval(known, 0.5, len(every) - len(known))
-            reach = f"{most:.4g}" if np.isfinite(most) else f"beyond {cycles:.4g}"
-            words.append(
-                f"Median service life: {turns:.4g} revolutions (95 % CI {np.nan_to_num(least):.4g} to {reach}), {hours:.4g} h."
-            )
-    if any(name.startswith("limit_") for name in lives.attrs):
-        interval = f"{float(last['survival_lower']):.0%} to {float(last['survival_upper']):.0%}"
-        words.append(
-            f"Survival after {cycles:.4g} revolutions: {float(last['survival']):.0%} (95 % CI {interval})."
-        )
-    return words
 
 
-def _samples_words(content: Content) -> list[str]:
-    samples = content.get("samples")
-    if samples is None:
-        return []
-    count, failed = samples.sizes["sample"], int(np.count_nonzero(samples["status"]))
-    names = ", ".join(labels.words(v) for v in labels.design_variables(samples))
-    words = [f"{count} simulations, varying {names}; {_failures(failed)}."]
-    f = samples["objective"]
-    if not np.isnan(f).all():
-        ends = float(np.nanmin(f)), float(np.nanmax(f))
-        low, high = (str(quantity(end, str(f.attrs["units"]))) for end in ends)
-        words.append(
-            f"The objective f, {labels.objective(samples)}, lies between {low} and {high}."
-        )
-    return words
+def _changes(found: Results, seconds: effects.Times) -> Table:
+    """A row a variant: what is off, changes with confidence intervals, time, verdict."""
+    shown = [
+        k
+        for k in range(found.sizes["response"])
+        if np.isfinite(found["change"].isel(response=k)[1:]).any()
+    ]
+    words = {"mean": "mean f", "deviation": "std. dev."}
+    names = (str(found["response"].to_numpy()[k]) for k in shown)
+    header = ["off", *(words.get(name, name) for name in names), "run time saved", "within"]
+    rows: list[list[object]] = []
+    for k in range(1, found.sizes["variant"]):
+        one = found.isel(variant=k)
+        cells = [effects.shown(float(one["change"][r]), float(one["limit"][r])) for r in shown]
+        verdict = ("yes", "no", "?")[int(one["decision"])]
+        saved = effects.saving(found, k, seconds).words
+        rows.append([effects.label(effects.named(found, k)), *map(Number, cells), saved, verdict])
+    return Table(header, rows, "Changes with effects disabled, against all enabled")
 
 
-def _effects_words(content: Content) -> list[str]:
-    certificate = content.get("effects")
-    return (
-        []
-        if certificate is None
-        else effects.statements(certificate, effects.seconds_of(content.get("timing")))
-    )
-
-
-def _facts(content: Content) -> list[tuple[str, object]]:
-    """Numbers of samples and designs as tiles."""
-    facts: list[tuple[str, object]] = []
-    if (samples := content.get("samples")) is not None:
-        failed = int(np.count_nonzero(samples["status"]))
-        facts += [("samples", samples.sizes["sample"]), ("failed", failed)]
-    if (verified := content.get("verification")) is not None:
-        facts.append(("designs simulated with confidence intervals", verified.sizes["design"]))
-    return facts
-
-
-def _failures(count: int) -> str:
-    return "no failures" if count == 0 else f"{count} failed"
+def _changed(found: Results) -> str:
+    """Tables of the scene that change where what can be neglected is left out, as TOML to paste; "" if nothing can."""
+    chosen = int(np.argmax(found["recommended"].to_numpy()))
+    try:
+        whole = scene_of_text(str(found.attrs["scene"]), "scene").resolved()
+    except InputError:
+        return ""  # of another version
+    if not chosen:
+        return ""
+    reduced = parse(found.attrs["reduced_scene"], "reduced scene")
+    changed = {key: value for key, value in reduced.items() if whole.get(key) != value}
+    gone = [key for key in whole if key not in reduced]
+    more = f"; [{'], ['.join(gone)}] goes" if gone else ""
+    head = f"# Without {', '.join(effects.named(found, chosen))}, in place of the same tables"
+    return f"{head}{more}.\n{tomli_w.dumps(changed)}"
 
 
 def identified_machine(content: Content) -> list[object] | None:
@@ -108,7 +76,7 @@ def identified_machine(content: Content) -> list[object] | None:
     found = content.get("identify")
     if found is None:
         return None
-    rows: list[list[object]] = [[line.label, line.text] for line in identified.lines(found)]
+    rows = [[line.label, line.text] for line in identified.lines(found)]
     table = Table(["quantity", "result"], rows, "Unknowns of the machine")
     return [table, *(f"Warning: {text}." for text in identified.warnings(found))]
 
@@ -119,7 +87,7 @@ def statistics(content: Content) -> list[object] | None:
     if samples is None or content.get("verification") is not None:
         return None
     lines = spread.statistics(samples, _thresholds(samples))
-    rows = [[line.label, line.text] for line in lines]
+    rows = [[line.label, line.text] for line in [*lines, *spread.in_time(samples)]]
     table = Table(
         ["quantity", "95 % confidence interval in brackets"], rows, "Statistics of the samples"
     )
@@ -127,13 +95,14 @@ def statistics(content: Content) -> list[object] | None:
     return [*([table] if rows else []), *warnings] or None
 
 
-def compared(content: Content) -> list[object]:
+def compared(content: Content) -> list[object] | None:
     """Statistics of several samples in one table, a column for each file."""
+    if not content.samples:
+        return None
     every = {name: own["samples"] for name, own in content.samples.items()}
     rows = spread.rows_of(spread.side_by_side(every))
-    words = f"The files {', '.join(content.samples)} are compared here; a part on each follows."
     caption = "Statistics of the samples, with 95 % confidence intervals"
-    return [words, Table(["quantity", *content.samples], rows, caption)]
+    return [Table(["quantity", *content.samples], rows, caption)]
 
 
 def _thresholds(samples: Results) -> list[spread.Beyond]:
@@ -158,42 +127,33 @@ def trust(content: Content) -> list[object] | None:
         return None
     status = samples["status"].to_numpy()
     numbers = samples["sample"].to_numpy()
-    parts: list[object] = []
-    rows: list[list[object]] = []
+    failed: list[list[object]] = []
     for code in Status:
         hit = numbers[status == code]
         if code is not Status.OK and hit.size:
-            rows.append(
-                [
-                    code.name.lower(),
-                    Number(len(hit)),
-                    code.message,
-                    failures.where(status == code, failures.variables(samples)),
-                    code.remedy,
-                    _listed(hit, len(numbers)),
-                ]
-            )
-    if rows:
-        header = ["outcome", "samples", "what happened", "where", "what to change", "which"]
-        parts.append(Table(header, rows, "Samples that failed; their numbers are missing, never 0"))
-    else:
-        parts.append("No sample failed.")
-    rows = []
+            place = failures.where(status == code, failures.variables(samples))
+            which = _listed(hit, len(numbers))
+            name = code.name.lower()
+            failed.append([name, Number(len(hit)), code.message, place, code.remedy, which])
     flags = samples["flags"].to_numpy() if "flags" in samples else np.zeros(len(numbers), int)
+    marked: list[list[object]] = []
     for flag, words in labels.FLAGS.items():
         hit = numbers[(flags & flag) != 0]
         if hit.size:
-            rows.append([flag.name.lower(), Number(len(hit)), words, _listed(hit, len(numbers))])
-    if rows:
-        parts.append(
-            Table(["flag", "samples", "why", "which"], rows, "Valid results to be read with care")
-        )
-    else:
-        parts.append("No sample carries a warning.")
-    return parts
+            which = _listed(hit, len(numbers))
+            marked.append([flag.name.lower(), Number(len(hit)), words, which])
+    heads = ["outcome", "samples", "what happened", "where", "what to change", "which"]
+    return [
+        Table(heads, failed, "Samples that failed; their numbers are missing, never 0")
+        if failed
+        else "No sample failed.",
+        Table(["flag", "samples", "why", "which"], marked, "Valid results to be read with care")
+        if marked
+        else "No sample carries a warning.",
+    ]
 
 
-def _listed(numbers: np.ndarray, of: int) -> str:
+def _listed(numbers: Sequence[int] | np.ndarray, of: int) -> str:
     """Numbers of samples, the first ones only where they are many, "all" where all are meant."""
     if len(numbers) == of > 1:
         return "all"
@@ -204,8 +164,9 @@ def _listed(numbers: np.ndarray, of: int) -> str:
 
 
 PARTS = (
-    SectionOf(20, "identify", "Identified machine", "parts.html", identified_machine),
-    SectionOf(50, "statistics", "Statistics of the samples", "parts.html", statistics, of_samples=True, each=True),
-    SectionOf(70, "summary", "Summary", "summary.html", summary, of_samples=True, each=True),
-    SectionOf(110, "trust", "Data quality", "parts.html", trust, of_samples=True, each=True),
-)  # fmt: skip
+    SectionOf(10, "identify", "identified", "Identified machine", identified_machine),
+    SectionOf(10, "effects", "screened", "Effects", screened),
+    SectionOf(10, "quality", "compared", "Comparison", compared),
+    SectionOf(20, "quality", "statistics", "Statistics of the samples", statistics, each=True),
+    SectionOf(30, "quality", "trust", "Data quality", trust, each=True),
+)

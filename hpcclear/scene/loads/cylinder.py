@@ -1,13 +1,13 @@
 """A force between two points by a law of their distance: hydraulic or pneumatic cylinder, gas spring, end stop, cable."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from hpcclear.base.pieces import hinges
 from hpcclear.scene.curves import Curve, Pairs
 from hpcclear.scene.fields import Quantity
-from hpcclear.scene.loads.declared import Acting, Amount, Load, Term
+from hpcclear.scene.loads.declared import Load
 
 
 def along(ex: float, ey: float, vx: float, vy: float) -> tuple[float, float, float, float]:
@@ -39,12 +39,12 @@ class CylinderLoad(Load):
         """The force, if it is a table."""
         return {self.name: self.force} if isinstance(self.force, tuple) else {}
 
-    def numbers(self) -> dict[str, Amount]:
+    def numbers(self) -> dict[str, Any]:
         """Its damping, and its force or where the table of it bends."""
         found = super().numbers()
         return found | hinges(self.name, self.force) if isinstance(self.force, tuple) else found
 
-    def act(self, on: Acting) -> Term:
+    def act(self, on: Any) -> Any:
         """Opposite forces along the line of both places."""
         apart, moving = on.apart(self.first, self.second)
         nx, ny, length, rate = on.call(

@@ -5,15 +5,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from hpcclear.base.pieces import Pieces, Rows, level, periodic
+from hpcclear.base.pieces import Pieces, level, periodic
 from hpcclear.scene.fields import Table, invalid
-
-Acting = Any
-"""`hpcclear.dynamics.linkage.acting.Acting`, which stands above the scene."""
-Term = Any
-"""What it makes: a term of the motion's source."""
-Amount = Any
-"""A number, or an array of samples, SI."""
 
 
 class Load(Table):
@@ -35,7 +28,7 @@ class Load(Table):
         """Its tables that run straight from row to row (`Acting.piecewise`), by the names that their parameters begin with."""
         return {}
 
-    def numbers(self) -> dict[str, Amount]:
+    def numbers(self) -> dict[str, Any]:
         """Parameters of its terms, ``NAME_ENTRY``, SI; numbers or arrays of samples: its entries that are numbers."""
         entries = {entry: getattr(self, entry) for entry in type(self).model_fields}
         return {
@@ -44,7 +37,7 @@ class Load(Table):
             if not (value is None or isinstance(value, (str, bool, tuple, Table)))
         }
 
-    def act(self, on: Acting) -> Term:
+    def act(self, on: Any) -> Any:
         """Add its forces and torques to a motion by `on`, a `hpcclear.dynamics.linkage.acting.Acting`.
 
         Returns the power that it gives, W, as a term.
@@ -65,15 +58,14 @@ class SizedLoad(Load):
     """Another body against whose angle the table is read; it repeats with each turn of that body."""
 
     @property
-    def constant(self) -> Amount:
+    def constant(self) -> Any:
         """Its size; 1 where a curve has it."""
         return 1.0 if self.table else getattr(self, self.size_entry)
 
     @property
-    def timed(self) -> Rows | None:
+    def timed(self) -> Any:
         """Rows of its curve over the time; None where there is none."""
-        rows: Rows | None = getattr(self, f"{self.size_entry}_by_time")
-        return rows
+        return getattr(self, f"{self.size_entry}_by_time")
 
     @property
     def seconds(self) -> float:
@@ -102,7 +94,7 @@ class SizedLoad(Load):
             raise invalid(reason, "Remove it", key="angle_of", value=self.angle_of)
         if self.repeats and timed is None:
             raise invalid(f"there is no {entry}_by_time", "Remove it", key="repeats", value=True)
-        if self.repeats and timed and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
+        if self.repeats and (timed[0][0] != 0.0 or timed[0][1] != timed[-1][1]):
             raise invalid(
                 "a table that repeats begins at 0 s, and ends at the value with which it begins",
                 "Make its first and last value equal",

@@ -1,6 +1,6 @@
 """A force at a point: gas, wind, the resistance of a workpiece."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -8,7 +8,7 @@ from pydantic import Field
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, by_angle, by_time
 from hpcclear.scene.fields import Angle, PairTable, Quantity, check_one_of
-from hpcclear.scene.loads.declared import Acting, Amount, SizedLoad, Term
+from hpcclear.scene.loads.declared import SizedLoad
 
 
 class Components(PairTable):
@@ -45,7 +45,7 @@ class ForceLoad(SizedLoad):
         size = self.size if self.size is not None else self.size_by_time
         check_one_of("force", force, size, "Write force = [x, y], or size and direction")
 
-    def components(self) -> tuple[Amount, Amount]:
+    def components(self) -> tuple[Any, Any]:
         """Force along x and y, N; where a curve has its size, the direction. Numbers or arrays of samples."""
         if self.force is not None:
             return self.force.x, self.force.y
@@ -56,12 +56,12 @@ class ForceLoad(SizedLoad):
         )
         return self.constant * cosine, self.constant * sine
 
-    def numbers(self) -> dict[str, Amount]:
+    def numbers(self) -> dict[str, Any]:
         """Its components."""
         x, y = self.components()
         return {f"{self.name}_force_x": x, f"{self.name}_force_y": y}
 
-    def act(self, on: Acting) -> Term:
+    def act(self, on: Any) -> Any:
         """The force at its place."""
         now = on.curve() if self.table else on.one
         parts = zip("xy", self.components(), strict=True)

@@ -1,11 +1,11 @@
 """A spring and damper between two points, on both sides of its length or on one."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from hpcclear.scene.fields import Quantity
-from hpcclear.scene.loads.declared import Acting, Load, Term
+from hpcclear.scene.loads.declared import Load
 
 
 def spring_force(
@@ -67,7 +67,7 @@ class SpringLoad(Load):
     """Range in which the spring acts: "both" sides of its length; "pushing": only when shorter, as a buffer or end
     stop; "pulling": only when longer, as a rope."""
 
-    def act(self, on: Acting) -> Term:
+    def act(self, on: Any) -> Any:
         """Opposite forces along the line of both places."""
         apart, moving = on.apart(self.first, self.second)
         entries = ("stiffness", "damping", "length")

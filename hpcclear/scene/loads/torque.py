@@ -1,11 +1,11 @@
 """A torque on a body."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from hpcclear.base.pieces import Rows
 from hpcclear.scene.curves import Curve, by_angle, by_time
 from hpcclear.scene.fields import check_one_of
-from hpcclear.scene.loads.declared import Acting, Amount, SizedLoad, Term
+from hpcclear.scene.loads.declared import SizedLoad
 
 
 class TorqueLoad(SizedLoad):
@@ -27,11 +27,11 @@ class TorqueLoad(SizedLoad):
         remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
         check_one_of("torque", self.torque, self.torque_by_time, remedy)
 
-    def numbers(self) -> dict[str, Amount]:
+    def numbers(self) -> dict[str, Any]:
         """Its size."""
         return {f"{self.name}_torque": self.constant}
 
-    def act(self, on: Acting) -> Term:
+    def act(self, on: Any) -> Any:
         """The torque on its body."""
         now = on.curve() if self.table else on.one
         torque = on.let(self.name, on.parameter("torque") * now)

@@ -1,9 +1,9 @@
 """A spring, a damper and end stops on the angle of a body, against the ground or another body."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from hpcclear.scene.fields import Angle, Quantity, invalid
-from hpcclear.scene.loads.declared import Acting, Load, Term
+from hpcclear.scene.loads.declared import Load
 
 
 class TorsionSpringLoad(Load):
@@ -44,7 +44,7 @@ class TorsionSpringLoad(Load):
         """Unless it is a damper alone."""
         return self.stiffness != 0.0 or self.stop_stiffness != 0.0
 
-    def act(self, on: Acting) -> Term:
+    def act(self, on: Any) -> Any:
         """Torques on both bodies."""
         angle, rate = on.angle(self.body), on.spin(self.body)
         if self.other is not None:

@@ -1,0 +1,148 @@
+"""The first screen of results: what the page opens with and what commands print, from the numbers and codes of the files.
+
+Each kind of result makes its own (`ScreenOf` in `PARTS` of a module of `hpcclear.report.screens`); nobody reads its words back.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcclear.report.figures import labels
+
+WORRIES = 6
+"""Lines on what to trust."""
+
+
+class Level(IntEnum):
+    """How far a result can be trusted, the worst first."""
+
+    RED = 0
+    AMBER = 1
+    GREEN = 2
+
+
+class Trust(NamedTuple):
+    """A line on what to trust."""
+
+    level: Level
+    text: str
+    place: str = ""
+    """Subject of the page on which more is said."""
+
+
+class Tile(NamedTuple):
+    """A figure of the first screen: one number."""
+
+    label: str
+    value: str
+    before: str = ""
+    """Of the baseline."""
+    change: str = ""
+    """From the baseline: "-37 %"."""
+    within: str = ""
+    """Half-width or interval of the value: "± 0.24 %"."""
+    good: bool | None = None
+    """Whether the change is for the better; None where that is not decided."""
+
+
+class Span(NamedTuple):
+    """Where a value lies in its range, from 0 to 1."""
+
+    before: float
+    after: float
+    bound: str = ""
+    """The end that it sits on: "lower", "upper"; "" for none."""
+
+
+class Row(NamedTuple):
+    """A line of the table of the first screen."""
+
+    label: str
+    cells: tuple[str, ...]
+    span: Span | None = None
+
+
+class Bar(NamedTuple):
+    """A share with its half-width."""
+
+    label: str
+    share: float
+    half: float
+
+
+@dataclass(frozen=True)
+class Screen:
+    """A first screen."""
+
+    headline: str
+    """What an engineer repeats."""
+    about: tuple[str, ...] = ()
+    """What was simulated, in a few words each."""
+    doubt: str = ""
+    """Why the headline is not to be relied on; "" where nothing is known against it."""
+    tiles: tuple[Tile, ...] = ()
+    """At most four."""
+    header: tuple[str, ...] = ()
+    rows: tuple[Row, ...] = ()
+    """header and rows: the table beside, and its heads; the rows' label is the first."""
+    remark: str = ""
+    """Below the table."""
+    trust: tuple[Trust, ...] = ()
+    bars: tuple[Bar, ...] = ()
+    """What the scatter comes from."""
+    causes: str = ""
+    """What to do about it."""
+    steps: tuple[str, ...] = ()
+    """What to do next, the most useful first."""
+    figures: tuple[str, ...] = ()
+    """Names of the figures that stand beside, as `hpcclear plot` calls them."""
+
+
+def trusted(lines: Iterable[Trust]) -> tuple[Trust, ...]:
+    """Return the lines on what to trust, red first, at most `WORRIES`."""
+    return tuple(sorted(lines, key=lambda one: one.level)[:WORRIES])
+
+
+def percent(share: float) -> str:
+    """Return a half-width relative to its value, in words, rounded up to two digits; "" where it is not known or zero."""
+    if not np.isfinite(share):
+        return ""
+    half = 100.0 * share
+    step = 10.0 ** (np.floor(np.log10(half)) - 1.0) if half > 0.0 else 1.0
+    return f"± {np.ceil(half / step - 1e-9) * step:.6g} %" if half else ""
+
+
+def change(after: Sequence[float], before: Sequence[float]) -> tuple[str, bool | None]:
+    """Return a change in words, and whether it is surely downwards (None: undecided), of values with ends of their intervals.
+
+    The interval is that of independent estimates, which is no narrower than that of simulations at common random numbers.
+    """
+    (new, *ends), (old, *old_ends) = after, before
+    if not (np.isfinite([new, old]).all() and old):
+        return "", None
+    ratio = new / old
+    known = np.isfinite([*ends, *old_ends]).all() and new
+    halves = [float(np.ptp(one)) / 2.0 for one in (ends, old_ends)] if known else [np.nan] * 2
+    reach = abs(ratio) * float(np.hypot(halves[0] / new, halves[1] / old)) if known else np.nan
+    moved = ratio - 1.0
+    if np.isfinite(reach) and abs(moved) <= reach:
+        return "no significant change", None
+    return f"{100.0 * moved:+.0f} %".replace("-", "\N{MINUS SIGN}"), moved < 0.0
+
+
+def lower(text: str) -> str:
+    """Return a change in a sentence: "38 % lower"; "" where it is none."""
+    number = text.removesuffix(" %")
+    return f"{number[1:]} % {'lower' if number[0] != '+' else 'higher'}" if number != text else ""
+
+
+def within(value: float, low: float, high: float, unit: str) -> str:
+    """Return the interval of a value: relative to it, or its ends where these are of another sign or far apart."""
+    if not np.isfinite([value, low, high]).all():
+        return "interval not known"
+    if value and (high - low) < abs(value):
+        return percent((high - low) / 2.0 / abs(value))
+    return labels.between(low, high, unit) if low < high else ""

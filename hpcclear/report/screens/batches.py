@@ -1,0 +1,241 @@
+"""First screens of many simulations: samples, their sums, maps of motion and bifurcation diagrams."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.report import failures, spread
+from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.screen import Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.results.content import Results
+
+MOST = 0.5
+"""Share of samples with a warning from which on it is red."""
+
+
+def compared(content: Content) -> Screen | None:
+    """Return the first screen of several samples beside each other; None where there are not several."""
+    if not content.samples:
+        return None
+    every = {name: own["samples"] for name, own in content.samples.items()}
+    names = "P95 of f", "mean of f", "std. deviation of f"
+    rows = [
+        row for row in spread.rows_of(spread.side_by_side(every)) if row[0] in ("samples", *names)
+    ]
+    worries = [one for found in every.values() for one in _trust(found)]
+    return Screen(
+        f"{len(every)} files of samples, beside each other",
+        header=("quantity", *every),
+        rows=tuple(Row(label, tuple(cells)) for label, *cells in rows),
+        trust=trusted(dict.fromkeys(worries)),
+    )
+
+
+def samples(content: Content) -> Screen | None:
+    """Return the first screen of samples; None without any."""
+    found = content.get("samples")
+    if found is None:
+        return None
+    f, unit = found["objective"].to_numpy(), str(found["objective"].attrs["units"])
+    names = ", ".join(labels.words(v) for v in labels.design_variables(found))
+    about = (
+        f"f: {labels.objective(found)}",
+        f"{len(f)} simulations",
+        f"varied: {names}" if names else "",
+    )
+    lines = spread.statistics(found)
+    shown = {line.label: line for line in lines if line.estimate.known}
+    tiles = tuple(
+        Tile(line.label, labels.quantity(line.estimate.value, unit), within=_interval(line))
+        for line in shown.values()
+        if line.label in ("mean of f", "std. deviation of f", "P95 of f", "median of f")
+    )
+    if not np.isfinite(f).any():
+        headline = "Every simulation failed"
+    elif "mean of f" in shown:
+        headline = (
+            f"f = {shown['mean of f'].text}, standard deviation {shown['std. deviation of f'].text}"
+        )
+    else:
+        headline = f"f = {labels.quantity(float(np.nanmean(f)), unit)}"
+    rows = [
+        Row(line.label, (line.text.partition(" (")[0], _interval(line)))
+        for line in shown.values()
+        if line.label.startswith("P95 peak") or line.label.startswith("P99")
+    ]
+    if np.isfinite(f).any():
+        ends = (
+            labels.quantity(float(np.nanmin(f)), unit),
+            labels.quantity(float(np.nanmax(f)), unit),
+        )
+        rows.insert(0, Row("range of f", (" to ".join(ends), "")))
+    share = _share(found, Flag.BEYOND_HERTZ)
+    return Screen(
+        headline,
+        about,
+        "the contact model is outside its range" if share > MOST else "",
+        tiles,
+        ("statistic", "value", "95 % CI") if rows else (),
+        tuple(rows),
+        trust=trusted(_trust(found)),
+        figures=("samples",),
+    )
+
+
+def _interval(line: spread.Line) -> str:
+    value, low, high = line.estimate.ends
+    if not np.isfinite([low, high]).all():
+        return "interval not stated"
+    return f"95 % CI {labels.between(low, high, line.estimate.unit)}" if value else ""
+
+
+def _share(found: Results, flag: Flag) -> float:
+    return float(((found["flags"].to_numpy() & int(flag)) != 0).mean()) if "flags" in found else 0.0
+
+
+def _trust(found: Results) -> Iterator[Trust]:
+    good = found["status"].to_numpy() == Status.OK
+    for text in failures.explained(found)[:2]:
+        yield Trust(Level.AMBER if good.any() else Level.RED, text, "quality")
+    if good.all():
+        yield Trust(Level.GREEN, "No simulation failed", "quality")
+    for flag, text in (
+        (Flag.BEYOND_HERTZ, "contact model outside its range, forces are indicative"),
+        (Flag.LATCHED, "a joint never left contact, f may depend on the tolerance"),
+        (Flag.TARGET_MISSED, "f is not known to numerics.target_error"),
+    ):
+        if share := _share(found, flag):
+            level = Level.RED if share > MOST and flag is not Flag.LATCHED else Level.AMBER
+            yield Trust(level, f"{spread.percent(share)} of the samples: {text}", "quality")
+    name = "objective_limit" if "objective_limit" in found else "objective_uncertainty"
+    if not np.isfinite(found[name].to_numpy()).any():
+        yield Trust(
+            Level.AMBER,
+            "The half-width of a single f was not checked (numerics.target_error)",
+            "quality",
+        )
+    if "sampling" not in found.attrs:
+        yield Trust(Level.AMBER, "The designs were chosen, not drawn: no intervals", "quality")
+
+
+def map_of_motion(content: Content) -> Screen | None:
+    """Return the first screen of a map; None without one."""
+    found = content.get("map")
+    if found is None:
+        return None
+    good = found["status"].to_numpy() == Status.OK
+    regimes = found["regime"].to_numpy()
+    cells, count = len(good), int(good.sum())
+    kinds = [(regime, int(((regimes == regime) & good).sum())) for regime in Regime]
+    kinds = sorted((one for one in kinds if one[1]), key=lambda one: -one[1])
+    growth = found["lyapunov_exponent"].to_numpy()[good]
+    periods = np.unique(found["period"].to_numpy()[good])
+    known = ", ".join(f"{one:.0f}" for one in periods[np.isfinite(periods)][:6])
+    f, unit = found["objective"].to_numpy()[good], str(found["objective"].attrs["units"])
+    headline = "Every cell failed"
+    if kinds:
+        words = [f"{regime.name.lower()} in {n} of {cells} cells" for regime, n in kinds[:2]]
+        headline = f"Motion: {', '.join(words)}"
+    tiles = [
+        Tile(f"{regime.meaning.partition(':')[0]} cells", f"{n}", within=f"of {cells}")
+        for regime, n in kinds[:2]
+    ]
+    if len(growth):
+        tiles.append(
+            Tile("largest Lyapunov exponent", f"{growth.max():.3g}", within="per revolution")
+        )
+        tiles.append(Tile("period", known or "none", within="revolutions"))
+        tiles.append(Tile("f", labels.between(float(f.min()), float(f.max()), unit)))
+    axes = ", ".join(labels.words(v) for v in labels.design_variables(found))
+    trust = [
+        Trust(
+            Level.GREEN if count == cells else Level.AMBER,
+            f"{count} of {cells} cells without failure",
+            "quality",
+        )
+    ]
+    open_ = sum(
+        n for regime, n in kinds if regime in (Regime.SETTLING, Regime.UNSTEADY, Regime.UNJUDGED)
+    )
+    if open_:
+        trust.append(
+            Trust(
+                Level.AMBER,
+                f"{open_} cells have not settled: longer transients would decide",
+                "quality",
+            )
+        )
+    if (share := _share(found, Flag.BEYOND_HERTZ)) > 0.0:
+        level = Level.RED if share > MOST else Level.AMBER
+        trust.append(
+            Trust(
+                level,
+                f"{spread.percent(share)} of the cells: contact model outside its range",
+                "quality",
+            )
+        )
+    rows = tuple(Row(regime.meaning, (f"{n}",)) for regime, n in kinds)
+    return Screen(
+        headline, (f"{cells} cells over {axes}", f"f: {labels.objective(found)}"),
+        "the contact model is outside its range" if share > MOST else "",
+        tuple(tiles[:4]), ("motion", "cells") if rows else (), rows, trust=trusted(trust), figures=("map",),
+    )  # fmt: skip
+
+
+def bifurcation(content: Content) -> Screen | None:
+    """Return the first screen of a bifurcation diagram; None without one."""
+    found = content.get("bifurcation")
+    if found is None:
+        return None
+    seen = found["observed"]
+    count, crossings = seen.shape
+    failed = int(np.isnan(seen.to_numpy()).all(axis=1).sum())
+    what, unit = str(seen.attrs["long_name"]), str(seen.attrs["units"])
+    headline = "Every value failed"
+    if failed < count:
+        ends = float(np.nanmin(seen.to_numpy())), float(np.nanmax(seen.to_numpy()))
+        headline = f"{what}: {labels.between(*ends, unit)}"
+    level = Level.AMBER if failed else Level.GREEN
+    trust = Trust(level, f"{count - failed} of {count} values without failure", "reproduce")
+    return Screen(
+        headline,
+        (f"{count} values, {crossings} revolutions each",),
+        trust=(trust,),
+        figures=("bifurcation",),
+    )
+
+
+def statistics(content: Content) -> Screen | None:
+    """Return the first screen of samples that were summed up and not kept; None without."""
+    found = content.get("statistics")
+    if found is None:
+        return None
+    by_status = found["samples_by_status"]
+    total, good = int(np.sum(by_status.to_numpy())), int(by_status.sel(outcome=int(Status.OK)))
+    number = int(found["objective_count"])
+    headline, tiles = "Every simulation failed", list[Tile]()
+    if number > 1:
+        mean, deviation = (float(found[f"objective_{n}"]) for n in ("mean", "deviation"))
+        unit = str(found["objective_mean"].attrs["units"])
+        error = labels.quantity(deviation / number**0.5, unit, 2)
+        shown = labels.quantity(mean, unit, 6), labels.quantity(deviation, unit)
+        headline = f"Mean of f {shown[0]}, standard deviation {shown[1]}"
+        tiles.append(Tile("mean of f", shown[0], within=f"standard error {error}"))
+        tiles.append(Tile("std. deviation of f", shown[1]))
+    lost = Trust(
+        Level.AMBER if good < total else Level.GREEN,
+        f"{good} of {total} simulations without failure",
+        "quality",
+    )
+    single = Trust(Level.AMBER, "The half-width of a single f was not checked", "quality")
+    return Screen(
+        headline,
+        (f"f: {labels.objective(found)}",),
+        tiles=tuple(tiles),
+        trust=trusted([lost, single]),
+    )
+
+
+SCREENS = (compared, map_of_motion, bifurcation, samples, statistics)

@@ -1,0 +1,148 @@
+"""First screens of commands that answer one question: an identified machine, effects, accuracy against run time."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hpcclear.base.verdict import Verdict
+from hpcclear.report import identified, targets
+from hpcclear.report.figures import effects as screening
+from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.screen import Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.results.content import Results
+
+
+def machine(content: Content) -> Screen | None:
+    """Return the first screen of an identified machine; None without one."""
+    found = content.get("identify")
+    if found is None:
+        return None
+    lines = identified.lines(found)
+    known = "interval" in found
+    trust = [
+        Trust(Level.RED, f"{text[0].upper()}{text[1:]}", "identify")
+        for text in identified.warnings(found)
+    ]
+    if known and not trust:
+        trust.append(Trust(Level.GREEN, "The model explains every signal", "identify"))
+    if known:
+        coverage = f"{float(np.min(found['coverage'].to_numpy())):.0%}"
+        level = Level.GREEN if float(np.min(found["coverage"].to_numpy())) >= 0.9 else Level.AMBER
+        trust.append(
+            Trust(level, f"{coverage} of simulated machines lie in their 95 % interval", "identify")
+        )
+    unknown = _unknowns(found) if known else []
+    headline = "What to measure: expected half-widths of each signal"
+    if unknown:
+        headline = "; ".join(f"{label}: {text}" for label, text in unknown[-2:])
+    failed = known and not found["explained"].to_numpy().all()
+    tiles = [
+        Tile(label, text.partition(" (")[0], within=text.partition(" (")[2].rstrip(")"))
+        for label, text in unknown
+    ]
+    rows = tuple(Row(line.label, (line.text,)) for line in lines if line.label != "calibration")
+    return Screen(
+        headline,
+        (f"measured records: {found.sizes['record']}",) if known else (),
+        "the model does not explain every signal" if failed else "",
+        tuple(tiles[-4:]),
+        ("quantity", "result"),
+        rows,
+        trust=trusted(trust),
+        figures=("posterior", "features") if known else (),
+    )
+
+
+def _unknowns(found: Results) -> list[tuple[str, str]]:
+    """Unknowns of each record with their intervals, in words."""
+    return [
+        (identified.short(name), identified.interval(found, k, u))
+        for k in range(found.sizes["record"])
+        for u, name in enumerate(found["unknown"].to_numpy())
+    ]
+
+
+def effects(content: Content) -> Screen | None:
+    """Return the first screen of an effect screening; None without one."""
+    found = content.get("effects")
+    if found is None:
+        return None
+    seconds = screening.seconds_of(content.get("timing"))
+    tolerance = f"{100 * float(found.attrs['tolerance']):g} %"
+    chosen = int(np.argmax(found["recommended"].to_numpy()))
+    names, saved = screening.named(found, chosen), screening.saving(found, chosen, seconds)
+    headline = (
+        f"Within {tolerance}, {', '.join(names)} can be neglected: run time saved {saved.words}"
+        if chosen
+        else f"No effect can be neglected within {tolerance}"
+    )
+    verdicts = ("yes", "no", "undecided")
+    rows = tuple(
+        Row(
+            screening.label(screening.named(found, k)),
+            (
+                screening.shown(float(found["change"][k, 0]), float(found["limit"][k, 0])),
+                screening.saving(found, k, seconds).words,
+                verdicts[int(found["decision"][k])],
+            ),
+        )
+        for k in range(1, found.sizes["variant"])
+    )
+    return Screen(
+        headline, (f"f: {labels.objective(found)}", f"{int(np.sum(found['samples'].to_numpy()))} simulations"),
+        header=("disabled", "change of f", "run time saved", "within"), rows=rows,
+        trust=trusted(_screened(found)), figures=("effects",),
+        steps=("--scene FILE writes the scene without them",) if chosen else (),
+    )  # fmt: skip
+
+
+def _screened(found: Results) -> Iterator[Trust]:
+    decisions = found["decision"].to_numpy()[1:]
+    open_ = int((decisions == Verdict.UNDECIDED).sum())
+    if open_:
+        yield Trust(
+            Level.AMBER,
+            f"{open_} of {len(decisions)} variants are undecided: more samples would decide",
+            "effects",
+        )
+    else:
+        yield Trust(Level.GREEN, "Every variant is decided", "effects")
+    if failed := int(np.sum(found["failed"].to_numpy())):
+        yield Trust(Level.AMBER, f"{failed} simulations failed", "effects")
+    level = f"{float(found.attrs['confidence']):.0%}"
+    yield Trust(Level.GREEN, f"Intervals of {level}, from averages over the same points", "effects")
+
+
+def accuracy(content: Content) -> Screen | None:
+    """Return the first screen of accuracy against run time; None without."""
+    found = content.get("accuracy")
+    if found is None:
+        return None
+    own = targets.settings(found)
+    ways = [(target, targets.cheapest(found, target)) for target in targets.TARGETS]
+    rows = [
+        Row(
+            f"error of {100 * target:g} %",
+            ("not reached", "") if way is None else (way.words, targets.seconds(way.seconds)),
+        )
+        for target, way in ways
+    ]
+    if own is not None:
+        rows.append(Row("your settings", (own.words, targets.seconds(own.seconds))))
+        headline = f"Your settings: error of f at most {100 * own.error:.2g} %, {targets.seconds(own.seconds)} per design"
+    else:
+        reached = [(target, way) for target, way in ways if way is not None]
+        headline = "No measured setting reaches an error of 1 %"
+        if reached:
+            target, way = reached[-1]
+            headline = f"An error of f of {100 * target:g} % costs {targets.seconds(way.seconds)} of one core per design"
+    known = Trust(Level.GREEN, "Errors against references with much tighter settings", "accuracy")
+    times = Trust(Level.AMBER, "Times are those of one core of this machine", "accuracy")
+    return Screen(
+        headline, header=("target", "settings", "time of one core"), rows=tuple(rows),
+        trust=trusted([known, times]), figures=("accuracy",),
+    )  # fmt: skip
+
+
+SCREENS = (machine, accuracy, effects)

@@ -1,0 +1,273 @@
+"""Service lives of joints that wear (kind ``wear``): their first screen, and everything in lines."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hpcclear.base.arrays import Booleans
+from hpcclear.base.outcome import Flag, Status
+from hpcclear.report.figures.labels import quantity
+from hpcclear.report.html.content import Content
+from hpcclear.report.html.markup import Table
+from hpcclear.report.parts import SectionOf
+from hpcclear.report.screen import Bar, Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.results.content import Results
+from hpcclear.statistics.random.survival import fewest, order_interval, quantiles
+
+HOUR = 3600.0
+
+DOMINATES = 0.5
+"""Share of the variance of ranks from which on an input is said to decide."""
+
+REASONS = {
+    "cycles": "after wear.cycles, no limit reached",
+    "clearance": "at wear.limit.clearance",
+    "peak_contact_force": "at wear.limit.peak_contact_force",
+    "objective": "at wear.limit.objective",
+}
+"""How lives end, by what the file has as their reason."""
+
+
+def screen(content: Content) -> Screen | None:
+    """Return the first screen of service lives; None without any."""
+    lives = content.get("wear")
+    if lives is None:
+        return None
+    if not followed(lives).any():
+        failed = (Trust(Level.RED, text, "lives") for text in _failed(lives))
+        return Screen("Every service life failed", trust=trusted(failed))
+    rows = tuple(Row(name, tuple(cells)) for name, *cells in _clearances(lives))
+    causes = [Bar(f"{name}, {joint}", share, np.nan) for joint, name, share in _inputs(lives)]
+    named = ", ".join(f"{one.label} {one.share:.2f}" for one in causes)
+    return Screen(
+        _headline(lives),
+        (
+            f"{lives.sizes['life']} service lives",
+            f"up to {_long(float(lives['cycle'][-1]))} revolutions",
+        ),
+        "",
+        tuple(_tiles(lives)),
+        ("radial clearance", "new (median)", "final (median)", "5 to 95 %"),
+        rows,
+        trust=trusted(_trust(lives)),
+        bars=tuple(causes),
+        causes=f"Squared rank correlation of wear with its main input: {named}." if named else "",
+        figures=("wear", "survival"),
+    )
+
+
+def followed(lives: Results) -> Booleans:
+    """Return which lives did not fail, (lives,)."""
+    lived = [int(status) for status in Status if status.valid or status is Status.WORN_THROUGH]
+    return np.isin(lives["ending"].to_numpy(), lived)
+
+
+def _is_limited(lives: Results) -> bool:
+    return any(name.startswith("limit_") for name in lives.attrs)
+
+
+def _headline(lives: Results) -> str:
+    cycles = float(lives["cycle"][-1])
+    if not _is_limited(lives):
+        worst = int(np.argmax(np.nanmedian(lives["end_clearance"].to_numpy(), axis=0)))
+        name, _, end, _ = _clearances(lives)[worst]
+        return f"After {_long(cycles)} revolutions the clearance of {name} is {end}"
+    value, low, high = spread(lives, "lifetime", cycles)[0]
+    if not value.startswith("beyond"):
+        return f"Half of the machines last {value} revolutions (95 % CI {low} to {high})"
+    return f"More than half of the machines last {_long(cycles)} revolutions"
+
+
+def _long(count: float) -> str:
+    """Four digits of a number of revolutions or hours, without an exponent, in groups of three."""
+    short = float(f"{count:.4g}")
+    return f"{short:.4g}" if short < 1e4 else f"{short:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
+
+
+def _tiles(lives: Results) -> Iterator[Tile]:
+    cycles, last = float(lives["cycle"][-1]), lives.isel(cycle=-1)
+    if _is_limited(lives):
+        (median, low, high), (early, least, most), _ = spread(lives, "lifetime", cycles)
+        yield Tile("median life, revolutions", median, within=f"95 % CI {low} to {high}")
+        yield Tile("5th percentile, revolutions", early, within=f"95 % CI {least} to {most}")
+        ends = (float(last[f"survival_{end}"]) for end in ("lower", "upper"))
+        within = " to ".join(f"{end:.0%}" for end in ends)
+        yield Tile(
+            f"survival, {_long(cycles)} rev.",
+            f"{float(last['survival']):.0%}",
+            within=f"95 % CI {within}",
+        )
+    for name, new, end, reach in _clearances(lives)[:1]:
+        yield Tile(f"final clearance, {name}", end, new, within=reach and f"5 to 95 %: {reach}")
+
+
+def _trust(lives: Results) -> Iterator[Trust]:
+    count = lives.sizes["life"]
+    for text in doubts(lives):
+        yield Trust(Level.AMBER, f"{text[0].upper()}{text[1:]}", "lives")
+    failed = _failed(lives)
+    yield from (Trust(Level.AMBER, text, "lives") for text in failed)
+    if not failed:
+        yield Trust(Level.GREEN, "No service life failed", "lives")
+    open_ = int((lives["end_reason"].to_numpy() == "cycles").sum())
+    if open_ and _is_limited(lives):
+        yield Trust(
+            Level.AMBER,
+            f"{open_} of {count} lives reached no limit: raise wear.cycles for their length",
+            "lives",
+        )
+    if count < (least := fewest(0.05)):
+        text = (
+            f"{count} lives do not bound the 5th percentile from below; {least} would (wear.lives)"
+        )
+        yield Trust(Level.AMBER, text, "lives")
+
+
+def _failed(lives: Results) -> list[str]:
+    """How many lives failed with each status, and the remedy."""
+    codes = lives["ending"].to_numpy()
+    statuses = [one for one in Status if not one.valid and one is not Status.WORN_THROUGH]
+    return [
+        f"{count} of {len(codes)} lives {status.name.lower()}: {status.message}. {status.remedy}"
+        for status in statuses
+        if (count := int((codes == status).sum()))
+    ]
+
+
+def doubts(content: Results) -> list[str]:
+    """Return warnings on the service lives of a file, a sentence each: scatter of wear rates, motion before its steady
+    state."""
+    texts = []
+    unsure = int((content["flags"].to_numpy() == Flag.TARGET_MISSED).sum())
+    if unsure:
+        texts.append(
+            f"in {unsure} lives wear rate or f scatters more than wear.tolerance; see clearance_limit"
+        )
+    drift = content["drift"].to_numpy()
+    moving = int((drift > content.attrs["tolerance"]).sum())
+    if moving:
+        count = f"{moving} service {'life' if moving == 1 else 'lives'}"
+        texts.append(
+            f"{count} had not reached steady state ({drift.max():.1%} change with a longer transient); "
+            "raise numerics.transient_revolutions"
+        )
+    if "sharpest" in content:
+        narrow = int((content["sharpest"].to_numpy() > 1.0).sum())
+        if narrow:
+            texts.append(
+                f"in {narrow} lives a groove is worn narrower than the journal, which would touch both of its edges; "
+                "lower wear.harmonics"
+            )
+    return texts
+
+
+def section(content: Content) -> list[object] | None:
+    """All that is known of service lives, in lines."""
+    lives = content.get("wear")
+    if lives is None:
+        return None
+    rows: list[list[object]] = [["failed", text] for text in _failed(lives)]
+    reasons = lives["end_reason"].to_numpy()
+    for name, words in REASONS.items():
+        if count := int((reasons == name).sum()):
+            rows.append(["ended", f"{count} {words}"])
+    rows += [["warning", text] for text in doubts(lives)]
+    for name, new, end, reach in _clearances(lives):
+        text = f"median initial {new}, final {end}" + (f" (5 to 95 %: {reach})" if reach else "")
+        rows.append([f"clearance {name}", text])
+    rows += [*_lifetimes(lives), *_profiles(lives)]
+    for joint, name, share in _inputs(lives):
+        word = "dominant" if share >= DOMINATES else "largest"
+        rows.append([f"{word} input, {joint}", f"{name}, squared rank correlation {share:.2f}"])
+    return [Table(["quantity", "result"], rows, "Service lives")]
+
+
+def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:
+    """Each joint with its new and final clearance, medians, and the range of the final one, "" where it has none."""
+    rows = []
+    at_end = quantiles(lives["end_clearance"].to_numpy(), np.array([0.05, 0.5, 0.95]))
+    for k, name in enumerate(map(str, lives["joint"].to_numpy())):
+        new = float(np.nanmedian(lives["clearance"].isel(cycle=0).sel(joint=name)))
+        low, middle, high = (quantity(float(value), "m") for value in at_end[:, k])
+        rows.append((name, quantity(new, "m"), middle, f"{low} to {high}" if low != high else ""))
+    return rows
+
+
+def spread(lives: Results, name: str, beyond: float) -> list[tuple[str, str, str]]:
+    """Return median, 5th and 95th percentile of lives in words, each with the ends of its confidence interval; lives that
+    failed may be of any length."""
+    every = lives[name].to_numpy()
+    known = every[~np.isnan(every)]
+
+    def one(value: float) -> str:
+        return _long(value) if value < np.inf else f"beyond {_long(beyond)}"
+
+    shown = []
+    for level in (0.5, 0.05, 0.95):
+        low, high = order_interval(known, level, len(every) - len(known))
+        ends = one(0.0 if np.isnan(low) else low), one(np.inf if np.isnan(high) else high)
+        shown.append((one(float(lives[f"{name}_quantile"].sel(quantile=level))), *ends))
+    return shown
+
+
+def _lifetimes(lives: Results) -> list[list[object]]:
+    """How long lives last, where a limit was given, and the share that is above the clearance's limit."""
+    cycles, last = float(lives["cycle"][-1]), lives.isel(cycle=-1)
+    each, followed = lives["revolution_time"].to_numpy() / HOUR, lives["ended"].to_numpy()
+    text = f"at most {followed.max():.4g} revolutions, or {(followed * each).max():.4g} h"
+    rows: list[list[object]] = [["simulated", text]]
+    if not _is_limited(lives):
+        return [*rows, ["service life", "no threshold given (wear.limit)"]]
+    for name, unit, beyond in (
+        ("lifetime", "revolutions", cycles),
+        ("lifetime_hours", "h", float((cycles * each).min())),
+    ):
+        texts = [
+            value + ("" if low == high == value else f" (95 % CI {low} to {high})")
+            for value, low, high in spread(lives, name, beyond)
+        ]
+        text = "median {}; 5th percentile {}; 95th percentile {}".format(*texts)
+        rows.append([f"service life, {unit}", text])
+    interval = f"95 % CI {float(last['survival_lower']):.3g} to {float(last['survival_upper']):.3g}"
+    text = f"{float(last['survival']):.3g} of the service lives ({interval})"
+    rows.append([f"survival, {_long(cycles)} rev.", text])
+    for name in lives["joint"].to_numpy() if "exceedance" in lives else ():
+        one = last.sel(joint=name)
+        low, high = float(one["exceedance_lower"]), float(one["exceedance_upper"])
+        text = f"{float(one['exceedance']):.3g} (95 % CI {low:.3g} to {high:.3g})"
+        rows.append([f"P(clearance {name} > limit)", text])
+    return rows
+
+
+def _profiles(lives: Results) -> list[list[object]]:
+    """Wear where surfaces touch: the largest clearance around, and lives, beside uniform wear."""
+    if "local_clearance" not in lives:
+        return []
+    rows: list[list[object]] = []
+    for k, name in enumerate(lives["joint"].to_numpy()):
+        largest = quantity(float(np.nanmedian(lives["end_clearance"][:, k])), "m")
+        even = lives["even_clearance"].isel(cycle=-1).sel(joint=name).to_numpy()
+        known = np.isfinite(even).all()
+        beside = f"; {quantity(float(np.median(even)), 'm')} with uniform wear" if known else ""
+        rows.append([f"largest clearance, {name}", f"{largest} at the end{beside} (medians)"])
+    if _is_limited(lives):
+        cycles, parts = float(lives["cycle"][-1]), []
+        for name in ("lifetime_quantile", "even_lifetime_quantile"):
+            value = float(lives[name].sel(quantile=0.5))
+            parts.append(f"{value:.4g}" if np.isfinite(value) else f"beyond {cycles:.4g}")
+        rows.append(["median service life", f"{parts[0]}; {parts[1]} with uniform wear"])
+    return rows
+
+
+def _inputs(lives: Results) -> Iterator[tuple[str, str, float]]:
+    """The random input that decides most how fast each joint wears: joint, input, squared rank correlation."""
+    for joint in map(str, lives["joint"].to_numpy()):
+        share = lives["rank_correlation"].sel(joint=joint).to_numpy() ** 2
+        if len(share) and np.isfinite(share).any():
+            k = int(np.nanargmax(share))
+            yield joint, str(lives["random_input"].to_numpy()[k]), float(share[k])
+
+
+SCREENS = (screen,)
+
+PARTS = (SectionOf(10, "lives", "lives", "Service lives", section),)

@@ -1,0 +1,142 @@
+"""The first screen of responses: peak forces, the objective, the loads of the bearings, and whether the model is valid."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from hpcclear.base.outcome import Flag, Regime, Status
+from hpcclear.report import bearings
+from hpcclear.report.figures import labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.screen import Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.results.content import Results
+
+
+def screen(content: Content) -> Screen | None:
+    """Return the first screen of the response of the baseline design, else of the first; None without any."""
+    response = content.response
+    if response is None:
+        return None
+    name = next(name for name, one in content.responses.items() if one is response)
+    status = Status(int(response["status"]))
+    if not status.valid:
+        said = str(response.attrs.get("ended", status.message))
+        return Screen(
+            f"The simulation failed: {said}",
+            doubt="no number of it is a result",
+            trust=(Trust(Level.RED, status.remedy, "bearings"),),
+            steps=(status.remedy,),
+        )
+    loads = bearings.bearings(response)
+    tiles = list(_tiles(response, loads))
+    header = ("bearing", "peak force", "at crank angle", "mean force", "contact")
+    flags = int(response["flags"])
+    return Screen(
+        _headline(response, loads),
+        (
+            f"f: {labels.objective(response)}",
+            "" if name == "response" else name.replace("original", "baseline"),
+        ),
+        "the contact model is outside its range" if flags & Flag.BEYOND_HERTZ else "",
+        tuple(tiles),
+        header if loads else (),
+        tuple(
+            Row(
+                bearings.named(one.joint),
+                (
+                    labels.quantity(one.peak, "N"),
+                    bearings.degrees(one),
+                    labels.quantity(one.mean, "N"),
+                    bearings.share(one.contact),
+                ),
+            )
+            for one in loads
+        ),
+        trust=trusted(_trust(response, loads)),
+        steps=tuple(_steps(response)),
+        figures=("response", "orbit") if loads else ("response",),
+    )
+
+
+def _headline(response: Results, loads: Sequence[bearings.Bearing]) -> str:
+    """The largest force and where it acts, and f."""
+    unit = str(response["objective"].attrs["units"])
+    f = f"f = {labels.quantity(float(response['objective']), unit)}"
+    if not loads:
+        return f
+    worst = max(loads, key=lambda one: one.peak)
+    return f"Peak force {labels.quantity(worst.peak, 'N', 3)} in {bearings.named(worst.joint)}; {f}"
+
+
+def half_width(response: Results) -> float:
+    """Return the half-width of f of a response; NaN where nobody checked it."""
+    return float(response["objective_limit" if "regime" in response else "objective_uncertainty"])
+
+
+def _tiles(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tile]:
+    f, unit = float(response["objective"]), str(response["objective"].attrs["units"])
+    shown, _, reach = labels.with_half_width(f, half_width(response), unit).partition(" ± ")
+    known = f"{shown} {reach.partition(' ')[2]}" if reach else labels.quantity(f, unit)
+    yield Tile("objective f", known, within=f"± {reach}" if reach else labels.NOT_CHECKED)
+    for one in sorted(loads, key=lambda one: -one.peak)[:1]:
+        angle = "" if bearings.degrees(one) == "–" else f"at {bearings.degrees(one)}"
+        yield Tile(
+            f"peak force, {bearings.named(one.joint)}", labels.quantity(one.peak, "N"), within=angle
+        )
+    drive = bearings.torque(response)
+    mean = f"mean {labels.quantity(drive.mean, 'N m')}" if np.isfinite(drive.mean) else ""
+    yield Tile("largest torque of the drive", labels.quantity(drive.peak, "N m"), within=mean)
+    if np.isfinite(spread := float(response["objective_spread"])):
+        yield Tile("cycle-to-cycle std. dev. of f", labels.quantity(spread, unit, 2))
+
+
+def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Trust]:
+    flags = int(response["flags"])
+    if flags & Flag.BEYOND_HERTZ:
+        yield Trust(Level.RED, "Contact model outside its range: forces are indicative", "bearings")
+    elif loads:
+        yield Trust(Level.GREEN, "Contact model within its range", "bearings")
+    if flags & Flag.TARGET_MISSED:
+        yield Trust(Level.RED, "f is not known to numerics.target_error", "bearings")
+    if flags & Flag.LATCHED:
+        yield Trust(
+            Level.AMBER,
+            "A joint never left contact: f may depend on the tolerance",
+            "bearings",
+        )
+    f, reach = float(response["objective"]), half_width(response)
+    if not np.isfinite(reach):
+        yield Trust(
+            Level.AMBER, "The interval of f is not known: set numerics.target_error", "bearings"
+        )
+    elif reach > bearings.SENSITIVE * abs(f):
+        yield Trust(
+            Level.AMBER,
+            f"f is sensitive to initial conditions or tolerance: ± {reach / abs(f):.0%}",
+            "bearings",
+        )
+    else:
+        yield Trust(Level.GREEN, "f is known within the interval beside it", "bearings")
+    if any(one.between_instants for one in loads):
+        yield Trust(
+            Level.AMBER, "A peak lies between stored instants: its angle is not known", "bearings"
+        )
+    if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
+        yield Trust(
+            Level.GREEN if regime is Regime.REGULAR else Level.AMBER,
+            f"Motion: {regime.meaning}",
+            "bearings",
+        )
+    for text in str(response.attrs.get("cautions", "")).splitlines():
+        yield Trust(Level.AMBER, text, "bearings")
+
+
+def _steps(response: Results) -> Iterator[str]:
+    flags = int(response["flags"])
+    if flags & Flag.BEYOND_HERTZ:
+        yield "stiffer bearings or less load"
+    if not np.isfinite(half_width(response)):
+        yield "numerics.target_error, for a mean with a confidence interval"
+
+
+SCREENS = (screen,)

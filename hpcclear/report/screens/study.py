@@ -1,0 +1,360 @@
+"""The first screen of a study: the recommended design beside today's, its figures, and what to trust of them."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hpcclear.base.errors import InputError
+from hpcclear.base.objectives import Usual
+from hpcclear.base.outcome import Status
+from hpcclear.base.verdict import Verdict
+from hpcclear.report import alike, scatter
+from hpcclear.report.answer import FAR, MANY, beyond_hertz, steps, surrogate_errors, unit_of
+from hpcclear.report.constraints import ABSENT, OPEN, WORDS, verdict_of
+from hpcclear.report.figures import fits, labels
+from hpcclear.report.html.content import Content
+from hpcclear.report.merit import (
+    baseline_of,
+    best_of,
+    goals_of,
+    is_plain,
+    ours_of,
+    usual_of,
+)
+from hpcclear.report.parts import Recommended
+from hpcclear.report.screen import (
+    Bar,
+    Level,
+    Row,
+    Screen,
+    Span,
+    Tile,
+    Trust,
+    change,
+    lower,
+    percent,
+    trusted,
+    within,
+)
+from hpcclear.results.content import Results
+from hpcclear.scene.domain import box, to_coordinates
+from hpcclear.scene.loading import scene_of_text
+
+MOST = 0.5
+"""Share of simulations outside the range of the contact model above which a recommendation is not relied on."""
+
+TILES = 4
+
+_USUAL = {"mean": "mean", "deviation": "standard deviation", "percentile": "95th percentile"}
+"""Statistics that each design has, by the stem of their variables."""
+
+_INFEASIBLE = {
+    Verdict.FAILS: "No simulated design satisfies the constraints",
+    Verdict.UNDECIDED: "No simulated design is certain to satisfy the constraints",
+}
+
+
+def screen(content: Content) -> Screen | None:
+    """Return the first screen of a verified study; None where nothing was verified."""
+    verified = content.get("verification")
+    if verified is None or not np.isfinite(verified["mean_true"]).any():
+        return None
+    ours = ours_of(verified)
+    best, base = best_of(ours), baseline_of(ours)
+    of = Recommended(content.files, ours, best)
+    kept = base is not None and str(base["design"].item()) == str(best["design"].item())
+    tiles = list(_tiles(best, None if kept else base, content))[:TILES]
+    bars, causes = _bars(of)
+    rows = tuple(_rows(best, None if kept else base))
+    infeasible = verdict_of(best) in _INFEASIBLE
+    column = "nearest" if infeasible else "today, kept" if kept else "recommended"
+    return Screen(
+        _headline(of, tiles, kept),
+        tuple(_about(of)),
+        _doubt(of),
+        tuple(tiles),
+        ("design", *(("today",) if base is not None and not kept else ()), column),
+        rows,
+        _remark(of, rows),
+        trusted(_trust(of)),
+        tuple(bars),
+        causes,
+        tuple(steps(of)),
+        ("front",) if "front" in content.files else (),
+    )
+
+
+def _readable(one: Results) -> str:
+    return str(one["design"].item())
+
+
+def _headline(of: Recommended, tiles: list[Tile], kept: bool) -> str:
+    name, found = _readable(of.best), verdict_of(of.best)
+    if found in _INFEASIBLE:
+        return f"{_INFEASIBLE[found]}. Nearest: {name}"
+    if kept:
+        return "Keep today's design: no simulated design is better"
+    said = [f"{lower(one.change)} {one.label}" for one in tiles[:2] if lower(one.change)]
+    return f"{name[0].upper()}{name[1:]}: {', '.join(said) or 'no significant change'}"
+
+
+def _doubt(of: Recommended) -> str:
+    """Why the recommendation is not to be relied on."""
+    found = []
+    if beyond_hertz(of.best) > MOST:
+        found.append("the contact model is outside its range")
+    if verdict_of(of.best) is Verdict.UNDECIDED:
+        found.append("constraints are undecided")
+    if _missed(of.best):
+        found.append("the requested accuracy was not reached")
+    return "; ".join(found)
+
+
+def _about(of: Recommended) -> Iterator[str]:
+    """What was simulated."""
+    yield f"f: {labels.objective(of.ours)}"
+    if "random" in of.best:
+        yield f"random: {str(of.best['random'].item()).replace(' ', ', ')}"
+    timing, designs = of.files.get("timing"), of.files["verification"].sizes["design"]
+    if timing is not None and "samples" in timing:
+        count = f"{int(timing['samples'].to_numpy().sum()):,}".replace(",", "\N{NO-BREAK SPACE}")
+        yield f"{count} simulations of {designs} designs and a surrogate"
+
+
+def _ends(one: Results, stem: str) -> tuple[float, float, float]:
+    """A simulated value and the ends of its interval, NaN where they are not known."""
+    value = float(one[stem if stem in one else f"{stem}_true"])
+    low, high = (float(one.get(f"{stem}_{end}", np.nan)) for end in ("lower", "upper"))
+    return value, low, high
+
+
+def _statistics(best: Results) -> Iterator[tuple[str, str]]:
+    """Stems of the values that are shown, and their words: what the case makes small, then what every design has."""
+    asked = [] if is_plain(best) else goals_of(best)
+    usual = {Usual.MEAN: "mean", Usual.DEVIATION: "deviation"}
+    shown = set()
+    for name in asked:
+        shown.add(usual.get(usual_of(best, name), name))
+        yield name, str(best[f"{name}_goal"].item())
+    for stem, words in _USUAL.items():
+        if stem not in shown and (stem in best or f"{stem}_true" in best):
+            yield stem, f"{words} of f"
+
+
+def _tiles(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
+    """Constraints and objectives of the case, then mean, standard deviation, percentile, and peak force."""
+    for own in _constraints(best):
+        unit, most = str(own["constraint_unit"].item()), float(own["constraint_most"])
+        value, low, high = (float(own[f"constraint_{end}"]) for end in ("true", "lower", "upper"))
+        verdict = Verdict(int(own["constraint_verdict"]))
+        known = f"95 % CI {labels.between(low, high, unit)}; " if low < high else ""
+        yield Tile(
+            str(own["constraint_goal"].item()),
+            labels.quantity(value, unit),
+            within=f"{known}at most {labels.quantity(most, unit)}: {WORDS[verdict]}",
+            good=verdict is Verdict.HOLDS,
+        )
+    for stem, words in _statistics(best):
+        unit, mine = unit_of(best, stem if stem in best else f"{stem}_true"), _ends(best, stem)
+        before = None if base is None else _ends(base, stem)
+        moved, good = ("", None) if before is None else change(mine, before)
+        old = "" if before is None else labels.quantity(before[0], unit)
+        if np.isfinite(mine[0]):
+            yield Tile(words, labels.quantity(mine[0], unit), old, moved, within(*mine, unit), good)
+    yield from _peaks(best, base, content)
+
+
+def simulated(one: Results) -> list[list[str]]:
+    """Return what is known of a simulated design: values with their intervals, and how many simulations."""
+    tiles = _tiles(one, None, Content(Path(), {}, {}))
+    rows = [[tile.label, f"{tile.value} {tile.within}".rstrip()] for tile in tiles]
+    return rows + [[word, f"{int(one[word])}"] for word in ("samples", "failed") if word in one]
+
+
+def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Tile]:
+    """The largest force of the stored responses: one run each, without an interval."""
+    found = [
+        content.responses.get(name)
+        for name in (_readable(best), "original" if base is not None else "")
+    ]
+    forces = [
+        np.nan if one is None else float(np.nanmax(one["peak_contact_force"].to_numpy()))
+        for one in found
+    ]
+    if np.isfinite(forces[0]):
+        moved = change((forces[0], np.nan, np.nan), (forces[1], np.nan, np.nan))
+        old = labels.quantity(forces[1], "N") if np.isfinite(forces[1]) else ""
+        yield Tile(
+            "peak force", labels.quantity(forces[0], "N"), old, moved[0], "one run", moved[1]
+        )
+
+
+def _constraints(best: Results) -> Iterator[Results]:
+    if "constraint_verdict" in best:
+        every = (best.isel(constraint=k) for k in range(best.sizes["constraint"]))
+        yield from (own for own in every if int(own["constraint_verdict"]) != ABSENT)
+
+
+def _rows(best: Results, base: Results | None) -> Iterator[Row]:
+    """Design variables, with their place in the ranges of the study."""
+    spans = _spans(best, base)
+    for one in labels.design_variables(best):
+        name = str(one.name)
+        if not np.isfinite(float(one)):
+            continue
+        short = labels.words(one)
+        words = re.split(", from | about ", str(one.attrs.get("long_name", "")))[0]
+        label = short if words in ("", short) else words if "." in short else f"{short}, {words}"
+        before = () if base is None else (labels.value(base[name]),)
+        yield Row(label, (*before, labels.value(one)), spans.get(name))
+
+
+def _spans(best: Results, base: Results | None) -> dict[str, Span]:
+    """Where the variables of a design lie in their ranges, by name; none where the scene does not say."""
+    active = str(best["on_bounds"].item()) if "on_bounds" in best else ""
+    ends = dict(part.rsplit(" ", 1) for part in active.split(", ") if part)
+    try:
+        scene = scene_of_text(str(best.attrs.get("scene", "")), "scene")
+        known = scene.study.names if scene.study is not None else ()
+        names = [
+            str(v.name)
+            for v in labels.design_variables(best)
+            if str(v.name) in known and np.isfinite(float(v))
+        ]
+        region = box(scene, names)
+        designs = [best if base is None else base, best]
+        values = np.array([[float(one[name]) for name in names] for one in designs])
+        places = (to_coordinates(scene, names, values) - region.lower) / (
+            region.upper - region.lower
+        )
+    except InputError:
+        return {}
+    low, high = np.clip(places, 0.0, 1.0)
+    return {
+        name: Span(float(low[k]), float(high[k]), ends.get(name, ""))
+        for k, name in enumerate(names)
+    }
+
+
+def _remark(of: Recommended, rows: tuple[Row, ...]) -> str:
+    found = []
+    if any(row.span and row.span.bound for row in rows):
+        found.append("Orange: active bound.")
+    twins = alike.others(of.ours, of.best)
+    if twins:
+        spans = alike.spans(of.ours, of.best, twins)
+        found.append(
+            f"{len(twins) + 1} designs are equivalent{spans and f' ({spans})'}: choose by cost."
+        )
+    return " ".join(found)
+
+
+def _missed(best: Results) -> str:
+    return str(best["accuracy_missed"].item()) if "accuracy_missed" in best else ""
+
+
+def _trust(of: Recommended) -> Iterator[Trust]:
+    best = of.best
+    for own in _constraints(best):
+        verdict = Verdict(int(own["constraint_verdict"]))
+        level = Level.GREEN if verdict is Verdict.HOLDS else Level.RED
+        price = float(own["constraint_price"])
+        more = f"; about {price:.0f} simulations would decide" if np.isfinite(price) else ""
+        more += f"; {OPEN}" if np.isinf(price) else ""
+        yield Trust(
+            level, f"Constraint {WORDS[verdict]}: {own['constraint_goal'].item()}{more}", "designs"
+        )
+    share = beyond_hertz(best)
+    if share > MANY:
+        level = Level.RED if share > MOST else Level.AMBER
+        text = f"Contact model outside its range ({100 * share:.0f} % of runs)"
+        yield Trust(level, f"{text}: forces indicative", "bearings")
+    yield _accuracy(best)
+    if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
+        moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
+        yield Trust(
+            Level.AMBER,
+            f"Chaotic motion in {int(moved.sum())} of {moved.size} designs: values are means over it",
+            "quality",
+        )
+    yield from _failures(of)
+    errors = surrogate_errors(best)
+    if any(abs(error) > FAR for error in errors):
+        yield Trust(
+            Level.AMBER,
+            "Surrogate error above 20 %: a better design may have been missed",
+            "sensitivities",
+        )
+    if (half := scatter.half_width(of.files.get("sensitivity"))) > scatter.UNSURE:
+        yield Trust(
+            Level.AMBER, f"Sobol indices ± {100 * half:.0f} %: a ranking only", "sensitivities"
+        )
+    poor = [
+        one
+        for kind in ("sensitivity", "kriging")
+        for one in fits.warnings(kind, of.files.get(kind))
+    ]
+    if poor:
+        yield Trust(
+            Level.AMBER,
+            f"{len(poor)} surrogate fits are poor; simulated values do not use them",
+            "sensitivities",
+        )
+
+
+def _accuracy(best: Results) -> Trust:
+    """The half-widths of mean and standard deviation, and whether they are those that were requested."""
+    if missed := _missed(best):
+        return Trust(Level.RED, f"Requested accuracy not reached: {missed}", "quality")
+    known = []
+    for stem in ("mean", "deviation"):
+        value, low, high = _ends(best, stem)
+        if value and np.isfinite([low, high]).all():
+            known.append(f"{_USUAL[stem]} {percent((high - low) / 2.0 / abs(value))}")
+    if not known:
+        return Trust(
+            Level.AMBER, "Intervals of mean and standard deviation are not known", "quality"
+        )
+    return Trust(Level.GREEN, f"Accuracy: {', '.join(known)}", "quality")
+
+
+def _failures(of: Recommended) -> Iterator[Trust]:
+    best, samples = of.best, of.files.get("samples")
+    failed = int(best["failed"]) if "failed" in best else 0
+    if failed:
+        yield Trust(
+            Level.AMBER,
+            f"{failed} of {int(best['samples'])} simulations of this design failed",
+            "quality",
+        )
+    lost = 0 if samples is None else int((samples["status"].to_numpy() != Status.OK).sum())
+    if lost:
+        yield Trust(Level.AMBER, f"{lost} of {samples.sizes['sample']} samples failed", "quality")  # type: ignore[union-attr]
+    if not failed and not lost:
+        yield Trust(Level.GREEN, "No simulation failed", "quality")
+
+
+def _bars(of: Recommended) -> tuple[list[Bar], str]:
+    """Contributions to the variance of the recommended design; where these are not known, total Sobol indices."""
+    own, found = of.of_best("contributions"), of.files.get("sensitivity")
+    if own is not None and np.isfinite(own["contribution"].to_numpy()).any():
+        return list(map(Bar._make, scatter.shares(own))), "".join(scatter.tighten(own))
+    if found is not None and "sobol_total" in found:
+        rows = zip(
+            *(found[name].to_numpy() for name in ("parameter", "sobol_total", "sobol_total_error")),
+            strict=True,
+        )
+        bars = [
+            Bar(str(n), float(v), scatter.HALF_WIDTH * float(e))
+            for n, v, e in rows
+            if np.isfinite(v)
+        ]
+        return sorted(
+            bars, key=lambda one: -one.share
+        ), "Total Sobol indices over the ranges of the study."
+    return [], ""
+
+
+SCREENS = (screen,)
