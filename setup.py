@@ -17,6 +17,7 @@ def absolute(page: str) -> str:
     files = re.sub(r"^https://github\.com", "https://raw.githubusercontent.com", REPOSITORY)
     page = re.sub(r"(!\[[^]]*\]\()(?!https?:|#)", rf"\1{files}/main/", page)
     page = re.sub(r"((?<!!)\[[^]]*\]\()(?!https?:|#)", rf"\1{REPOSITORY}/blob/main/", page)
+    page = re.sub(r'(\bsrc=")(?!https?:)', rf"\1{files}/main/", page)
     return re.sub(r"^(`{3,}\w+) (?:slow|no-run|from)\b.*$", r"\1", page, flags=re.MULTILINE)
 
 
