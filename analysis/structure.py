@@ -124,7 +124,7 @@ def _repeated(root: Path, texts: dict[str, str]) -> list[tuple[str, str]]:
     loose = sum(len(re.findall(r"\bAny\b", text)) for text in texts.values())
     upwards = sum(len(re.findall(r"import_module\(", text)) for text in texts.values())
     commands = sum(
-        len(re.findall(r"^@(?:click\.)?command\(", text, re.M))
+        len(re.findall(r"^@(?:click\.|cli\.)?command\(", text, re.M))
         for name, text in texts.items()
         if name.startswith(f"{PACKAGE}.cli")
     )
