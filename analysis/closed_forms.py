@@ -171,16 +171,18 @@ class Judge:
     ----------
     scene : Scene
         Whose random inputs do not depend on the design, or are relative to it.
+    wide : float
+        Standard deviations of the draws; 1 for plain ones.
     """
 
-    def __init__(self, scene: Scene, form: Form, draws: int, seed: int) -> None:
+    def __init__(self, scene: Scene, form: Form, draws: int, seed: int, wide: float = WIDE) -> None:
         self._scene, self._form = scene, form
         self._random = scene.required_study.cases[0].random
-        u = WIDE * np.random.default_rng([97, seed]).standard_normal((draws, len(self._random)))
+        u = wide * np.random.default_rng([97, seed]).standard_normal((draws, len(self._random)))
         chances = list(np.clip(ndtr(u), 1e-16, 1.0 - 1e-16).T)
         self._moved = offsets(scene, self._random, chances, {})
-        self._weights = WIDE ** len(self._random) * np.exp(
-            -0.5 * (u**2).sum(axis=1) * (1.0 - WIDE**-2)
+        self._weights = wide ** len(self._random) * np.exp(
+            -0.5 * (u**2).sum(axis=1) * (1.0 - wide**-2)
         )
 
     def values(self, design: dict[str, float]) -> np.ndarray:

@@ -1,0 +1,189 @@
+"""Regret of random studies that no constant was set on: what a recommended design lacks, and what the decision costs.
+
+    python analysis/fresh_studies.py 1000                     # 40 studies from seed 1000 on; writes results/fresh_studies.csv
+    python analysis/fresh_studies.py 3 --studies 10 --csv x.csv
+
+f of each study is a random formula in masses, a mass centre and two clearances (`closed_forms`): smooth, rough, with two modes
+or chaotic. What is made small is the mean and the standard deviation, a percentile, or the negative sum of the masses; a
+percentile or a probability of 1e-1 to 1e-4 may be bounded.
+The truth is the best of a global search by `SCANNED` draws a design, then judged, as the recommended design, by `JUDGED` draws
+that neither has seen; probabilities by `WEIGHTED` draws of a wide density. Constants are set on seeds below 100; what is
+reported are seeds that were never used before.
+"""
+
+import argparse
+import csv
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from closed_forms import DESIGN, PATHS, Judge, dynamics, form_of, random_inputs, scene_of
+from regret import carried_out
+from scipy.optimize import differential_evolution
+
+from hpcclear.base.verdict import Verdict
+from hpcclear.ensemble.samples import sample_points
+from hpcclear.ranks.boundary import alone
+from hpcclear.report.merit import SPAN, recommended
+from hpcclear.results import dataset
+from hpcclear.scene import Scene
+from hpcclear.study import forecast
+
+RESULTS = Path(__file__).parent / "results" / "fresh_studies.csv"
+CACHE = Path.home() / ".cache" / "fresh_studies"
+KINDS = "smooth", "rough", "two modes", "chaotic"
+PERCENTILE = {"statistic": "quantile", "level": 0.95}
+OBJECTIVES = (
+    ["mean", "deviation"],
+    [PERCENTILE, {"formula": "0 - m2"}],
+    ["deviation"],
+    [{"formula": "0 - m2 - m3"}, "mean"],
+)
+SCANNED, JUDGED, WEIGHTED = 4096, 65536, 40_000
+FIELDS = (
+    "seed", "kind", "objective", "constraint", "regret", "kept", "false", "share", "simulations", "forecast", "seconds",
+    "inside", "intervals",
+)  # fmt: skip
+VERIFICATION = {"designs": 4, "most_samples": 8192, "infill_rounds": 4}
+ACCURACY = {"mean": 0.002, "deviation": 0.005, "quantile": 0.005}
+
+
+def study(seed: int) -> tuple[Scene, Any, str, "Truth", "Truth"]:
+    """A random study, its formula and kind, and judges of its designs: of those of a search, and of what it found."""
+    rng, kind = np.random.default_rng([83, seed]), KINDS[seed % len(KINDS)]
+    form, random = form_of(rng, kind), random_inputs(rng)
+    which = int(rng.integers(len(OBJECTIVES)))
+    case: dict[str, Any] = {"objectives": OBJECTIVES[which]}
+    if which == 0:
+        case = {}
+    plain = scene_of(seed, random, case, accuracy=ACCURACY, verification=VERIFICATION)
+    judge = Judge(plain, form, WEIGHTED, seed)
+    centre = {name: 0.5 * (PATHS[name][1] + PATHS[name][2]) for name in DESIGN}
+    bounded = which == 3 or (which > 0 and rng.random() < 0.5)
+    if bounded and rng.random() < 0.3:
+        limit = judge.quantile(centre, 0.05)
+        case["constraints"] = [{"statistic": "quantile", "level": 0.95, "most": limit}]
+    elif bounded:
+        most = float(10.0 ** rng.uniform(-4.0, -1.0))
+        limit = judge.quantile(centre, most)
+        case["constraints"] = [{"statistic": "exceedance", "limit": limit, "most": most}]
+    scene = scene_of(seed, random, case, accuracy=ACCURACY, verification=VERIFICATION)
+    scanning, judging = (
+        Truth(scene, Judge(plain, form, count, seed + 1000 * k, 1.0), judge)
+        for k, count in enumerate((SCANNED, JUDGED), 1)
+    )
+    return scene, form, kind, scanning, judging
+
+
+class Truth:
+    """Objectives and constraints of designs by many draws, plain ones but for probabilities."""
+
+    def __init__(self, scene: Scene, plain: Judge, wide: Judge) -> None:
+        self.case, self._plain, self._wide = scene.required_study.cases[0], plain, wide
+
+    def statistic(self, goal: Any, design: dict[str, float], f: np.ndarray) -> float:
+        """An objective or a constraint of a design, from plain draws."""
+        if goal.exact:
+            return float(goal.of_design(design))
+        if goal.statistic == "exceedance":
+            return self._wide.probability(design, goal.limit)[0]
+        if goal.statistic == "quantile":
+            return float(np.quantile(f, goal.order))
+        return float(f.mean() if goal.statistic == "mean" else f.std())
+
+    def of(self, row: np.ndarray | list[float]) -> tuple[float, float, list[float]]:
+        """Merit of a design, by how much it breaks its constraints, and all values."""
+        design = dict(zip(DESIGN, map(float, row), strict=True))
+        f = self._plain.values(design)
+        values = [self.statistic(one, design, f) for one in (*self.case.goals, *self.case.kept)]
+        merit = values[0] + SPAN * values[1] if self.case.plain else values[0]
+        kept = zip(self.case.kept, values[len(self.case.goals) :], strict=True)
+        return merit, max((x / goal.most - 1.0 for goal, x in kept), default=-1.0), values
+
+
+def least(seed: int, true: Truth) -> np.ndarray:
+    """The best design by a global search, kept in `CACHE`."""
+    kept = CACHE / f"{seed}_{SCANNED}_{WEIGHTED}.npy"
+    if kept.exists():
+        return np.load(kept)
+
+    def penalised(row: np.ndarray) -> float:
+        merit, broken, _ = true.of(row)
+        return merit + 10.0 * abs(merit) * max(broken, 0.0)
+
+    bounds = [PATHS[name][1:] for name in DESIGN]
+    found = differential_evolution(penalised, bounds, seed=5, maxiter=40, popsize=10, tol=1e-8).x
+    CACHE.mkdir(parents=True, exist_ok=True)
+    np.save(kept, found)
+    return found
+
+
+def judged(seed: int) -> dict[str, Any]:
+    """One study and what is true of it."""
+    scene, form, kind, scanning, fine = study(seed)
+    with dynamics(form), tempfile.TemporaryDirectory() as name:
+        said, _ = forecast.expected(scene, partial(sample_points, scene, ranks=alone()), 1e-6)
+        begun = time.process_time()
+        place, count = carried_out(scene, Path(name) / "out")
+        seconds = time.process_time() - begun
+        table = dataset.read(place / "verification.nc", "verification").to_xarray()
+    case = scene.required_study.cases[0]
+    names = list(table["design"].to_numpy())
+    rows = [[float(table[n][k]) for n in DESIGN] for k in range(len(names))]
+    best = rows[names.index(recommended(table))]
+    merit, _, values = fine.of(best)
+    ideal, its, _ = fine.of(least(seed, scanning))
+    regret = (merit - ideal) / abs(ideal) if its <= 0.02 else np.nan  # no truth was found
+    holds = np.zeros(len(names), bool)
+    if case.kept:
+        holds = (table["constraint_verdict"].to_numpy() == Verdict.HOLDS).all(axis=1)
+    false = sum(fine.of(row)[1] > 0.02 for row, one in zip(rows, holds, strict=True) if one)
+    inside = intervals = 0
+    for k, row in enumerate(rows):
+        true = fine.of(row)[2]
+        for column, which in zip(true, ("first", "second"), strict=False):
+            if f"{which}_lower" in table and len(case.goals) > ("first", "second").index(which):
+                low, high = (float(table[f"{which}_{end}"][k]) for end in ("lower", "upper"))
+                slack = 2e-3 * abs(column)  # of the judge
+                intervals += high > low
+                inside += high > low and low - slack <= column <= high + slack
+    return {
+        "seed": seed, "kind": kind, "objective": case.goals[0].words("m"),
+        "constraint": f"{case.kept[0].words('m')} {case.kept[0].most:.2g}" if case.kept else "",
+        "regret": round(float(np.maximum(regret, 0.0)), 5), "kept": int(holds.sum()), "false": int(false),
+        "share": round(values[-1] / case.kept[0].most, 3) if case.kept and case.kept[0].limit else "",
+        "simulations": count, "forecast": said, "seconds": round(seconds, 1),
+        "inside": inside, "intervals": intervals,
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Carry out, judge, write and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seed", type=int)
+    parser.add_argument("--studies", type=int, default=40)
+    parser.add_argument("--csv", type=Path, default=RESULTS)
+    words = parser.parse_args()
+    rows = []
+    for seed in range(words.seed, words.seed + words.studies):
+        rows.append(judged(seed))
+        print(", ".join(f"{name} {rows[-1][name]}" for name in FIELDS), flush=True)
+        with words.csv.open("w", newline="") as file:
+            table = csv.DictWriter(file, FIELDS)
+            table.writeheader()
+            table.writerows(rows)
+    regret = np.array([row["regret"] for row in rows])
+    middle, late = np.nanquantile(regret, (0.5, 0.9))
+    print(
+        f"regret: median {middle:.2%}, 90th percentile {late:.2%}, at most {np.nanmax(regret):.2%}"
+    )
+    spent = np.median([row["simulations"] for row in rows])
+    kept, false = (sum(row[name] for row in rows) for name in ("kept", "false"))
+    print(f"{spent:.0f} simulations in the median; {false} of {kept} designs called kept are not")
+
+
+if __name__ == "__main__":
+    main()
