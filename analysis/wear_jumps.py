@@ -21,7 +21,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping.lanes import Lanes
 from hpcclear.dynamics.wear.law import Joints, joints_of
-from hpcclear.dynamics.wear.life import Asked, Plan, Seen, life
+from hpcclear.dynamics.wear.life import Asked, LifePlan, WearOutcome, life
 from hpcclear.ensemble.wear import States, inputs_of, waiting_longer
 from hpcclear.report.figures import style
 from hpcclear.scene import Scene, load_scene
@@ -117,7 +117,7 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
     joints = joints_of(scene, inputs)
     states = States(scene, inputs, joints)
     table, numerics = scene.wear, scene.numerics
-    plan = Plan(
+    plan = LifePlan(
         table.cycles,
         table.tolerance,
         float(numerics.averaged_revolutions),
@@ -157,7 +157,7 @@ def jumped(scene: Scene) -> tuple[np.ndarray, np.ndarray, float, int]:
         waiting, going = going, {}
         for k, seen in zip(waiting, found, strict=True):
             try:
-                going[k] = lives[k].send(Seen(*seen))
+                going[k] = lives[k].send(WearOutcome(*seen))
             except StopIteration as end:
                 ended[k] = end.value
     seconds = time.process_time() - began

@@ -16,15 +16,15 @@ from hpcclear.ensemble import corners as trying
 from hpcclear.ensemble.corners import MOST, corners, tried
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
-from hpcclear.report.failures import Sampled, explained, where
+from hpcclear.report.failures import SampledVariable, explained, where
 from hpcclear.scene import load_scene
 
 JOBS = Path(__file__).parent.parent / "jobs"
 
 
-def columns(count: int, variables: int, seed: int) -> list[Sampled]:
+def columns(count: int, variables: int, seed: int) -> list[SampledVariable]:
     rng = np.random.default_rng(seed)
-    return [Sampled(f"x{k}", "kg", 1.0 + rng.random(count)) for k in range(variables)]
+    return [SampledVariable(f"x{k}", "kg", 1.0 + rng.random(count)) for k in range(variables)]
 
 
 # -- samples ---------------------------------------------------------------------------------------------

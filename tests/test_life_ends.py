@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.wear.curves import DEEPEST, curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.life import Plan, Seen, life
+from hpcclear.dynamics.wear.life import LifePlan, WearOutcome, life
 from hpcclear.ensemble.wear import check_worn
 from hpcclear.scene import load_scene
 
@@ -36,7 +36,7 @@ def followed(joints, plan, rate, objective=lambda c: 1.0, peak=lambda c: 1.0):
     def seen(what):
         c, n = joints.worn(what.work)[0], len(what.copies)
         asked.append(what)
-        return Seen(
+        return WearOutcome(
             np.repeat(rate(c)[None], n, axis=0), np.full(n, objective(c)), np.full((n, 1), peak(c)), np.zeros(n, int)
         )  # fmt: skip
 
@@ -44,7 +44,7 @@ def followed(joints, plan, rate, objective=lambda c: 1.0, peak=lambda c: 1.0):
 
 
 def plan(limits, cycles=1e12, beyond=False, tolerance=0.01):
-    return Plan(cycles, tolerance, 5.0, 4, 16, limits, beyond)
+    return LifePlan(cycles, tolerance, 5.0, 4, 16, limits, beyond)
 
 
 def power_law(power, coefficient, clearance):

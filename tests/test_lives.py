@@ -18,14 +18,14 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.dynamics.wear.curves import curves, lifetime
 from hpcclear.dynamics.wear.law import Joints, joints_of
-from hpcclear.dynamics.wear.life import Plan, Seen, _drift, life
+from hpcclear.dynamics.wear.life import LifePlan, WearOutcome, _drift, life
 from hpcclear.ensemble.wear import check_worn
 from hpcclear.report import fan_figure, survival_figure
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.survival import share_interval
 
 SCENE = Path(__file__).parent.parent / "jobs" / "wear.toml"
-PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
+PLAN = LifePlan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
 ONE = Joints(*(np.array([x]) for x in (3e-4, 0.02, 2e-12, 1e-12, 0.0, 1.0)))
 
 
@@ -42,7 +42,7 @@ def followed(joints, plan, rate, objective=None, noise=0.0, status=Status.OK, se
         n = len(asked.copies)
         scatter = 1.0 + noise * rng.standard_normal((n, 1))
         scatter[np.array(asked.copies) % 2 == 1] += settling
-        return Seen(
+        return WearOutcome(
             scatter * rate(c), np.full(n, f(c)) * scatter[:, 0], np.ones((n, len(c))),
             np.full(n, int(status)),
         )  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcclear.dynamics.layout.views import Parameters, Settings
+from hpcclear.dynamics.layout.views import Parameters, RunSettings
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
@@ -29,7 +29,7 @@ SCALES = np.array([1e-3, 1e-3, 1e-2, 1e-3, 1.0, 1.0, 50.0, 1.0])  # m, rad; m/s,
 class ConstantSteps(Problem):
     """A step-size controller that accepts every step and asks for the same again."""
 
-    def settings(self) -> Settings:
+    def settings(self) -> RunSettings:
         s = super().settings()
         s.rtol = s.atol = 1e300  # the error is 0, its rough logarithm -1023
         s.exponent, s.beta = 0.152003 / (0.5 * 1023.0), 0.0  # cancels the safety factor

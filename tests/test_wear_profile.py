@@ -27,7 +27,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.wear.curves import curves, lifetime
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.life import Plan, Seen, life
+from hpcclear.dynamics.wear.life import LifePlan, WearOutcome, life
 from hpcclear.dynamics.wear.relief import Relief, kernel
 from hpcclear.report import profile_figure
 from hpcclear.scene import load_scene
@@ -271,7 +271,7 @@ def test_patches_take_nothing_on_and_are_the_narrowest():
 
 
 ONE = Joints(*(np.array([x]) for x in (3e-4, 0.02, 2e-12, 1e-12, 0.0, 1.0)))
-PLAN = Plan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
+PLAN = LifePlan(cycles=1e6, tolerance=0.01, shortest=5.0, copies=4, most_copies=16)
 
 
 def followed(joints, relief, rate, share):
@@ -283,7 +283,7 @@ def followed(joints, relief, rate, share):
         moments = None
         if relief.size:
             moments = work[..., None] * share(asked.moments)
-        return Seen(work, np.ones(n), np.ones((n, 1)), np.zeros(n, int), moments)
+        return WearOutcome(work, np.ones(n), np.ones((n, 1)), np.zeros(n, int), moments)
 
     return answered(life(joints, PLAN, relief), seen)
 

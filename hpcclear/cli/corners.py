@@ -5,7 +5,7 @@ import numpy as np
 from hpcclear.cli.check import show_rows
 from hpcclear.cli.terminal import fitting
 from hpcclear.ensemble.corners import MOST, CornerOutcomes, tried
-from hpcclear.report.failures import Sampled, sentences, where
+from hpcclear.report.failures import SampledVariable, sentences, where
 from hpcclear.scene import Scene
 
 
@@ -20,7 +20,7 @@ def lines(found: CornerOutcomes, simulate: bool) -> list[tuple[str, str]]:
     """Return label and text of each line."""
     points, total = found.points, len(found.points)
     columns = [
-        Sampled(name, unit or "1", values)
+        SampledVariable(name, unit or "1", values)
         for name, unit, values in zip(points.names, points.units, points.values.T, strict=True)
     ]
     failed = list(sentences(found.status, columns, "corners")) if simulate else []

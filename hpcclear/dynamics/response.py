@@ -22,12 +22,18 @@ from hpcclear.dynamics.evaluation.evaluator import (
 from hpcclear.dynamics.evaluation.recorded.between import seen_between
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
-from hpcclear.dynamics.evaluation.recorded.steps import ITSELF, Piece, Pieces, Recorded, Recording
+from hpcclear.dynamics.evaluation.recorded.steps import (
+    ITSELF,
+    Piece,
+    Recorded,
+    Recording,
+    StepInstants,
+)
 from hpcclear.dynamics.evaluation.steady.wording import recorded
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, period_of, refused_of
-from hpcclear.dynamics.planar.response import Seen, pins_of, wound_up
+from hpcclear.dynamics.planar.response import ResponseStates, pins_of, wound_up
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.planar.tables import mechanism_of
@@ -303,7 +309,7 @@ class Collected:
 
     def __init__(self, scene: Scene, sample: Recorded) -> None:
         self._scene, self._sample = scene, sample
-        self._pieces = Pieces(scene.output.instants_per_revolution)
+        self._pieces = StepInstants(scene.output.instants_per_revolution)
         self._parts: list[dict[str, Array]] = []
         self._taken, self._turns = 0, Turns()
         self._kept, self._began = kept_revolutions(scene), 0.0
@@ -394,4 +400,4 @@ def _series_between(scene: Scene, sample: Recorded, piece: Piece) -> dict[str, A
     seen = seen_between(sample, piece)
     works = _works_between(sample, piece, seen.share)
     q, v = (one[:, scene.bristles :] for one in seen[:2])
-    return planar_series(scene, sample.par, Seen(q, v, *seen[2:6], works, seen.pins))
+    return planar_series(scene, sample.par, ResponseStates(q, v, *seen[2:6], works, seen.pins))

@@ -16,7 +16,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.setup.further import wave_paths
 from hpcclear.dynamics.wear.curves import DEEPEST
 from hpcclear.dynamics.wear.law import Joints, joints_of
-from hpcclear.dynamics.wear.life import Asked, Asking, Plan, Seen, life
+from hpcclear.dynamics.wear.life import Asked, Asking, LifePlan, WearOutcome, life
 from hpcclear.dynamics.wear.record import Life
 from hpcclear.dynamics.wear.relief import Relief
 from hpcclear.ensemble.identity import run_key
@@ -174,7 +174,7 @@ def follow(
 ) -> list[Life]:
     """All lives to their ends; raises as `sample_points`. `first`: number of the first simulation in the checkpoint."""
     assert scene.wear is not None
-    plan = Plan(
+    plan = LifePlan(
         scene.wear.cycles, scene.wear.tolerance, float(scene.numerics.averaged_revolutions), scene.wear.copies,
         scene.wear.most_copies, scene.wear.limit.given(), scene.wear.beyond_limit,
     )  # fmt: skip
@@ -235,7 +235,7 @@ def waiting_longer(scene: Scene) -> Scene:
 def _go_on(
     number: int,
     asking: Asking,
-    seen: Seen | None,
+    seen: WearOutcome | None,
     going: dict[int, tuple[Asking, Asked]],
     ended: dict[int, Life],
 ) -> None:
@@ -247,12 +247,12 @@ def _go_on(
         ended[number] = end.value
 
 
-def _seen(records: Records, worn: list[int], joints: int, relief: Relief) -> Seen:
+def _seen(records: Records, worn: list[int], joints: int, relief: Relief) -> WearOutcome:
     moments = None
     if relief.size:
         rows = [slice(k * relief.size, (k + 1) * relief.size) for k in worn]
         moments = np.stack([records["sliding_waves"][:, row] for row in rows], axis=1)
-    return Seen(
+    return WearOutcome(
         records["sliding_work"][:, worn], records["objective"],
         records["peak_contact_force"][:, :joints], records["status"], moments,
     )  # fmt: skip

@@ -146,7 +146,7 @@ def _columns(lines: spread.Lines, units: Units) -> dict[str, list[object]]:
     shown = [unit or si for (_, si), unit in rows.items()]
     columns: dict[str, list[object]] = {"statistic": [label for label, _ in rows], "unit": [*shown]}
     for name, own in lines.items():
-        for k, end in enumerate(spread.Estimate._fields[:3]):
+        for k, end in enumerate(spread.StatedValue._fields[:3]):
             cells = columns[f"{name} {end}"] = []
             for (label, si), unit in rows.items():
                 line = own.get(label)

@@ -22,7 +22,7 @@ NAMED = 2
 """Variables that are named for each status."""
 
 
-class Sampled(NamedTuple):
+class SampledVariable(NamedTuple):
     """A variable: its name, SI unit, and value in each sample, shape (n,)."""
 
     name: str
@@ -41,15 +41,17 @@ def explained(samples: Results) -> list[str]:
     return list(sentences(samples["status"].to_numpy(), variables(samples)))
 
 
-def variables(samples: Results) -> list[Sampled]:
+def variables(samples: Results) -> list[SampledVariable]:
     """Return the design variables of samples (kind ``samples``)."""
     return [
-        Sampled(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())
+        SampledVariable(labels.words(one), str(one.attrs.get("units", "1")), one.to_numpy())
         for one in labels.design_variables(samples)
     ]
 
 
-def sentences(status: Array, columns: Sequence[Sampled], what: str = "samples") -> Iterator[str]:
+def sentences(
+    status: Array, columns: Sequence[SampledVariable], what: str = "samples"
+) -> Iterator[str]:
     """Return the same of outcomes (n,) and the variables of what was simulated."""
     for code in Status:
         failed = status == code
@@ -60,7 +62,7 @@ def sentences(status: Array, columns: Sequence[Sampled], what: str = "samples") 
         yield f"{count} {code.name.lower()}: {code.message}{place and f'; {place}'}. Remedy: {code.remedy}"
 
 
-def where(failed: Booleans, columns: Sequence[Sampled]) -> str:
+def where(failed: Booleans, columns: Sequence[SampledVariable]) -> str:
     """Return in which ranges of which variables failures (n,) lie; "" where all failed, as ranges then explain nothing.
 
     A variable is named if its values in failures are distributed unlike those in the others.

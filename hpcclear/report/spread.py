@@ -40,7 +40,7 @@ USUALLY_WIDER = (
 CHOSEN = "none: the designs were chosen, not sampled at random"
 
 
-class Estimate(NamedTuple):
+class StatedValue(NamedTuple):
     """A statistic with its confidence interval, in a unit of the result file; NaN where not stated."""
 
     value: float = np.nan
@@ -64,7 +64,7 @@ class Line(NamedTuple):
 
     label: str
     text: str
-    estimate: Estimate = Estimate()
+    estimate: StatedValue = StatedValue()
 
 
 Lines = Mapping[str, Mapping[str, Line]]
@@ -214,7 +214,7 @@ def side_by_side(
         joints = [str(joint) for joint in samples["joint"].to_numpy()]
         levels = [beyond(units, words, joints) for words in thresholds]
         count = samples.sizes["sample"]
-        lines = [Line("samples", str(count), Estimate(count)), *statistics(samples, levels)]
+        lines = [Line("samples", str(count), StatedValue(count)), *statistics(samples, levels)]
         found[name] = {line.label: line for line in lines}
     return found
 
@@ -268,31 +268,31 @@ def _moments(known: Array, unit: str, drawn: bool) -> list[Line]:
     mean, deviation = moments(known[:, None])  # each sample is a replicate
     if not drawn or not np.isfinite(mean.value):
         plain = (float(known.mean()), float(known.std(ddof=1)))
-        found = [Estimate(value, unit=unit) for value in plain]
+        found = [StatedValue(value, unit=unit) for value in plain]
         texts = [labels.quantity(value, unit) for value in plain]
         texts = [f"{t}, interval not stated: too few samples" for t in texts] if drawn else texts
     else:
         pairs = [(m.value, student(CONFIDENCE, mean.freedom) * m.error) for m in (mean, deviation)]
-        found = [Estimate(value, value - half, value + half, unit) for value, half in pairs]
+        found = [StatedValue(value, value - half, value + half, unit) for value, half in pairs]
         texts = [labels.with_half_width(value, half, unit) for value, half in pairs]
     names = ("mean of f", "std. deviation of f")
     return [Line(*one) for one in zip(names, texts, found, strict=True)]
 
 
-def _quantile(values: Array, level: float, unit: str, drawn: bool) -> tuple[str, Estimate]:
+def _quantile(values: Array, level: float, unit: str, drawn: bool) -> tuple[str, StatedValue]:
     """A quantile with its confidence interval by the order of the values; not stated where the samples do not reach so far."""
     known = values[np.isfinite(values)]
     value = float(np.quantile(known, level, method="hazen"))
     if not drawn:
-        return labels.quantity(value, unit), Estimate(value, unit=unit)
+        return labels.quantity(value, unit), StatedValue(value, unit=unit)
     failed = len(values) - len(known)
     low, high = order_interval(known, level, failed)
     if np.isfinite([low, high]).all():
         text = f"{labels.quantity(value, unit)} ({labels.between(low, high, unit)})"
-        return text, Estimate(value, low, high, unit)
+        return text, StatedValue(value, low, high, unit)
     if failed and len(values) >= fewest(level):
-        return "not stated: too many samples failed", Estimate()
-    return f"not stated: it needs {fewest(level)} samples", Estimate()
+        return "not stated: too many samples failed", StatedValue()
+    return f"not stated: it needs {fewest(level)} samples", StatedValue()
 
 
 def _share(samples: Results, one: Beyond, drawn: bool) -> Line:
@@ -313,7 +313,7 @@ def _share(samples: Results, one: Beyond, drawn: bool) -> Line:
         low = float(share_interval(above, total)[0])
         high = float(share_interval(above + failed, total)[1])
         text = f"{text} ({percent(low)} to {percent(high)})"
-    return Line(label, text, Estimate(100.0 * share, 100.0 * low, 100.0 * high, "%"))
+    return Line(label, text, StatedValue(100.0 * share, 100.0 * low, 100.0 * high, "%"))
 
 
 def percent(share: float) -> str:

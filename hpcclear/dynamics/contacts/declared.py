@@ -26,7 +26,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Geometry:
+class ContactGeometry:
     """One kind of contact between two bodies.
 
     ``force(effects, work, par, joint, relative, frame, i, W)`` is a lane function. `relative`: a place of the journal's body

@@ -14,7 +14,7 @@ from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.base.outcome import CORNERS
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.declared import Geometry, Get, Shape
+from hpcclear.dynamics.contacts.declared import ContactGeometry, Get, Shape
 from hpcclear.dynamics.contacts.forces import (
     lost,
     normal_force,
@@ -90,7 +90,7 @@ def gap_of(joint: Any, which: str, offset: Any, tilt: Any) -> Any:
     return away + joint.corner_radius - 0.5 * joint.height - joint.clearance
 
 
-GEOMETRY = Geometry(
+GEOMETRY = ContactGeometry(
     name="guide",
     words="corner of a slider against the face of its channel",
     force=corner_force,

@@ -11,7 +11,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.bits import no_less
 from hpcclear.base.jit import apart, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.contacts.declared import Geometry, Get, Shape
+from hpcclear.dynamics.contacts.declared import ContactGeometry, Get, Shape
 from hpcclear.dynamics.contacts.forces import (
     lost,
     normal_force,
@@ -96,7 +96,7 @@ def reach(parameters: Any, place: int) -> Array:
     return found
 
 
-GEOMETRY = Geometry(
+GEOMETRY = ContactGeometry(
     name="pin_in_bearing",
     words="journal in a round bearing",
     force=joint_force,

@@ -8,7 +8,7 @@ from typing import Any
 
 from hpcclear.base.outcome import WALLS
 from hpcclear.dynamics.contacts import guide
-from hpcclear.dynamics.contacts.declared import Geometry, Get, Shape
+from hpcclear.dynamics.contacts.declared import ContactGeometry, Get, Shape
 
 
 def shape(get: Get) -> Shape:
@@ -22,7 +22,7 @@ def gap_of(joint: Any, which: str, offset: Any) -> Any:
     return WALLS[which] * offset - joint.clearance
 
 
-GEOMETRY = Geometry(
+GEOMETRY = ContactGeometry(
     name="pin_in_slot",
     words="pin against a wall of its slot",
     force=guide.corner_force,

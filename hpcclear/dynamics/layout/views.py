@@ -180,7 +180,7 @@ class Outcome(View):
         return start
 
 
-class Settings(View):
+class RunSettings(View):
     """Numbers that steer a run, one row."""
 
     size = settings.SETTINGS

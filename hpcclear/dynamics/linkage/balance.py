@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.kinematics import CENTER, Column, Kinematics, Move, Point
+from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics, Move, Mover, Point
 from hpcclear.dynamics.linkage.parts import GROUND, Body, split
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -62,13 +62,13 @@ class Balance:
         x, y = (self.writer.parameter(n) if a else ZERO for n, a in zip(names, arm, strict=True))
         return Vector(x, y)
 
-    def mass(self, first: Column, second: Column) -> Term:
+    def mass(self, first: Mover, second: Mover) -> Term:
         """Entry of the mass matrix."""
         if {first.kind, second.kind} == {"slide", "across"} and first.body == second.body:
             return ZERO
         total, pairs = ZERO, []
         for body in self.forest.mechanism.bodies:
-            turns = Column("angle", self.forest.frames[body.name])
+            turns = Mover("angle", self.forest.frames[body.name])
             if first == second == turns:
                 total = total + self.inertia_of(body)
             if self.forest.on_ground(body.name):
@@ -87,19 +87,19 @@ class Balance:
                 total = total + self._bent_mass(body.name, first, second)
         return total + self.inner(pairs)
 
-    def moved_by(self, body: str) -> dict[Column, Held]:
+    def moved_by(self, body: str) -> dict[Mover, Held]:
         """Derivatives of a bent bar's first moment (`bending`) by all that changes it."""
         bend, frame = self.kinematics.bends[body], self.forest.frames[body]
-        found = {Column("angle", frame): (frame, bend.moved().across())}
+        found = {Mover("angle", frame): (frame, bend.moved().across())}
         modes = zip(bend.kinds, bend.modes, strict=True)
-        return found | {Column(kind, body): (frame, bend.moved_by(k)) for kind, k in modes}
+        return found | {Mover(kind, body): (frame, bend.moved_by(k)) for kind, k in modes}
 
-    def _bent_mass(self, body: str, first: Column, second: Column) -> Term:
+    def _bent_mass(self, body: str, first: Mover, second: Mover) -> Term:
         """What bending adds to an entry of the mass matrix, besides products of first moment and mass centre."""
-        bend, turns = self.kinematics.bends[body], Column("angle", self.forest.frames[body])
+        bend, turns = self.kinematics.bends[body], Mover("angle", self.forest.frames[body])
         if first == second == turns:
             return bend.spun()
-        modes = {Column(kind, body): k for kind, k in zip(bend.kinds, bend.modes, strict=True)}
+        modes = {Mover(kind, body): k for kind, k in zip(bend.kinds, bend.modes, strict=True)}
         if first in modes and first == second:
             return bend.modal_mass
         for one, two in ((first, second), (second, first)):
@@ -148,7 +148,7 @@ class Balance:
         return self.writer.let(f"s_{early}_{late}", s * ct - c * st)
 
     # ---- forces ---------------------------------------------------------------------------------
-    def force(self, column: Column) -> Term:
+    def force(self, column: Mover) -> Term:
         """What moves along a column: pulls and moments, gravity, and what turning frames require."""
         total = ZERO
         for pull in self.pulls:
@@ -164,7 +164,7 @@ class Balance:
                 total = total + bend.slope(mode, twist.point) * twist.moment
         return total + self._weight(column) + self._turning(column) + self._bent(column)
 
-    def _bent(self, column: Column) -> Term:
+    def _bent(self, column: Mover) -> Term:
         """What acts within a bent bar: on its turning, and on its modes."""
         for body, bend in self.kinematics.bends.items():
             frame = self.forest.frames[body]
@@ -187,7 +187,7 @@ class Balance:
         across = s * fx - c * fy if ay.negative else c * fy - s * fx
         return abs(ay) * across + ax * (c * fx + s * fy)
 
-    def _weight(self, column: Column) -> Term:
+    def _weight(self, column: Mover) -> Term:
         """Gravity acts towards -y; a tree that nothing holds falls as a whole, which is added to its root alone."""
         if not self.gravity:
             return ZERO
@@ -213,7 +213,7 @@ class Balance:
             whole = whole + self.kinematics.raised(frame, moment)
         return -(whole * self.writer.parameter("gravity"))
 
-    def _turning(self, column: Column) -> Term:
+    def _turning(self, column: Mover) -> Term:
         """What centripetal, Coriolis and prescribed accelerations require."""
         pairs: dict[tuple[Term, ...], list[tuple[Term, Held, Held]]] = {}
         known = ZERO
@@ -236,14 +236,14 @@ class Balance:
                     pairs.setdefault(rates, []).append(both)
         for frame in self.forest.prescribed:
             if turn := self.kinematics.turn(frame):
-                known = known + self.mass(column, Column("angle", frame)) * turn
+                known = known + self.mass(column, Mover("angle", frame)) * turn
         total = ZERO
         for rates, found in pairs.items():
             total = total + self.inner(found, rates)
         return total - known
 
     def _thrown(
-        self, body: str, point: Point, columns: dict[Column, Held], column: Column
+        self, body: str, point: Point, columns: dict[Mover, Held], column: Mover
     ) -> Iterator[tuple[tuple[Term, ...], tuple[Term, Held, Held]]]:
         """The same of a bent bar's first moment: its own acceleration along the mass centre's column, and the mass centre's
         along its own."""

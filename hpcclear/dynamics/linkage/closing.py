@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.kinematics import Column, Kinematics, Point
+from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Aligned,
@@ -24,7 +24,7 @@ from hpcclear.dynamics.linkage.parts import (
 )
 
 
-class Row(NamedTuple):
+class ClosureRow(NamedTuple):
     """One constraint: derivatives by columns, and the required sum of these times accelerations.
 
     `others`: derivatives by what is prescribed or held, for its reactions; `error` and `rate`: the constraint and its
@@ -32,9 +32,9 @@ class Row(NamedTuple):
     """
 
     name: str
-    columns: dict[Column, Term]
+    columns: dict[Mover, Term]
     asked: Term
-    others: dict[Column, Term]
+    others: dict[Mover, Term]
     error: Term
     rate: Term
 
@@ -46,7 +46,7 @@ class Closing:
     kinematics: Kinematics
     writer: Writer
 
-    def rows(self, one: Joint | Drive) -> list[Row]:
+    def rows(self, one: Joint | Drive) -> list[ClosureRow]:
         """The constraints of a joint or of a drive."""
         if isinstance(one, Revolute):
             return self._pin(one)
@@ -58,12 +58,12 @@ class Closing:
         return [self._driven(one)]
 
     def _row(
-        self, name: str, columns: dict[Column, Term], rest: Term, rate: Term, error: Term
-    ) -> Row:
+        self, name: str, columns: dict[Mover, Term], rest: Term, rate: Term, error: Term
+    ) -> ClosureRow:
         """`rest`: c'' without the coordinates' accelerations; `rate`, `error`: c' and c."""
         write, asked = self.writer, -rest
-        free: dict[Column, Term] = {}
-        others: dict[Column, Term] = {}
+        free: dict[Mover, Term] = {}
+        others: dict[Mover, Term] = {}
         for column, term in columns.items():
             turns = column.kind == "angle"
             given = column.kind == "across" or (turns and self.kinematics.given(column.body))
@@ -73,9 +73,9 @@ class Closing:
                 asked = asked - term * self.kinematics.turn(column.body)
         alpha2, beta2 = write.parameter("alpha2"), write.parameter("beta2")
         asked = asked - alpha2 * rate - beta2 * error
-        return Row(name, free, asked, others, error, rate)
+        return ClosureRow(name, free, asked, others, error, rate)
 
-    def _pin(self, joint: Revolute) -> list[Row]:
+    def _pin(self, joint: Revolute) -> list[ClosureRow]:
         kin = self.kinematics
         journal, bearing = kin.point(joint.journal), kin.point(joint.bearing)
         error = kin.position(journal) - kin.position(bearing)
@@ -90,9 +90,9 @@ class Closing:
             for axis in "xy"
         ]  # fmt: skip
 
-    def between(self, first: str, second: str) -> dict[Column, Vector]:
+    def between(self, first: str, second: str) -> dict[Mover, Vector]:
         """Derivatives of the difference of two places, along the ground's axes."""
-        found: dict[Column, Vector] = {}
+        found: dict[Mover, Vector] = {}
         for place, ahead in ((first, True), (second, False)):
             for column, held in self.kinematics.columns(self.kinematics.point(place)).items():
                 moved = self.kinematics.rotated(*held)
@@ -119,7 +119,7 @@ class Closing:
                 found = found + kin.rotated(move.frame, move.changing.times(speed, speed))
         return found
 
-    def _guide(self, joint: Slide | Slot) -> list[Row]:
+    def _guide(self, joint: Slide | Slot) -> list[ClosureRow]:
         """Across the line, and the angle of the body to it."""
         kin, write = self.kinematics, self.writer
         forest = kin.forest
@@ -135,7 +135,7 @@ class Closing:
         columns = {c: dot(v, normal) for c, v in self.between(*joint.places).items()}
         if other != GROUND:
             apart = Vector(*(write.let(f"apart_{joint.name}", part) for part in apart))
-            turns = Column("angle", other)
+            turns = Mover("angle", other)
             columns[turns] = columns.get(turns, ZERO) - dot(apart, along)
         across = self._row(
             f"{joint.name}_across",
@@ -146,13 +146,13 @@ class Closing:
         )  # fmt: skip
         c, s = kin.trig(own)
         tilted = s * along.x - c * along.y  # of the angle between body and line
-        angles = {Column("angle", own): ONE, Column("angle", other): -ONE}
+        angles = {Mover("angle", own): ONE, Mover("angle", other): -ONE}
         angles = {column: term for column, term in angles.items() if column.body != GROUND}
         return [across, self._row(
             f"{joint.name}_angle", angles, ZERO, kin.spin(own) - spin, tilted
         )]  # fmt: skip
 
-    def sliding(self, joint: Slide) -> tuple[dict[Column, Term], Term]:
+    def sliding(self, joint: Slide) -> tuple[dict[Mover, Term], Term]:
         """Derivatives of the displacement along a guide that closes a loop, and the sliding speed."""
         kin, along = self.kinematics, self.direction(joint)
         normal = along.across()
@@ -161,7 +161,7 @@ class Closing:
         moved = {c: dot(v, along) for c, v in self.between(*joint.places).items()}
         carrier = kin.forest.frames[split(joint.line)[0]]
         if carrier != GROUND:
-            turns = Column("angle", carrier)
+            turns = Mover("angle", carrier)
             moved[turns] = moved.get(turns, ZERO) + aside
         speed = dot(self.rate(*joint.places), along) + kin.spin(carrier) * aside
         return {c: term for c, term in moved.items() if term}, self.writer.let(
@@ -180,13 +180,13 @@ class Closing:
         x, y = self.kinematics.rotated(forest.frames[carrier], held)
         return Vector(write.let(f"x_{joint.name}", x), write.let(f"y_{joint.name}", y))
 
-    def run_up(self, drive: RunUp, speed: Term, rise: Term) -> Row:
+    def run_up(self, drive: RunUp, speed: Term, rise: Term) -> ClosureRow:
         """A free body's acceleration as its drive has it; what its speed is off by is fed back."""
         own = self.kinematics.forest.frames[drive.body]
         rate = self.kinematics.spin(own) - speed
-        return self._row(f"{drive.name}_angle", {Column("angle", own): ONE}, -rise, rate, ZERO)
+        return self._row(f"{drive.name}_angle", {Mover("angle", own): ONE}, -rise, rate, ZERO)
 
-    def _driven(self, drive: Drive) -> Row:
+    def _driven(self, drive: Drive) -> ClosureRow:
         kin, name = self.kinematics, f"{drive.name}_drive"
         angle, spin, turn = kin.driven(drive, name)
         own = kin.forest.frames[drive.body]
@@ -198,7 +198,7 @@ class Closing:
             self.writer.when_needed(names, f"{', '.join(names)} = sincos({apart.name})")
             error = named(f"s_{name}")
         return self._row(
-            f"{drive.name}_angle", {Column("angle", own): ONE}, -turn, kin.spin(own) - spin, error
+            f"{drive.name}_angle", {Mover("angle", own): ONE}, -turn, kin.spin(own) - spin, error
         )
 
 

@@ -19,7 +19,7 @@ from hpcclear.dynamics.linkage.closing import Closing, dot
 from hpcclear.dynamics.linkage.elements import functions
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix, blocks
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.look_ups import LookUp, LookUps
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
@@ -117,7 +117,7 @@ class _Generator:
         )
         self.balance = Balance(self.forest, self.kinematics, self.writer, on.gravity)
         self.closing = Closing(self.kinematics, self.writer)
-        self.columns = [Column(one.kind, one.body) for one in self.forest.coordinates]
+        self.columns = [Mover(one.kind, one.body) for one in self.forest.coordinates]
         self.number = {column: k for k, column in enumerate(self.columns)}
         self.losses: list[Term] = []
         self.load_power = ZERO
@@ -219,14 +219,14 @@ class _Generator:
         self.writer.when_needed((turned,), f"{turned} = work[{self.rows.curves[name]} * W + i]")
         return named(turned)
 
-    def _torque(self, drive: TorqueDrive) -> tuple[Column, Term]:
+    def _torque(self, drive: TorqueDrive) -> tuple[Mover, Term]:
         write = self.writer
         if drive.by_speed is not None:
             speed = self.kinematics.spin(self.forest.frames[drive.body])
             name = f"{drive.name}_by_speed"
             row = self.rows.places.get(name)
             torque = piecewise.term(write, name, len(drive.by_speed), speed, row)
-            return Column("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
+            return Mover("angle", self.forest.frames[drive.body]), write.let(drive.name, torque)
         torque = write.parameter(f"{drive.name}_torque")
         if drive.table:
             torque = write.let(drive.name, torque * self._turned(drive.name))
@@ -234,7 +234,7 @@ class _Generator:
             speed = self.kinematics.spin(self.forest.frames[drive.body])
             fall = write.parameter(f"{drive.name}_fall") * speed
             torque = write.let(f"{drive.name}_falling", torque * (ONE - fall))
-        return Column("angle", self.forest.frames[drive.body]), torque
+        return Mover("angle", self.forest.frames[drive.body]), torque
 
     # ---- accelerations --------------------------------------------------------------------------
     def inverse(self, term: Term) -> Term | None:
@@ -247,7 +247,7 @@ class _Generator:
         known = self.writer.hoist or not term.name.endswith("_pivot_inertia")
         return self.writer.parameter(name) if known else None
 
-    def _solved(self, torques: list[tuple[Column, Term]]) -> dict[int, Term]:
+    def _solved(self, torques: list[tuple[Mover, Term]]) -> dict[int, Term]:
         """Accelerations of the coordinates, then multipliers, by number."""
         n = len(self.columns)
         matrix: Matrix = {}
@@ -333,12 +333,12 @@ class _Generator:
         }
 
     # ---- what is written down besides ------------------------------------------------------------
-    def _store(self, found: dict[int, Term], torques: dict[Column, Term]) -> None:
+    def _store(self, found: dict[int, Term], torques: dict[Mover, Term]) -> None:
         on, write = self.on, self.writer
         for drive in self.mechanism.drives:
             for name in straight_of(drive):  # the rate of a speed is known last
                 if name in self.rows.places:
-                    angle = self.number[Column("angle", self.forest.frames[drive.body])]
+                    angle = self.number[Mover("angle", self.forest.frames[drive.body])]
                     row = self.rows.places[name] + at.MAX_CURVES
                     write.line(f"work[{row} * W + i] = {write.text(found[angle])}")
         if on.energies or on.series or on.responses or on.objective or on.pins:
@@ -399,10 +399,10 @@ class _Generator:
             call = f"effects.objective.rate(work, par, {joint}, {drive}, i, W)"
             self.writer.line(f"work[{where} * W + i] = {call}")
 
-    def _second(self, found: dict[int, Term]) -> Callable[[Column], Term]:
+    def _second(self, found: dict[int, Term]) -> Callable[[Mover], Term]:
         """Accelerations of coordinates, by their columns; 0 of what is none."""
 
-        def second(column: Column) -> Term:
+        def second(column: Mover) -> Term:
             term = found[self.number[column]] if column in self.number else ZERO
             if column.kind == "y" and column.body in self.balance.falling:
                 return term - self.writer.parameter("gravity")
@@ -432,7 +432,7 @@ class _Generator:
         second = self._second(found)
         kin, follow = self.kinematics, self.on.follow
         if "." not in follow:
-            if (k := self.number.get(Column("slide", follow))) is not None:
+            if (k := self.number.get(Mover("slide", follow))) is not None:
                 along = found[k]
             else:
                 guide = _guide_of(self.mechanism, follow)
@@ -454,11 +454,11 @@ class _Generator:
         main = self.mechanism.period
         return [main, *(drive for drive in self.mechanism.drives if drive is not main)]
 
-    def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Column, Term]) -> Term:
+    def _moment(self, drive: Drive, found: dict[int, Term], torques: dict[Mover, Term]) -> Term:
         """Moment of a drive: what is given, or what the prescribed angle requires."""
         if isinstance(drive, Release):
             return ZERO
-        column = Column("angle", self.forest.frames[drive.body])
+        column = Mover("angle", self.forest.frames[drive.body])
         if column in torques:
             return torques[column]
         names = [row.name for row in self.constraints]
@@ -466,7 +466,7 @@ class _Generator:
             return found[len(self.columns) + names.index(f"{drive.name}_angle")]
         return self.writer.let("moment", self.reaction(column, found), whole=True)
 
-    def reaction(self, column: Column, found: dict[int, Term]) -> Term:
+    def reaction(self, column: Mover, found: dict[int, Term]) -> Term:
         """What has to act along a column that is prescribed."""
         total = ZERO
         for k, one in enumerate(self.columns):

@@ -47,7 +47,7 @@ class Point(NamedTuple):
     moves: tuple[Move, ...]
 
 
-class Column(NamedTuple):
+class Mover(NamedTuple):
     """What makes points move: the turning of a frame, or a move."""
 
     kind: str  # "angle" or a move's
@@ -290,16 +290,16 @@ class Kinematics:
             found = found + self.rotated(frame, arm.times(self.spin(frame)).across())
         return found
 
-    def acceleration(self, point: Point, second: Callable[[Column], Term]) -> Vector:
+    def acceleration(self, point: Point, second: Callable[[Mover], Term]) -> Vector:
         """How its velocity changes; `second`: the acceleration of a coordinate, and of a frame that no drive turns."""
         found = NOWHERE
         for frame in dict.fromkeys((*(m.frame for m in point.moves), *point.arms)):
             spin = self.spin(frame)
-            turn = self.turn(frame) if self.given(frame) else second(Column("angle", frame))
+            turn = self.turn(frame) if self.given(frame) else second(Mover("angle", frame))
             for move in point.moves:
                 if move.frame == frame and move.kind != "across":
                     speed = named(self.speed_name((move.kind, move.body, "")))
-                    rate = second(Column(move.kind, move.body))
+                    rate = second(Mover(move.kind, move.body))
                     twice = spin * speed + spin * speed  # Coriolis
                     moved = move.direction.times(rate) + move.direction.times(twice).across()
                     moved = moved + move.changing.times(speed, speed)
@@ -309,15 +309,15 @@ class Kinematics:
             found = found + self.rotated(frame, turned)
         return found
 
-    def columns(self, point: Point) -> dict[Column, tuple[str, Vector]]:
+    def columns(self, point: Point) -> dict[Mover, tuple[str, Vector]]:
         """Derivatives of a point by all that moves it: frame, and vector in it."""
         found = {
-            Column("angle", frame): (frame, arm.across())
+            Mover("angle", frame): (frame, arm.across())
             for frame, arm in point.arms.items()
             if frame != GROUND and self.forest.turning(frame)
         }
         return found | {
-            Column(move.kind, move.body): (move.frame, move.direction) for move in point.moves
+            Mover(move.kind, move.body): (move.frame, move.direction) for move in point.moves
         }
 
     def raised(self, frame: str, vector: Vector) -> Term:

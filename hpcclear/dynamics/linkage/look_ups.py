@@ -7,7 +7,7 @@ from hpcclear.dynamics.linkage.expression import Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics
 from hpcclear.dynamics.linkage.parts import (
     Drive,
-    Load,
+    LoadTerms,
     RunUp,
     TableDrive,
     TorqueDrive,
@@ -49,7 +49,7 @@ class LookUps:
             name: self._of(one) for one in (*m.drives, *m.loads) for name in curves_of(one)
         }
 
-    def _of(self, part: Drive | Load) -> LookUp:
+    def _of(self, part: Drive | LoadTerms) -> LookUp:
         main = self._forest.mechanism.period
         if isinstance(part, TableDrive):
             share = main.seconds / part.seconds / main.turns / at.TURN

@@ -14,7 +14,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.closing import Closing
 from hpcclear.dynamics.linkage.expression import Writer
-from hpcclear.dynamics.linkage.kinematics import Column, Kinematics
+from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
 from hpcclear.dynamics.linkage.parts import TableDrive
@@ -102,7 +102,7 @@ class Loops:
     def __init__(self, mechanism: Mechanism, closed: bool = False, trees: bool = False) -> None:
         self.mechanism = mechanism = straight(mechanism)  # what bends starts straight
         self.forest = forest(mechanism, cartesian=not trees, closed=closed)
-        columns = [Column(one.kind, one.body) for one in self.forest.coordinates]
+        columns = [Mover(one.kind, one.body) for one in self.forest.coordinates]
         self.size = n = len(columns)
         writer = Writer({}, 0, hoist=False)
         kinematics = Kinematics(self.forest, writer, 0, n, 2 * n)

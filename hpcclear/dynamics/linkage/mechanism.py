@@ -18,7 +18,7 @@ from hpcclear.dynamics.linkage.parts import (
     Fixed,
     Harmonic,
     Joint,
-    Load,
+    LoadTerms,
     Loose,
     LooseSlide,
     LooseSlot,
@@ -51,7 +51,7 @@ class Mechanism:
     joints: tuple[Joint, ...]
     drives: tuple[Drive, ...]
     ground: Mapping[str, Pair] = field(default_factory=lambda: {"o": (0.0, 0.0)})
-    loads: tuple[Load, ...] = ()
+    loads: tuple[LoadTerms, ...] = ()
 
     def __post_init__(self) -> None:
         for check in (_names, _places, _numbers, _connected, _drives, _sizes):

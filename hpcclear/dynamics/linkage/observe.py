@@ -73,10 +73,10 @@ def put_state(work, contacts, time, state, n, W, i):
 
 
 OPEN, FORCE, RATE = 0, 1, 2
-"""Columns of what `Seen.joints` holds at each joint: gap (m), contact force (N), rate of the gap (m/s)."""
+"""Columns of what `Derivative.joints` holds at each joint: gap (m), contact force (N), rate of the gap (m/s)."""
 
 
-class Seen(NamedTuple):
+class Derivative(NamedTuple):
     """What `derivative` writes: dy/dt, the joints (j, 3), and the kernel's rows of one lane, parameters included."""
 
     rates: Array
@@ -84,9 +84,9 @@ class Seen(NamedTuple):
     lane: Array
 
 
-def new_seen(n: int, par: Array, joints: int = 2) -> Seen:
+def new_seen(n: int, par: Array, joints: int = 2) -> Derivative:
     """Memory for n coordinates and so many joints of the lane with these parameters (PARAMETERS,)."""
-    return Seen(np.empty(2 * n + joints), np.zeros((joints, 3)), new_lane(par))
+    return Derivative(np.empty(2 * n + joints), np.zeros((joints, 3)), new_lane(par))
 
 
 # nine arguments: packed into named tuples, a call from Python takes 32 us in place of 17
@@ -95,7 +95,7 @@ def derivative(motion, tables, contacts, time, y, out, joints, lane):
     """Rates of y = (coordinates, velocities, integrals of the absolute gaps) at `time` since the start of the revolution.
 
     `motion`: address of a motion of one lane; `contacts`: whether each joint is `latched`, then 1/d'_0 of each. Others as in
-    `Seen`.
+    `Derivative`.
     """
     n = (len(y) - len(joints)) // 2
     put_state(lane, contacts, time, y, n, 1, 0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from hpcclear.base.outcome import CORNERS, WALLS
 from hpcclear.dynamics.contacts import pin_in_slot
-from hpcclear.dynamics.contacts.declared import Geometry
+from hpcclear.dynamics.contacts.declared import ContactGeometry
 from hpcclear.dynamics.contacts.guide import corner, gap_of
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
 
@@ -58,7 +58,7 @@ class Contact(NamedTuple):
     joint: "Joint"
     journal: str
     bearing: str
-    geometry: Geometry
+    geometry: ContactGeometry
     side: float = 0.0
 
     @property
@@ -397,7 +397,7 @@ class RunUp(TorqueDrive):
 Drive = ConstantSpeed | Harmonic | TableDrive | TorqueDrive
 
 
-class Load(Protocol):
+class LoadTerms(Protocol):
     """What is known here of a load (`hpcclear.scene.loads`): its parameters, and the terms that it adds by an `acting.Acting`.
 
     Its entries `place`, `first` and `second` are places, `body` and `other` bodies that rotate, where it has these.
@@ -427,14 +427,14 @@ def seconds_of(load: object) -> float:
     return float(getattr(load, "seconds", 0.0))
 
 
-def curves_of(part: Drive | Load) -> list[str]:
+def curves_of(part: Drive | LoadTerms) -> list[str]:
     """Names of the tabulated curves that a drive or load has."""
     if isinstance(part, (TableDrive, RunUp)):
         return [f"{part.name}.{one}" for one in part.curves]
     return [part.name] if getattr(part, "table", False) else []
 
 
-def straight_of(part: Drive | Load) -> dict[str, tuple[Pair, ...]]:
+def straight_of(part: Drive | LoadTerms) -> dict[str, tuple[Pair, ...]]:
     """Tables of a drive or load that run straight from row to row, over a speed or a distance."""
     found: dict[str, tuple[Pair, ...]] = getattr(part, "straight", {})
     return found

@@ -40,7 +40,7 @@ MOST_ROUNDS = 64
 _NEWTON = 8
 
 
-class Node(NamedTuple):
+class WalkPose(NamedTuple):
     """A pose of the walk: time in s, coordinates and velocities (n,), determinant, a bound of the smallest singular value."""
 
     time: float
@@ -54,7 +54,7 @@ class Ended(NamedTuple):
     """How a walk ended, and the pose there."""
 
     status: Status
-    node: Node
+    node: WalkPose
 
 
 @dataclass
@@ -66,12 +66,12 @@ class Passage:
 
     loops: Loops
     unit: float
-    nodes: list[Node] = field(default_factory=list)
-    changes: list[Node] = field(default_factory=list)
+    nodes: list[WalkPose] = field(default_factory=list)
+    changes: list[WalkPose] = field(default_factory=list)
     ended: Ended | None = None
     recurs: float = math.inf
 
-    def end(self, status: Status, node: Node) -> None:
+    def end(self, status: Status, node: WalkPose) -> None:
         """Let it end at a pose."""
         self.ended = Ended(status, node)
 
@@ -147,7 +147,7 @@ class _Walker:
         self.best = 0.0
         self.direct = -math.inf  # s, until when no change point is passed at once
 
-    def pose(self, guess: Array, time: float) -> Node | None:
+    def pose(self, guess: Array, time: float) -> WalkPose | None:
         """The pose near a guess, by Newton's method; None where there is none."""
         loops, q = self.loops, guess
         for _ in range(_NEWTON):
@@ -164,9 +164,9 @@ class _Walker:
         inverse, state = _inverse(loops, q, time)
         v = -loops.scales * (inverse @ (state.rate / loops.row_scales))
         determinant = np.linalg.det(state.jacobian * loops.scales / loops.row_scales[:, None])
-        return Node(time, q, v, float(determinant), float(_margins(inverse)))
+        return WalkPose(time, q, v, float(determinant), float(_margins(inverse)))
 
-    def step(self, here: Node, turn: Array, h: float) -> tuple[Node, float] | None:
+    def step(self, here: WalkPose, turn: Array, h: float) -> tuple[WalkPose, float] | None:
         """A step of so many s, and how much of what it may be off it is; None if it is further off. `turn`: v's rate."""
         guess = here.q + h * (here.v + 0.5 * h * turn)
         new = self.pose(guess, here.time + h)
@@ -177,7 +177,7 @@ class _Walker:
         off = max(off, np.abs((new.v - here.v) * h / scales).max(initial=0.0) / TURNED)
         return (new, float(off)) if off < 1.0 else None
 
-    def changed(self, here: Node, there: Node) -> tuple[Node, list[Node]] | None:
+    def changed(self, here: WalkPose, there: WalkPose) -> tuple[WalkPose, list[WalkPose]] | None:
         """The change point between two poses with determinants of either sign, and poses on both its sides; None unless one
         smooth motion leads through it, and no other one touches that."""
         loops, wide = self.loops, BESIDE * self.unit
@@ -199,20 +199,22 @@ class _Walker:
         smooth = jumps[0] < 0.3 and jumps[1] < 0.5 * jumps[0] + 1e-5
         if not (smooth and 0.5 < NEARER * sizes[1] / sizes[0] < 2.0):
             return None
-        middle = Node(time, self._along(*near, 0.5), 0.5 * (near[0].v + near[1].v), 0.0, 0.0)
+        middle = WalkPose(time, self._along(*near, 0.5), 0.5 * (near[0].v + near[1].v), 0.0, 0.0)
         return middle, list(outer)
 
-    def _along(self, a: Node, b: Node, s: float) -> Array:
+    def _along(self, a: WalkPose, b: WalkPose, s: float) -> Array:
         h = b.time - a.time
         return _hermite(a.q, a.v * h, b.q, b.v * h, np.asarray(s))
 
-    def _determinant(self, a: Node, b: Node, h: float, s: float) -> float:
+    def _determinant(self, a: WalkPose, b: WalkPose, h: float, s: float) -> float:
         loops = self.loops
         q = self._along(a, b, s)
         jacobian = loops.at(q, np.zeros_like(q), a.time + s * h).jacobian
         return float(np.linalg.det(jacobian * loops.scales / loops.row_scales[:, None]))
 
-    def leap(self, here: Node, turn: Array, h: float) -> tuple[Node, list[Node], Node] | None:
+    def leap(
+        self, here: WalkPose, turn: Array, h: float
+    ) -> tuple[WalkPose, list[WalkPose], WalkPose] | None:
         """A change point within about a step, poses on both its sides, and the pose at the end; None if there is none."""
         for share in (1.0, 1.37, 1.73, 0.81, 0.6):
             found = self.step(here, turn, share * h)
@@ -247,7 +249,7 @@ def walked(loops: Loops, start: Array, period: float, turns: int, rounds: int) -
     walker, found = _Walker(loops, unit), Passage(loops, unit)
     here = walker.pose(start, 0.0)
     if here is None:
-        found.end(Status.CANNOT_TURN, Node(0.0, start, np.zeros(loops.size), 0.0, 0.0))
+        found.end(Status.CANNOT_TURN, WalkPose(0.0, start, np.zeros(loops.size), 0.0, 0.0))
         return found
     found.nodes.append(here)
     for count in range(1, min(rounds, MOST_ROUNDS) + 1):
@@ -269,7 +271,7 @@ def _recurs(loops: Loops, first: Array, last: Array, within: float = 1e-6) -> Bo
     return same
 
 
-def _through(walker: _Walker, found: Passage, here: Node, end: float) -> Node:
+def _through(walker: _Walker, found: Passage, here: WalkPose, end: float) -> WalkPose:
     """To a time in s, or to where the walk ends."""
     unit, turn = walker.unit, np.zeros(walker.loops.size)
     h = LONGEST * unit

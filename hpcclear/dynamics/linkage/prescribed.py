@@ -21,7 +21,7 @@ from hpcclear.dynamics.linkage.loops import Loops, on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
 from hpcclear.dynamics.linkage.parts import GROUND, seconds_of, split
-from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Node, Passage, walked
+from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows
 
@@ -102,7 +102,7 @@ def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage
     return found
 
 
-def _diverges(assembly: Assembly, passage: Passage, change: Node, gravity: float) -> bool:
+def _diverges(assembly: Assembly, passage: Passage, change: WalkPose, gravity: float) -> bool:
     """Whether a force grows as one over the distance from a change point; tabulated loads count as those of factor 1."""
     near = BESIDE * passage.unit / np.array([1.0, NEARER])
     far = np.linspace(0.1, 1.0, 10) * min(change.time, passage.unit)

@@ -11,10 +11,10 @@ from functools import cached_property
 from typing import Protocol
 
 from hpcclear.dynamics.linkage.balance import Balance
-from hpcclear.dynamics.linkage.closing import Closing, Row
+from hpcclear.dynamics.linkage.closing import Closing, ClosureRow
 from hpcclear.dynamics.linkage.elimination import Elimination, Matrix
 from hpcclear.dynamics.linkage.expression import ONE, ZERO, Term, Vector, Writer, named, onto
-from hpcclear.dynamics.linkage.kinematics import Column
+from hpcclear.dynamics.linkage.kinematics import Mover
 from hpcclear.dynamics.linkage.parts import GROUND, Joint, Revolute, Slide, Slot, split
 
 PASSES = 4
@@ -26,8 +26,8 @@ class Solving(Protocol):
 
     balance: Balance
     closing: Closing
-    columns: list[Column]
-    constraints: list[Row]
+    columns: list[Mover]
+    constraints: list[ClosureRow]
 
 
 class Rubbing:
@@ -47,7 +47,7 @@ class Rubbing:
     size: Term
     force: Term
     speed: Term
-    influence: dict[Column, Term]
+    influence: dict[Mover, Term]
     reaction: list[tuple[Term, dict[int, Term]]]
 
     def __init__(self, joint: Joint, of: Solving) -> None:
@@ -126,10 +126,10 @@ class RubbingGuide(Rubbing):
         super().__init__(joint, of)
         balance, body, n = of.balance, self.body, len(of.columns)
         if body is not None:
-            self.place = self.number[Column("slide", body)]
-            self.influence = {Column("slide", body): ONE}
+            self.place = self.number[Mover("slide", body)]
+            self.influence = {Mover("slide", body): ONE}
             self.speed = named(f"vslide_{body}")
-            across = Column("across", body)
+            across = Mover("across", body)
             slopes = {k: balance.mass(across, one) for k, one in enumerate(of.columns)}
             slopes |= {n + r: -row.others.get(across, ZERO) for r, row in enumerate(of.constraints)}
             rest = -balance.force(across)
@@ -185,7 +185,7 @@ class RubbingPin(Rubbing):
         super().__init__(joint, of)
         kin = of.balance.kinematics
         journal, bearing = (kin.forest.frames[split(place)[0]] for place in joint.places)
-        turns = {Column("angle", journal): ONE, Column("angle", bearing): -ONE}
+        turns = {Mover("angle", journal): ONE, Mover("angle", bearing): -ONE}
         self.influence = {column: term for column, term in turns.items() if column.body != GROUND}
         self.turns = journal != bearing
         self.speed = kin.spin(journal) - kin.spin(bearing)

@@ -27,7 +27,7 @@ from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
 
-class Seen(NamedTuple):
+class ResponseStates(NamedTuple):
     """States at the instants of a response: coordinates and velocities (t, n), time in the revolution, its number, contacts
     (t, 2 MAX_JOINTS), rates, works (t, 4), forces of ideal pins (t, 2, MAX_PINS)."""
 
@@ -41,7 +41,7 @@ class Seen(NamedTuple):
     pins: Array
 
 
-def series(scene: Scene, par: Array, seen: Seen) -> dict[str, Array]:
+def series(scene: Scene, par: Array, seen: ResponseStates) -> dict[str, Array]:
     """Every time series of the response, names as in the response dataset; parameters (PARAMETERS,)."""
     linkage = linkage_of(scene)
     mechanism = linkage.mechanism
@@ -235,7 +235,7 @@ def driven(mechanism: Mechanism, places: Mapping[str, Array], phase: Array) -> d
     return {"crank_angle": angle, "crank_speed": speed, "drive_phase": phase}
 
 
-def _phase(scene: Scene, linkage: Linkage, par: Array, seen: Seen) -> Array:
+def _phase(scene: Scene, linkage: Linkage, par: Array, seen: ResponseStates) -> Array:
     """Progress of the drive since the start (t,), 2 pi a turn, rad: by time, or by the angle of a body that a torque drives."""
     named = Parameters(par)
     cycle = at.TURN * turns_of(scene.linkage)

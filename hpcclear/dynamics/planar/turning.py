@@ -23,7 +23,7 @@ from hpcclear.dynamics.linkage.parts import (
     Loose,
     TorqueDrive,
 )
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Node, Passage, clear
+from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose, clear
 from hpcclear.dynamics.linkage.prescribed import angle_of, cartesian, passage_of, refusal
 from hpcclear.dynamics.linkage.trees import Forest
 
@@ -118,7 +118,7 @@ def passage(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[Assembly
     return assembly, found
 
 
-def _narrowest(walk: Passage) -> Node | None:
+def _narrowest(walk: Passage) -> WalkPose | None:
     """The first pose of a walk that links nearly lock at, `NARROW`, and are past later on; None without one."""
     margins, times = np.array([(node.margin, node.time) for node in walk.nodes]).T
     best = margins.max(initial=0.0)
@@ -133,14 +133,14 @@ def _narrowest(walk: Passage) -> Node | None:
     return walk.nodes[int(tight[0])] if len(tight) else None
 
 
-def _closes(assembly: Assembly, walk: Passage, node: Node) -> bool:
+def _closes(assembly: Assembly, walk: Passage, node: WalkPose) -> bool:
     """Whether the loops close, to rounding, at a pose where they change branch; else they pass very near to it."""
     ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time]))
     error = np.abs(assembly.loops.at(q, v, node.time).error).max()
     return bool(error <= CLOSED * np.abs(q).max())
 
 
-def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: Node) -> bool:
+def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: WalkPose) -> bool:
     """Whether the constraints of the ideal joints and drives depend on one another at a pose of the twin."""
     time = np.array([node.time])
     ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], time)

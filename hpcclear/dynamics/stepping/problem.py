@@ -13,7 +13,7 @@ from hpcclear.base.pieces import Pieces, breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.curves import packed
 from hpcclear.dynamics.layout.settings import STRICT
-from hpcclear.dynamics.layout.views import Outcome, Parameters, Settings, Start
+from hpcclear.dynamics.layout.views import Outcome, Parameters, RunSettings, Start
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.linkage.rhs import compiled_motion
@@ -77,9 +77,9 @@ class Problem:
         if len(self.atol) != 2 * n:
             raise ValueError(f"{n} coordinates have {2 * n} tolerances, not {len(self.atol)}")
 
-    def settings(self) -> Settings:
+    def settings(self) -> RunSettings:
         """The numbers that the stepper's control reads."""
-        s = Settings(np.zeros(Settings.size))
+        s = RunSettings(np.zeros(RunSettings.size))
         n = self.coordinates
         modes = modes_of(self.linkage.mechanism)
         length = min(self.atol[at.bristles_of(self.effects) + modes : n])

@@ -24,7 +24,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.base.student import student
 from hpcclear.dynamics.wear.curves import THROUGH, first_passed, local_bounds
 from hpcclear.dynamics.wear.law import Joints
-from hpcclear.dynamics.wear.record import Life, Node
+from hpcclear.dynamics.wear.record import Life, WearState
 from hpcclear.dynamics.wear.relief import FLAT, Relief
 
 FIRST_GROWTH = 0.1
@@ -40,7 +40,7 @@ _SHRINK, _GROW, _SAFETY = 0.2, 4.0, 0.9
 
 
 @dataclass(frozen=True)
-class Plan:
+class LifePlan:
     """How lives are followed."""
 
     cycles: float
@@ -60,7 +60,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Seen:
+class WearOutcome:
     """What simulations at a state of wear came to.
 
     `work`: sliding work in a revolution of worn joints (copies, joints), J; `objective`: f (copies,); `peak`: peak forces
@@ -79,7 +79,7 @@ class Seen:
 class Asked:
     """Simulations at a state of wear: sliding work done so far (joints,), J, and the numbers of the copies.
 
-    Those of odd number are to wait longer. `moments` as of `Node`. `done`: about how much of the life's simulations lie
+    Those of odd number are to wait longer. `moments` as of `WearState`. `done`: about how much of the life's simulations lie
     behind it, from 0 to 1.
     """
 
@@ -96,12 +96,12 @@ class _EndedError(Exception):
         self.status = status
 
 
-Asking = Generator[Asked, Seen, Life]
+Asking = Generator[Asked, WearOutcome, Life]
 State = tuple[float, Array, Array]
 """Revolutions, work done (joints,), J, and its moments (joints, size)."""
 
 
-def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
+def life(joints: Joints, plan: LifePlan, relief: Relief = FLAT) -> Asking:
     """Follow one life; yields what is to be simulated, is sent what came of it, returns the `Life`.
 
     Parameters
@@ -144,7 +144,7 @@ def life(joints: Joints, plan: Plan, relief: Relief = FLAT) -> Asking:
     return found
 
 
-def _is_over(found: Life, joints: Joints, plan: Plan, relief: Relief) -> bool:
+def _is_over(found: Life, joints: Joints, plan: LifePlan, relief: Relief) -> bool:
     """Whether the last jump passed what ends the life, which then ends there."""
     limits = {} if plan.beyond else plan.limits
     cycle, reason = first_passed(found, joints, limits, relief, since=len(found.nodes) - 2)
@@ -154,7 +154,7 @@ def _is_over(found: Life, joints: Joints, plan: Plan, relief: Relief) -> bool:
     return bool(reason)
 
 
-def _speed(joints: Joints, relief: Relief, here: Node) -> Array:
+def _speed(joints: Joints, relief: Relief, here: WearState) -> Array:
     """Growth of the largest clearance around each joint in a revolution, m."""
     crowded = 1.0 + relief.deepest(relief.waves(joints, here.share)) / np.maximum(
         joints.slope, 1e-300
@@ -163,7 +163,7 @@ def _speed(joints: Joints, relief: Relief, here: Node) -> Array:
     return speed
 
 
-def _to_end(joints: Joints, plan: Plan, relief: Relief, here: Node) -> float:
+def _to_end(joints: Joints, plan: LifePlan, relief: Relief, here: WearState) -> float:
     """Revolutions until a clearance ends the life at the rates of its state; 0 or more, no end where nothing wears."""
     local = joints.worn(here.work)[0] + relief.deepest(relief.waves(joints, here.moments))
     bounds = local_bounds(joints, {} if plan.beyond else plan.limits)
@@ -171,7 +171,7 @@ def _to_end(joints: Joints, plan: Plan, relief: Relief, here: Node) -> float:
     return float((np.maximum(bounds - local, 0.0) / speed).min())
 
 
-def _done(joints: Joints, plan: Plan, relief: Relief, here: Node) -> float:
+def _done(joints: Joints, plan: LifePlan, relief: Relief, here: WearState) -> float:
     """How much of a life's jumps lie behind a state: each grows a clearance by about the same part of itself."""
     left = min(plan.cycles - here.cycle, _to_end(joints, plan, relief, here))
     now, new = joints.worn(here.work)[0], joints.clearance
@@ -180,20 +180,20 @@ def _done(joints: Joints, plan: Plan, relief: Relief, here: Node) -> float:
     return gone / whole if whole > 0.0 else here.cycle / plan.cycles
 
 
-def _growing(joints: Joints, relief: Relief, here: Node, growth: float) -> float:
+def _growing(joints: Joints, relief: Relief, here: WearState, growth: float) -> float:
     """Revolutions in which a clearance grows by that much where it does most, relative; no end where nothing wears."""
     speed = _speed(joints, relief, here) / joints.worn(here.work)[0]
     return growth / float(speed.max()) if speed.max() > 0.0 else math.inf
 
 
-def _moved(joints: Joints, here: Node, share: Array, work: Array) -> Array:
+def _moved(joints: Joints, here: WearState, share: Array, work: Array) -> Array:
     """Moments (joints, size), J, once so much work is done, shared out around the surfaces like this."""
     counted: Array = joints.counted(work) - joints.counted(here.work)
     return here.moments + share * counted[:, None]
 
 
 def _shifted(
-    joints: Joints, relief: Relief, here: Node, half: Node, length: float
+    joints: Joints, relief: Relief, here: WearState, half: WearState, length: float
 ) -> tuple[Array, Array]:
     """By how much a jump at once and in two halves differ in what profiles add to the clearance, halved as the difference of
     their rates is, and what is open of it, m, (joints,)."""
@@ -207,8 +207,8 @@ def _shifted(
 
 
 def _jump(
-    found: Life, joints: Joints, plan: Plan, relief: Relief, here: Node, length: float
-) -> Generator[Asked, Seen, tuple[Node, Node | None, float]]:
+    found: Life, joints: Joints, plan: LifePlan, relief: Relief, here: WearState, length: float
+) -> Generator[Asked, WearOutcome, tuple[WearState, WearState | None, float]]:
     """Half-way, the end unless the jump is refused, and its error over the tolerance."""
     work = here.work + 0.5 * length * here.rate
     state = here.cycle + 0.5 * length, work, _moved(joints, here, here.share, work)
@@ -239,18 +239,18 @@ def _jump(
     return _placed(half, here, end, joints), end, max(error, min(bend, 1.0))
 
 
-def _placed(half: Node, here: Node, end: Node, joints: Joints) -> Node:
+def _placed(half: WearState, here: WearState, end: WearState, joints: Joints) -> WearState:
     """The state half-way at the revolution at which it is passed: the half jump itself went at the rate of its start."""
     done = float((joints.slope * (half.work - here.work)).sum())
     whole = float((joints.slope * (end.work - here.work)).sum())
     share = min(max(done / whole, 0.05), 0.95) if whole > 0.0 else 0.5
     cycle = here.cycle + share * (end.cycle - here.cycle)
-    return Node(cycle, *list(vars(half).values())[1:])
+    return WearState(cycle, *list(vars(half).values())[1:])
 
 
 def _look(
-    found: Life, joints: Joints, plan: Plan, relief: Relief, state: State, length: float | None
-) -> Generator[Asked, Seen, Node]:
+    found: Life, joints: Joints, plan: LifePlan, relief: Relief, state: State, length: float | None
+) -> Generator[Asked, WearOutcome, WearState]:
     """Simulate a state of wear until its intervals are within what a jump of that length may be off, or copies run out.
 
     `state`: revolutions, work done and its moments.
@@ -259,7 +259,7 @@ def _look(
     clearance, radius = joints.worn(work)
     if (clearance >= radius).any():
         raise _EndedError(Status.WORN_THROUGH)
-    seen: list[Seen] = []
+    seen: list[WearOutcome] = []
     done, wanted = 0, plan.copies
     while True:
         part = _done(joints, plan, relief, found.nodes[-1]) if found.nodes else 0.0
@@ -293,7 +293,7 @@ def _look(
         wanted = min(2 * done, plan.most_copies)
 
 
-def _node(state: State, seen: list[Seen]) -> Node:
+def _node(state: State, seen: list[WearOutcome]) -> WearState:
     cycle, work, moments = state
     rates = np.concatenate([one.work for one in seen])
     values = np.concatenate([one.objective for one in seen])
@@ -307,7 +307,7 @@ def _node(state: State, seen: list[Seen]) -> Node:
         np.zeros((len(s.work), *moments.shape)) if s.moments is None else s.moments for s in seen
     ]
     shares = np.concatenate(done) / np.maximum(rates, 1e-300)[..., None]
-    return Node(
+    return WearState(
         cycle, work, mean[:-1], limit[:-1], float(mean[-1]), float(limit[-1]), peaks.mean(axis=0),
         drift / np.maximum(np.abs(mean), 1e-300), moments,
         shares.mean(axis=0), sure * shares.std(axis=0, ddof=1),

@@ -10,7 +10,7 @@ from hpcclear.base.outcome import Status
 
 
 @dataclass(frozen=True)
-class Node:
+class WearState:
     """What is known at a state of wear; `limit` is a 95 % half-width.
 
     `work`: done so far (joints,), J; `rate`: added in a revolution, J; `peak`: mean of the copies' peak forces of every
@@ -42,8 +42,8 @@ class Life:
     half, m; `drift`: the largest of any rate or f at any state; `sharpest`: as of `Relief`, likewise.
     """
 
-    nodes: list[Node]
-    halves: list[Node] = field(default_factory=list)
+    nodes: list[WearState]
+    halves: list[WearState] = field(default_factory=list)
     status: Status = Status.OK
     ended: float = math.nan
     reason: str = ""

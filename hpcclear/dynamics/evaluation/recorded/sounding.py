@@ -14,7 +14,7 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
 from hpcclear.dynamics.evaluation.recorded.spectral import LEAST, Spectra
-from hpcclear.dynamics.evaluation.recorded.steps import Piece, Pieces, Recorded, Recording
+from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded, Recording, StepInstants
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import Scene
@@ -110,7 +110,7 @@ class _Heard:
 
     def __init__(self, scene: Scene, sample: Recorded, count: int) -> None:
         self._scene, self._sample = scene, sample
-        self._pieces, self._turns = Pieces(1), Turns()
+        self._pieces, self._turns = StepInstants(1), Turns()
         self._spectra = Spectra(scene, sample, count)
 
     def take(self, rows: Array) -> None:

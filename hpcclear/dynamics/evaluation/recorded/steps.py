@@ -214,15 +214,15 @@ def pieces(chunks: Iterable[Array], count: int) -> Iterator[Piece]:
     chunks : iterable of ndarray, shape (m, columns)
         Of `Recording.chunks`.
     count : int
-        As of `Pieces`.
+        As of `StepInstants`.
     """
-    made = Pieces(count)
+    made = StepInstants(count)
     for chunk in chunks:
         yield from made.take(chunk)
     yield made.finish()
 
 
-class Pieces:
+class StepInstants:
     """Instants over the steps of one sample as these come.
 
     Parameters
