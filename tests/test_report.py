@@ -129,7 +129,7 @@ def test_sampled_results_alone_make_a_report(tmp_path: Path) -> None:
     assert [t for t, _ in tree.elements].count("img") == 2
     for kind in ("sensitivity", "kriging", "front", "verification", "accuracy"):
         assert f"{kind}.nc:" in tree.text
-    assert "broken.nc was left out" in tree.text
+    assert "Not all files are here: broken.nc was left out" in tree.text
     assert "no animation" in tree.text
 
 

@@ -237,7 +237,7 @@ def test_a_linkage_with_one_clearance_joint_meets_a_target(tmp_path, capsys):
     assert float(found["objective"]) == float(found["mean_gap"][0]) > 0.0
     describe_response(found, tmp_path / "a.nc", details=True)
     steady = re.search(r"objective f +([0-9.]+)", capsys.readouterr().out)
-    assert float(steady[1]) == pytest.approx(1e3 * float(found["objective"]), rel=0.1)
+    assert float(steady[1]) == pytest.approx(1e6 * float(found["objective"]), rel=0.1)
 
 
 @pytest.mark.parametrize("changes", [{"numerics.objective": "peak-contact-force"}, {"study": None}])

@@ -43,19 +43,7 @@ def designs(content: Content) -> list[object] | None:
         tables = [table_of(verified, every, SIMULATED, "Designs")]
     remarks = str(verified.attrs.get("remarks", "none"))
     parts: list[object] = [_WORDS, *tables, *([remarks] if remarks != "none" else [])]
-    if variables := _variables(verified):
-        parts.append(f"{variables}.")
     return parts
-
-
-def _variables(verified: Results) -> str:
-    """What the design variables are: "m2: mass of the rod; ..."."""
-    known = [
-        (str(labels.words(v)), str(v.attrs.get("long_name", "")))
-        for v in labels.design_variables(verified)
-        if bool(np.isfinite(v).any())
-    ]
-    return "; ".join(f"{name}: {words}" for name, words in known if words and words != name)
 
 
 def names_in(verified: Results) -> list[str]:
