@@ -79,7 +79,7 @@ def test_the_same_design_under_other_names_is_no_choice():
     assert "equivalent" not in opened(own).remark
     assert "as wide" not in told(own)["next steps"]
     near = verified([4e-4, 2e-4, 2e-4, 2.001e-4, 1e-4], [6e-5, 4e-5, 4e-5, 4e-5, 1e-5], **twice)
-    assert "2 designs are equivalent" in opened(near).remark
+    assert "2 equivalent designs" in opened(near).remark
 
 
 @pytest.mark.parametrize(

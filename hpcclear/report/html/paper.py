@@ -1,7 +1,5 @@
 """The page's section on a paper: its claims, its designs, and how its text can be read."""
 
-import textwrap
-
 from hpcclear.base.objectives import ENDS
 from hpcclear.base.verdict import Verdict
 from hpcclear.report import beside
@@ -16,9 +14,6 @@ _BADGES = {
     Verdict.FAILS: {"words": "✗ does not hold", "kind": "fails"},
     Verdict.UNDECIDED: {"words": "? undecided", "kind": "open"},
 }
-
-LONGEST = 120
-"""Letters of the numbers that decide a claim, on the page."""
 
 _PRINTED = (("mean_paper", "printed: mean"), ("deviation_paper", "printed: std. deviation"))
 """Variables of kind ``verification``, and the heads of their columns."""
@@ -63,10 +58,9 @@ def claims(content: Content) -> list[object] | None:
     for k in range(found.sizes["claim"]):
         one = found.isel(claim=k)
         badge = _BADGES[Verdict(int(one["verdict"]))]
-        figure = textwrap.shorten(str(one["figure"].item()), LONGEST, placeholder=" … (claims.nc)")
-        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge, figure])
-    header = ["claim", "verdict", "the numbers that decide"]
-    return [held, Table(header, rows, "Claims of the paper, tested on this data")]
+        rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge])
+    title = "Claims of the paper, tested on this data; claims.nc has the numbers that decide"
+    return [held, Table(["claim", "verdict"], rows, title)]
 
 
 def designs_of_a_paper(content: Content) -> list[object]:

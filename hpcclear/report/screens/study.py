@@ -115,8 +115,6 @@ def _doubt(of: Recommended) -> str:
 def _about(of: Recommended) -> Iterator[str]:
     """What was simulated."""
     yield f"f: {labels.objective(of.ours)}"
-    if "random" in of.best:
-        yield f"random: {str(of.best['random'].item()).replace(' ', ', ')}"
     timing, designs = of.files.get("timing"), of.files["verification"].sizes["design"]
     if timing is not None and "samples" in timing:
         count = f"{int(timing['samples'].to_numpy().sum()):,}".replace(",", "\N{NO-BREAK SPACE}")
@@ -246,7 +244,7 @@ def _remark(of: Recommended, rows: tuple[Row, ...]) -> str:
     if twins:
         spans = alike.spans(of.ours, of.best, twins)
         found.append(
-            f"{len(twins) + 1} designs are equivalent{spans and f' ({spans})'}: choose by cost."
+            f"{len(twins) + 1} equivalent designs{spans and f' ({spans})'}: choose by cost."
         )
     return " ".join(found)
 
@@ -270,7 +268,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     if share > MANY:
         level = Level.RED if share > MOST else Level.AMBER
         text = f"Contact model outside its range ({100 * share:.0f} % of runs)"
-        yield Trust(level, f"{text}: forces indicative", "bearings")
+        yield Trust(level, text, "bearings")
     yield _accuracy(best)
     if (moving := of.of_best("chaos")) is not None and float(moving["chaotic"]) > scatter.SOME:
         moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
@@ -289,7 +287,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
         )
     if (half := scatter.half_width(of.files.get("sensitivity"))) > scatter.UNSURE:
         yield Trust(
-            Level.AMBER, f"Sobol indices ± {100 * half:.0f} %: a ranking only", "sensitivities"
+            Level.AMBER, f"Sobol indices ± {100 * half:.0f} %: ranking only", "sensitivities"
         )
     poor = [
         one
@@ -299,7 +297,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
     if poor:
         yield Trust(
             Level.AMBER,
-            f"{len(poor)} surrogate fits are poor; simulated values do not use them",
+            f"{len(poor)} surrogate fits are poor",
             "sensitivities",
         )
 
