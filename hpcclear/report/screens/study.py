@@ -274,7 +274,7 @@ def _trust(of: Recommended) -> Iterator[Trust]:
         moved = of.files["chaos"]["chaotic"].to_numpy() > scatter.SOME
         yield Trust(
             Level.AMBER,
-            f"Chaotic motion in {int(moved.sum())} of {moved.size} designs: values are means over it",
+            f"Chaotic motion in {int(moved.sum())} of {moved.size} designs: values are means",
             "quality",
         )
     yield from _failures(of)
