@@ -161,12 +161,13 @@ def test_a_page_of_several_samples_compares_them_and_has_sections_for_each(tmp_p
     chosen = [tmp_path / f"{name}.nc" for name in ("H7f7", "H7g6")]
     for page in (write_report(tmp_path), write_report(*chosen, output=tmp_path / "chosen.html")):
         text = page.read_text()
-        heads = re.findall(r"<h2 [^>]*>([^<]*)</h2>", text)
+        heads = re.findall(r"<h3 [^>]*>([^<]*)</h3>", text)
         assert heads[:2] == ["Comparison", "H7f7: statistics of the samples"]
         assert "H7g6: statistics of the samples" in heads
+        assert "Statistics of the samples" not in heads
         assert "was left out" not in text
-        assert "nothing was sampled" not in text
-        table = re.search(r"<thead>.*?</tbody>", text, re.S)[0]
+        assert "2 files of samples, beside each other" in text
+        table = re.search(r'id="quality-compared".*?</tbody>', text, re.S)[0]
         assert table.index("H7f7") < table.index("H7g6")
         assert table.index("1 of 100") < table.index("5 of 100")
         ids = re.findall(r'id="([^"]*)"', text)

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -153,7 +154,10 @@ def _subjects(
 ) -> list[Subject]:
     """The folded parts of the page, those with nothing inside left out."""
     found: dict[str, list[tuple[str, str, Sequence[object]]]] = {name: [] for name in SUBJECTS}
-    for part, parts in sections(content, troubles):
+    plain = (
+        replace(content, files={}) if content.samples else content
+    )  # each has sections of its own
+    for part, parts in sections(plain, troubles):
         found[part.subject].append((part.name, part.title, parts))
     for k, (name, one) in enumerate(content.each_of_samples(), 1):
         for part, parts in sections(one, troubles):
