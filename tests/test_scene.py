@@ -495,3 +495,16 @@ def test_schema_refuses_wrong_keys_and_values(name: str) -> None:
     path = next(path for path in BROKEN if path.stem == name)
     content = tomllib.loads(path.read_text())
     assert list(validator_of_scenes().iter_errors(content))
+
+
+def test_the_accuracy_of_a_study_is_read_where_verification_had_it() -> None:
+    whole = tomllib.loads((ROOT / "jobs" / "quickstart.toml").read_text())
+    asked = whole["study"].pop("accuracy")
+    whole["study"].setdefault("verification", {})["accuracy"] = asked
+    assert (
+        load_scene(whole).required_study.wanted
+        == load_scene(ROOT / "jobs" / "quickstart.toml").required_study.wanted
+    )
+    whole["study"]["accuracy"] = asked
+    with pytest.raises(InputError, match=r"stands in \[study\] already"):
+        load_scene(whole)

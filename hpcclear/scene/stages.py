@@ -232,9 +232,7 @@ class Verification(Table):
     """Largest number of simulations of each of the paper's designs under each interpretation of its text (at least 16);
     0: no comparison."""
 
-    elsewhere: ClassVar = {
-        "accuracy": ("belongs to [study]", "Write study.accuracy with this value")
-    }
+    elsewhere: ClassVar = {"accuracy": ("stands in [study] already", "Remove one of them")}
 
     def _check(self) -> None:
         if self.method == "qmc" and self.samples is not None:

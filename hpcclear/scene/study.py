@@ -32,6 +32,11 @@ class Study(StudyTables):
         if not isinstance(data, Mapping):
             return data
         data = dict(data)
+        stage = data.get("verification")
+        if isinstance(stage, Mapping) and "accuracy" in stage and "accuracy" not in data:
+            # files of earlier versions have it there
+            data["verification"] = {k: entry for k, entry in stage.items() if k != "accuracy"}
+            data["accuracy"] = stage["accuracy"]
         if "accuracy" in data:
             data["accuracy"] = of_both(data["accuracy"])
         cases, variables, random = data.get("cases"), data.get("variables"), data.get("random")
