@@ -11,9 +11,9 @@ from hpcclear.dynamics.linkage.parts import (
     Fixed,
     GuideFriction,
     Harmonic,
-    IdealPinFriction,
     LooseSlide,
     LooseSlot,
+    PinFriction,
     Revolute,
     Slide,
     Slot,
@@ -295,7 +295,7 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
 def rubbing(mechanism, *names, coefficient=0.2, radius=0.008):
     """A mechanism with friction in its named pins, all without clearance by default."""
     joints = tuple(
-        replace(j, friction=IdealPinFriction(coefficient, radius * (1.0 + 0.2 * k), 0.3))
+        replace(j, friction=PinFriction(coefficient, radius * (1.0 + 0.2 * k), 0.3))
         if type(j) is Revolute and (not names or j.name in names)
         else j
         for k, j in enumerate(mechanism.joints)

@@ -7,6 +7,7 @@ The lowering (`hpcclear.base.lowering.arithmetic`) has instructions of its own f
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.extending import register_jitable
 
 from hpcclear.base.jit import emitted, lane_function
 
@@ -31,11 +32,13 @@ def double_of(typingctx, n):
     return types.float64(types.int64), codegen
 
 
+@register_jitable
 def no_less(x, least):
     """x, or `least` where that is more: one instruction without a branch. NaN stays NaN."""
     return least if least > x else x
 
 
+@register_jitable
 def no_more(x, most):
     """x, or `most` where that is less. NaN stays NaN."""
     return most if most < x else x

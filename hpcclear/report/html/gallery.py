@@ -113,7 +113,9 @@ def _png(draw: "Callable[[], Figure]") -> str | None:
 
 def _clearances(*responses: Results) -> str:
     """At which clearances these were simulated, where that is the same for all."""
-    parts = []
+    parts: list[str] = []
+    if any("penetration" not in one for one in responses):  # of ideal joints
+        return ""
     for joint, name in enumerate(motion.joints(responses[0]).values()):
         known = [motion.clearances(one)[joint] for one in responses]
         shown = {labels.quantity(float(c), "m") for c in known if np.isfinite(c)}

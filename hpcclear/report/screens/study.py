@@ -178,7 +178,9 @@ def _peaks(best: Results, base: Results | None, content: Content) -> Iterator[Ti
         for name in (_readable(best), "original" if base is not None else "")
     ]
     forces = [
-        np.nan if one is None else float(np.nanmax(one["peak_contact_force"].to_numpy()))
+        float(np.nanmax(one["peak_contact_force"].to_numpy()))
+        if one is not None and "peak_contact_force" in one
+        else np.nan
         for one in found
     ]
     if np.isfinite(forces[0]):
