@@ -252,7 +252,7 @@ def test_the_page_draws_the_tables_of_a_scene(tmp_path):
     """Also of one that came from a file, whose values the result carries."""
     from hpcclear.report.figures.catalogue import of_response
     from hpcclear.report.figures.curves import tables_figure
-    from hpcclear.report.html.gallery import picture
+    from hpcclear.report.html.gallery import _png
 
     (tmp_path / "p.csv").write_text("angle [deg],force [kN]\n0,1\n90,-0.5\n180,0\n270,0.2\n")
     load = f'effects.slider_load={{file="{tmp_path / "p.csv"}"}}'
@@ -262,9 +262,9 @@ def test_the_page_draws_the_tables_of_a_scene(tmp_path):
     assert [round(one, 9) for one in rows.get_ydata()] == [1.0, -0.5, 0.0, 0.2]
     assert {1.0, -0.5, 0.2} <= {round(one, 6) for one in curve.get_ydata()}
     assert tables_figure in [one.draw for one in of_response(found)]  # all are on the page
-    assert picture(tables_figure, found, "tables") is not None
+    assert _png(lambda: tables_figure(found)) is not None
     without = data.response().assign_attrs(scene=plain.text)
-    assert picture(tables_figure, without, "tables") is None
+    assert _png(lambda: tables_figure(without)) is None
 
 
 @pytest.mark.parametrize(

@@ -527,7 +527,9 @@ def words(output: Path, *further: str) -> list[str]:
 def certified(tmp_path_factory):
     """Folder and output of one run."""
     place = tmp_path_factory.mktemp("effects")
-    code, output = run(words(place / "e.nc", "--scene", str(place / "reduced.toml")), 0)
+    code, output = run(
+        words(place / "e.nc", "--details", "--scene", str(place / "reduced.toml")), 0
+    )
     assert code == 0, output
     return place, output
 

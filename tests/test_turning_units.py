@@ -204,7 +204,9 @@ MOTOR = "drive={kind='torque', torque=5.0, initial_speed='60 rpm', expected_spee
     ],
 )  # fmt: skip
 def test_check_prints_every_speed_and_every_frequency(job, settings, shown):
-    code, output = run(["check", str(JOBS / job), "--no-cost", *overrides(*settings)], 0)
+    code, output = run(
+        ["check", str(JOBS / job), "--no-cost", "--details", *overrides(*settings)], 0
+    )
     assert code == 0, output
     for text in shown:
         assert text in " ".join(output.split())
