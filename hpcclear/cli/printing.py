@@ -151,7 +151,7 @@ def _columns(rows: Sequence[Sequence[str]]) -> Iterator[Text]:
     widths = [max(len(row[k]) for row in filled) for k in range(count)]
     if filled:
         rest = sum(widths[1:]) + 2 * sum(width > 0 for width in widths[1:])
-        widths[0] = min(widths[0], max(WIDTH - rest, 14))
+        widths[0] = min(widths[0], max(WIDTH - rest, 24))
     for row in filled:
         row[0] = textwrap.shorten(row[0], widths[0], placeholder="..")
         line = "  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True) if w)
