@@ -30,7 +30,7 @@ import xarray as xr
 from drawing import described
 from matplotlib.ticker import NullFormatter
 
-from hpcclear.results.rows import Columns, number
+from hpcclear.results.rows import FileVariables, number
 from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.search.pareto import cut
 
@@ -83,7 +83,7 @@ TARGETS = {"ZDT1": 0.8700, "ZDT2": 0.5379, "ZDT3": 1.3265, "DTLZ2": 0.7290}
 
 
 RUNS = ("problem", "algorithm", "seed")
-VARIABLES: Columns = {
+VARIABLES: FileVariables = {
     "hypervolume": number(RUNS, "1", "hypervolume of the cut front, reference point 1.1"),
     "igd_plus": number(RUNS, "1", "IGD+ of the cut front against the known front"),
     "evaluations": number(RUNS, "1", "function evaluations used"),

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hpcclear.results.rows import Columns
+from hpcclear.results.rows import FileVariables
 
 
 def by_code(runs: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
@@ -37,7 +37,7 @@ def error_panels(
     return figure, panels
 
 
-def described(values: Mapping[str, np.ndarray], rows: Columns) -> dict[str, xr.Variable]:
+def described(values: Mapping[str, np.ndarray], rows: FileVariables) -> dict[str, xr.Variable]:
     """Variables with the dimensions, units and long names of `rows`; each value has the shape that these ask for."""
     return {
         name: xr.Variable(

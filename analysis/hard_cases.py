@@ -34,7 +34,7 @@ from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.setup.start import start_states
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.dynamics.stepping.lanes import Lanes
-from hpcclear.results.rows import Columns, number
+from hpcclear.results.rows import FileVariables, number
 from hpcclear.scene import Scene, load_scene
 from hpcclear.scene.points import Points
 from hpcclear.scene.scene import record_of
@@ -169,7 +169,7 @@ def uncertainty(scene: Scene) -> float:
 
 
 CASES = ("case", "rtol")
-VARIABLES: Columns = {
+VARIABLES: FileVariables = {
     "objective": number(CASES, "m", "objective f"),
     "objective_spread": number(CASES, "m", "standard deviation of f between revolutions"),
     "objective_uncertainty": number(
