@@ -16,7 +16,7 @@ from hpcclear.ranks.boundary import alone
 from hpcclear.scene import load_scene
 from hpcclear.scene.stages import FEWEST
 from hpcclear.statistics.search import foreign
-from hpcclear.statistics.search.asking import Task, minimise
+from hpcclear.statistics.search.asking import SearchTask, minimise
 from hpcclear.statistics.search.pareto import Front, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.study import run_study
@@ -30,7 +30,7 @@ UNIT = np.array([[0.0, 1.0]] * 6)
 
 def search(name: str, function=dtlz2, seed: int = 1, bounds=UNIT, objectives: int = 3) -> Front:
     rng = np.random.default_rng(seed)
-    task = Task(bounds, objectives, rng, 50, SwarmSettings(particles=40))
+    task = SearchTask(bounds, objectives, rng, 50, SwarmSettings(particles=40))
     return minimise(getattr(foreign, name)(task), function, task, 60)
 
 

@@ -15,7 +15,7 @@ from hpcclear.report.figures import fits
 from hpcclear.scene import load_scene
 from hpcclear.statistics.random.moments import RobustObjective
 from hpcclear.statistics.search import asking
-from hpcclear.statistics.search.asking import Task
+from hpcclear.statistics.search.asking import SearchTask
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.regression import RegressionMethod
@@ -234,8 +234,8 @@ class Fixed:
         self.met.append((designs, objectives, constraints))
 
 
-def task() -> Task:
-    return Task(SQUARE, 2, np.random.default_rng(0), 3, SwarmSettings(particles=4))
+def task() -> SearchTask:
+    return SearchTask(SQUARE, 2, np.random.default_rng(0), 3, SwarmSettings(particles=4))
 
 
 @pytest.mark.parametrize(

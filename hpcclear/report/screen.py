@@ -57,7 +57,7 @@ class Span(NamedTuple):
     """The end that it sits on: "lower", "upper"; "" for none."""
 
 
-class Row(NamedTuple):
+class ScreenRow(NamedTuple):
     """A line of the table of the first screen."""
 
     label: str
@@ -65,7 +65,7 @@ class Row(NamedTuple):
     span: Span | None = None
 
 
-class Bar(NamedTuple):
+class ShareBar(NamedTuple):
     """A share with its half-width."""
 
     label: str
@@ -86,12 +86,12 @@ class Screen:
     tiles: tuple[Tile, ...] = ()
     """At most four."""
     header: tuple[str, ...] = ()
-    rows: tuple[Row, ...] = ()
+    rows: tuple[ScreenRow, ...] = ()
     """header and rows: the table beside, and its heads; the rows' label is the first."""
     remark: str = ""
     """Below the table."""
     trust: tuple[Trust, ...] = ()
-    bars: tuple[Bar, ...] = ()
+    bars: tuple[ShareBar, ...] = ()
     """What the scatter comes from."""
     causes: str = ""
     """What to do about it."""

@@ -97,7 +97,7 @@ class ConsistentTables(SceneTables):
         """What is checked of every linkage, by the entries of its template; a slider with clearance tilts, and rubs at its
         corners."""
         with self._named_as_written():
-            self.linkage._check()
+            self.linkage.check()
         if self.joints.guide is None:
             return
         if self.slider_crank.slider.inertia is None:
@@ -108,7 +108,7 @@ class ConsistentTables(SceneTables):
             )  # fmt: skip
         (guide,) = (joint for joint in self.linkage.joints if isinstance(joint, Guide))
         with self._named_as_written("joints.guide"):
-            guide._check()
+            guide.check()
 
     @contextmanager
     def _named_as_written(self, below: str = "") -> Iterator[None]:

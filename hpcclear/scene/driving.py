@@ -156,7 +156,6 @@ class PlanarTorque(Driving, CrankTorque):
     """Time that replaces the revolution, s, for a body that swings or turns back. Without it the body has to turn."""
 
     def _check(self) -> None:
-        super()._check()
         if by_interval(self) and self.turns != 1:
             raise invalid("interval replaces the turns", "Remove turns", "turns", self.turns)
 

@@ -38,7 +38,6 @@ class ContactTable(LawTable):
         return None if name == SPHERE else name
 
     def _check(self) -> None:
-        super()._check()
         if self.curve is not None and self.geometry is None:
             raise invalid('belongs to geometry = "table"', "Write geometry, or remove it", "curve")
 

@@ -117,11 +117,18 @@ class Table(BaseModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        self._check()
+        self.check()
         return self
 
-    def _check(self) -> None:
-        """An error for validators where entries contradict each other; tables override it."""
+    def check(self) -> None:
+        """An error for validators where entries contradict each other.
+
+        Each class may have a `_check`. All are called, the most general first: a kind adds to what is checked, and cannot
+        replace it.
+        """
+        for kind in reversed(type(self).__mro__):
+            if "_check" in kind.__dict__:
+                kind.__dict__["_check"](self)
 
 
 class Converted:

@@ -192,7 +192,6 @@ class Guide(OfContacts):
     elsewhere: ClassVar = NOT_OF_GUIDES
 
     def _check(self) -> None:
-        super()._check()
         if self.clearance is None:
             return
         if getattr(self, "friction", None) is not None:

@@ -15,13 +15,13 @@ from hpcclear.scene.domain import Box, box, to_physical
 from hpcclear.scene.points import snapped
 from hpcclear.scene.study import Study
 from hpcclear.statistics.search import foreign
-from hpcclear.statistics.search.asking import Search, Task, made, minimise
+from hpcclear.statistics.search.asking import Search, SearchTask, made, minimise
 from hpcclear.statistics.search.pareto import Front, cut, hypervolume
 from hpcclear.statistics.search.settings import SwarmSettings
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study import surrogates
 from hpcclear.study.goals import ends_in_all
-from hpcclear.study.problem import Problem, problem_of
+from hpcclear.study.problem import SwarmProblem, problem_of
 from hpcclear.study.run import Result, StudyRun
 from hpcclear.study.surrogates import method_of
 
@@ -75,10 +75,10 @@ def check(scene: Scene) -> None:
 
 def _begun(
     scene: Scene, region: Box, objectives: int, rng: np.random.Generator
-) -> tuple[Search, Task, str]:
+) -> tuple[Search, SearchTask, str]:
     """The search of a study at its start, what it was made for, and its name."""
     settings = scene.required_study.swarm
-    task = Task(
+    task = SearchTask(
         bounds=np.column_stack([region.lower, region.upper]),
         objectives=objectives,
         rng=rng,
@@ -97,7 +97,7 @@ def _begun(
     return made(maker, name, task), task, name
 
 
-def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
+def _search(run: StudyRun, problem: SwarmProblem, rng: np.random.Generator) -> Front:
     def function(coordinates: Array) -> Array | tuple[Array, Array]:
         run.ranks.raise_if_stopped()
         return problem.searched(problem.physical(coordinates))
@@ -114,7 +114,7 @@ def _search(run: StudyRun, problem: Problem, rng: np.random.Generator) -> Front:
 
 def _minimised(
     run: StudyRun,
-    problem: Problem,
+    problem: SwarmProblem,
     function: Callable[[Array], Array | tuple[Array, Array]],
     objectives: int,
     rng: np.random.Generator,

@@ -33,7 +33,7 @@ them, and for all that is not mean and standard deviation."""
 
 
 @dataclass(frozen=True)
-class Problem:
+class SwarmProblem:
     """What the swarm minimises in one case.
 
     Attributes
@@ -213,7 +213,7 @@ class _Averages:
 
 def problem_of(
     scene: Scene, case: str, model: Piecewise, others: Sequence[Piecewise] = ()
-) -> Problem:
+) -> SwarmProblem:
     """The problem of one case on a surrogate of its objective, and on those of further responses.
 
     A surrogate that is cut into subintervals has no exact rule, nor has one for inputs that vary together or on a kernel
@@ -227,7 +227,7 @@ def problem_of(
     further = tuple(averages.averaged(other, probes, points) for other in others)
     study = scene.required_study
     region = box(scene, averages.names)
-    return Problem(averages.names, region, objective, scene, study.case(case), points, further)
+    return SwarmProblem(averages.names, region, objective, scene, study.case(case), points, further)
 
 
 def _inner(study: Study, row: RandomInput) -> quantiles.Quantiles:

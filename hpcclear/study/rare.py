@@ -47,7 +47,7 @@ class Failing(NamedTuple):
     """What the tolerance takes of it, by pairs of these."""
 
 
-class Found(NamedTuple):
+class FailureEstimate(NamedTuple):
     """What is known of such a probability: by itself, and as one of many."""
 
     own: Limited
@@ -103,7 +103,7 @@ def _replace(true: Result, row: int, one: Limited, names: tuple[str, str], colum
 
 def probabilities(
     run: StudyRun, asked: Sequence[Failing], many: Sequence[int], stage: str, purpose: str
-) -> list[Found]:
+) -> list[FailureEstimate]:
     """Probabilities of designs, each until it is decided as one of `many`, known well enough, or too long."""
     rates = [
         Rare(
@@ -133,7 +133,7 @@ def probabilities(
         ]  # fmt: skip
     _pair(run, asked, rates)
     return [
-        Found(
+        FailureEstimate(
             _interval(its, one, run.study.verification.confidence),
             _interval(its, one, verdicts.level(run.study.verification, number, one.f.size)),
             one.simulations,

@@ -72,7 +72,7 @@ class Models(NamedTuple):
     searched: Piecewise
 
 
-class Found(NamedTuple):
+class SearchOutcome(NamedTuple):
     """What a search ends with: designs to be verified, and remarks on how they were found."""
 
     designs: list[Choice]
@@ -83,7 +83,7 @@ class Verified(NamedTuple):
     """All designs that were simulated, those that are named among them, their moments, and remarks."""
 
     designs: list[Choice]
-    table: verification.Table
+    table: verification.NamedDesigns
     true: Result
     remarks: list[str]
 
@@ -102,7 +102,7 @@ def _surrogates(run: StudyRun) -> Models:
     return Models(kept, models[-1])
 
 
-def _search(run: StudyRun, models: Models) -> Found:
+def _search(run: StudyRun, models: Models) -> SearchOutcome:
     """Fronts by the model, and what simulations of their designs and of others make of them."""
     found = run.stage("optimisation", optimisation.optimise, models.searched)
     ends, between = optimisation.extremes(run, found), optimisation.spread(run, found)
@@ -110,10 +110,12 @@ def _search(run: StudyRun, models: Models) -> Found:
     statistics = by_statistics.applies(run.study, surrogates.checked_r2(run.study, models.kept))
     better, remarks = refinement.search(run, [*ends, *between], statistics)
     designs = better if better and statistics else [*ends, *(better or between)]
-    return Found([*designs, *verification.original(run), *printed_designs(run.scene)], remarks)
+    return SearchOutcome(
+        [*designs, *verification.original(run), *printed_designs(run.scene)], remarks
+    )
 
 
-def _verification(run: StudyRun, models: Models, found: Found) -> Verified:
+def _verification(run: StudyRun, models: Models, found: SearchOutcome) -> Verified:
     true = run.stage("verification", _moments, found.designs)
     table = verification.named(run, found.designs, true)
     true = {name: values[table.rows] for name, values in true.items()}

@@ -66,7 +66,7 @@ def missed(run: StudyRun, choices: Sequence[Choice], true: Result, model: Piecew
 
 
 @dataclass(frozen=True)
-class Table:
+class NamedDesigns:
     """Verified designs under their names.
 
     Attributes
@@ -88,7 +88,7 @@ class Table:
     dominated: list[bool]
 
 
-def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
+def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> NamedDesigns:
     """Verified designs under the names that they have earned.
 
     Of what its case makes small, alpha has the least of the first, beta of the second: mean and standard deviation, if
@@ -96,7 +96,7 @@ def named(run: StudyRun, choices: Sequence[Choice], true: Result) -> Table:
     study's confidence it is the best in the others. Each design of the front is significantly better than each
     other in one of them. They are chosen among the designs that significantly satisfy all constraints, if there are any.
     """
-    table = Table([], [], [], [])
+    table = NamedDesigns([], [], [], [])
     for case in run.study.cases:
         rows = [k for k, choice in enumerate(choices) if choice.case == case.name]
         _name_case(run, case, rows, choices, true, table)
@@ -109,7 +109,7 @@ def _name_case(
     rows: Sequence[int],
     choices: Sequence[Choice],
     true: Result,
-    table: Table,
+    table: NamedDesigns,
 ) -> None:
     count, kept = len(case.goals), case.kept
     values = true["goal"][rows, :count]
@@ -169,7 +169,7 @@ def _on_bounds(run: StudyRun, choice: Choice) -> str:
     return ", ".join(f"{name} {end}" for name, end in zip(names, ends, strict=True) if end)
 
 
-def _goals(run: StudyRun, table: Table, true: Result) -> dict[str, Array]:
+def _goals(run: StudyRun, table: NamedDesigns, true: Result) -> dict[str, Array]:
     """Objectives and constraints of the cases with confidence intervals; empty if all have mean and standard deviation only."""
     if all(case.plain for case in run.study.cases):
         return {}
@@ -227,7 +227,7 @@ def _broken(case: Case, true: Result) -> Array:
     return excess(case.kept, true["goal"][:, count : count + size], true["beyond"][:, :size])
 
 
-def _missed(run: StudyRun, table: Table, true: Result) -> Array:
+def _missed(run: StudyRun, table: NamedDesigns, true: Result) -> Array:
     """Of each design what is known less well than the accuracy of the study, "mean ± 0.4 % (requested 0.2 %)"."""
     accuracy, unit = run.study.wanted, run.scene.objective.unit
     texts = []
@@ -255,7 +255,7 @@ def _missed(run: StudyRun, table: Table, true: Result) -> Array:
 
 def write(
     run: StudyRun,
-    table: Table,
+    table: NamedDesigns,
     true: Result,
     model: Piecewise,
     remarks: Sequence[str],

@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.report import targets
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, folded
+from hpcclear.report.html.markup import Number, PageTable, folded
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results, Variable
 
@@ -24,16 +24,16 @@ def accuracy(content: Content) -> list[object] | None:
     two, here = ["setting", "result"], "Cheapest integrator for an error of f over one revolution"
     tables = [
         _spending(found),
-        Table(
+        PageTable(
             two, _cheapest(found), "Cheapest settings for a standard error of f as a steady mean"
         ),
-        Table(two, advice(found), here),
+        PageTable(two, advice(found), here),
     ]
     measured = f"{found.attrs['repeats']}; f: {found.attrs['motion']}."
     return [*targets.sentences(found), measured, folded("Integration and averaging", tables)]
 
 
-def _spending(found: Results) -> Table:
+def _spending(found: Results) -> PageTable:
     """A row a tolerance."""
     rows: Rows = []
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -50,7 +50,7 @@ def _spending(found: Results) -> Table:
         rows.append([f"{rtol:.0e}", *map(Number, cells)])
     header = ["rtol", "bias of f", "± 2 s.e.", "variance/rev.", "ms/rev.", "error/formula"]
     title = "Steady mean: relative bias and variance of f, and run time, by tolerance"
-    return Table(header, rows, title)
+    return PageTable(header, rows, title)
 
 
 def _known(value: Variable, digits: str) -> str:

@@ -9,7 +9,7 @@ from hpcclear.report import beside
 from hpcclear.report.constraints import worded
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, number
+from hpcclear.report.html.markup import Number, PageTable, number
 from hpcclear.report.merit import is_plain
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
@@ -56,7 +56,7 @@ def table_of(
     shown: Mapping[str, str],
     columns: Sequence[tuple[str, str]],
     caption: str,
-) -> Table:
+) -> PageTable:
     """A row for each design, by its name and what it is called; each column in one unit, empty ones left out."""
     chosen = verified.sel(design=list(shown))
     known = [(v, labels.words(v)) for v in labels.design_variables(chosen)]
@@ -76,7 +76,7 @@ def table_of(
                 continue
             row.append(Number(_cell(chosen.isel(design=k), str(variable.name), scale)))
         rows.append([*row, *_goals(chosen.isel(design=k), asked)])
-    return Table(header, rows, caption)
+    return PageTable(header, rows, caption)
 
 
 def _objectives(verified: Results) -> list[str]:

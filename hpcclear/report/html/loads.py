@@ -8,7 +8,7 @@ from hpcclear.base.outcome import Regime, Status
 from hpcclear.report import bearings, noise
 from hpcclear.report.figures import labels, motion
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, quantity
+from hpcclear.report.html.markup import Number, PageTable, quantity
 from hpcclear.report.merit import recommended
 from hpcclear.report.parts import SectionOf
 from hpcclear.report.screens.response import half_width
@@ -71,7 +71,7 @@ def _remarks(shown: Mapping[str, Results]) -> list[str]:
     return [f"{label}{of(names)}: {text}." for (label, text), names in found.items()]
 
 
-def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
+def _bearings(found: dict[str, list[bearings.Bearing]]) -> PageTable:
     """The bearings of all responses; a column of pressures where the length of a bearing is known."""
     header: list[object] = [
         "response", "joint", "peak force", "at crank angle", "mean force", "contact", "mean gap",
@@ -86,10 +86,10 @@ def _bearings(found: dict[str, list[bearings.Bearing]]) -> Table:
     return _table(header, rows, "Bearings, over the averaged revolutions")
 
 
-def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: str) -> Table:
+def _table(header: Sequence[object], rows: Sequence[Sequence[object]], caption: str) -> PageTable:
     """A table of responses; a single response is not named."""
     first = 0 if len({row[0] for row in rows}) > 1 else 1
-    return Table(header[first:], [row[first:] for row in rows], caption)
+    return PageTable(header[first:], [row[first:] for row in rows], caption)
 
 
 def _title(name: str) -> str:

@@ -21,7 +21,7 @@ class Number(str):
     """A number made readable; tables align it right."""
 
 
-class Table:
+class PageTable:
     """A table: texts, `Number` and badges (``kind``, ``words``) in rows, the first a heading."""
 
     def __init__(

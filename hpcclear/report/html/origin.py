@@ -3,7 +3,7 @@
 import numpy as np
 
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, download, number, preformatted
+from hpcclear.report.html.markup import Number, PageTable, download, number, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
 
@@ -36,7 +36,7 @@ def timing(content: Content) -> list[object] | None:
         rows.append(row)
     header = ["rank", "computing (s)", "waiting (s)", "compiling (s)", "writing (s)", "computing"]
     header += ["samples"] if "samples" in found else []
-    return [*_fared(content, found), Table(header, rows, "Time of each rank, all stages")]
+    return [*_fared(content, found), PageTable(header, rows, "Time of each rank, all stages")]
 
 
 def _fared(content: Content, found: Results) -> list[object]:
@@ -81,7 +81,7 @@ def reproduce(content: Content) -> list[object]:
         if content.attribute(name)
     ]
     if rows:
-        steps += [words, Table(["item", "value"], rows, "Origin of these files")]
+        steps += [words, PageTable(["item", "value"], rows, "Origin of these files")]
     return steps
 
 

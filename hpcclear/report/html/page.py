@@ -14,7 +14,7 @@ from hpcclear.report.answer import answer
 from hpcclear.report.html import gallery, picture
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
-from hpcclear.report.html.markup import Table, render
+from hpcclear.report.html.markup import PageTable, render
 from hpcclear.report.parts import SectionOf, declared
 from hpcclear.report.screen import Screen
 from hpcclear.report.screens import screen_of
@@ -200,7 +200,7 @@ _OPENED = ("contributions", "tighten first", "next steps", "warning", "negligibl
 def _further(content: Content) -> list[object] | None:
     """What else is known of the recommended design of a study, in lines."""
     rows = [[one.label, one.text] for one in answer(content.files, "") if one.label not in _OPENED]
-    return [Table(["subject", "result"], rows, "Recommended design")] if rows else None
+    return [PageTable(["subject", "result"], rows, "Recommended design")] if rows else None
 
 
 PARTS = (SectionOf(10, "designs", "answer", "Recommended design", _further),)

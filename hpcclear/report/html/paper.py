@@ -6,7 +6,7 @@ from hpcclear.report import beside
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.designs import SIMULATED, names_in, table_of
-from hpcclear.report.html.markup import Number, Table, number
+from hpcclear.report.html.markup import Number, PageTable, number
 from hpcclear.report.parts import SectionOf
 
 _BADGES = {
@@ -40,7 +40,7 @@ def readings(content: Content) -> list[object] | None:
         "Mean of f of the paper's own designs, by how its text is read; the distance is the root mean square of "
         "ln(mean / printed mean)."
     )
-    return [words, Table(header, rows, "Effect of ambiguities in the paper")]
+    return [words, PageTable(header, rows, "Effect of ambiguities in the paper")]
 
 
 def claims(content: Content) -> list[object] | None:
@@ -60,7 +60,7 @@ def claims(content: Content) -> list[object] | None:
         badge = _BADGES[Verdict(int(one["verdict"]))]
         rows.append([f"{int(one['claim'])}. {one['text'].item()}", badge])
     title = "Claims of the paper, tested on this data; claims.nc has the numbers that decide"
-    return [held, Table(["claim", "verdict"], rows, title)]
+    return [held, PageTable(["claim", "verdict"], rows, title)]
 
 
 def designs_of_a_paper(content: Content) -> list[object]:

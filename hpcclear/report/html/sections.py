@@ -11,7 +11,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.report import failures, identified, spread
 from hpcclear.report.figures import effects, labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Number, Table, preformatted
+from hpcclear.report.html.markup import Number, PageTable, preformatted
 from hpcclear.report.parts import SectionOf
 from hpcclear.results.content import Results
 from hpcclear.scene.loading import parse, scene_of_text
@@ -34,7 +34,7 @@ def screened(content: Content) -> list[object] | None:
     ]
 
 
-def _changes(found: Results, seconds: effects.Times) -> Table:
+def _changes(found: Results, seconds: effects.Times) -> PageTable:
     """A row a variant: what is off, changes with confidence intervals, time, verdict."""
     shown = [
         k
@@ -51,7 +51,7 @@ def _changes(found: Results, seconds: effects.Times) -> Table:
         verdict = ("yes", "no", "?")[int(one["decision"])]
         saved = effects.saving(found, k, seconds).words
         rows.append([effects.label(effects.named(found, k)), *map(Number, cells), saved, verdict])
-    return Table(header, rows, "Changes with effects disabled, against all enabled")
+    return PageTable(header, rows, "Changes with effects disabled, against all enabled")
 
 
 def _changed(found: Results) -> str:
@@ -77,7 +77,7 @@ def identified_machine(content: Content) -> list[object] | None:
     if found is None:
         return None
     rows = [[line.label, line.text] for line in identified.lines(found)]
-    table = Table(["quantity", "result"], rows, "Unknowns of the machine")
+    table = PageTable(["quantity", "result"], rows, "Unknowns of the machine")
     return [table, *(f"Warning: {text}." for text in identified.warnings(found))]
 
 
@@ -88,7 +88,7 @@ def statistics(content: Content) -> list[object] | None:
         return None
     lines = spread.statistics(samples, _thresholds(samples))
     rows = [[line.label, line.text] for line in [*lines, *spread.in_time(samples)]]
-    table = Table(
+    table = PageTable(
         ["quantity", "95 % confidence interval in brackets"], rows, "Statistics of the samples"
     )
     warnings = [f"Warning: {text}." for text in spread.remarks(samples)]
@@ -102,7 +102,7 @@ def compared(content: Content) -> list[object] | None:
     every = {name: own["samples"] for name, own in content.samples.items()}
     rows = spread.rows_of(spread.side_by_side(every))
     caption = "Statistics of the samples, with 95 % confidence intervals"
-    return [Table(["quantity", *content.samples], rows, caption)]
+    return [PageTable(["quantity", *content.samples], rows, caption)]
 
 
 def _thresholds(samples: Results) -> list[spread.Beyond]:
@@ -144,10 +144,10 @@ def trust(content: Content) -> list[object] | None:
             marked.append([flag.name.lower(), Number(len(hit)), words, which])
     heads = ["outcome", "samples", "what happened", "where", "what to change", "which"]
     return [
-        Table(heads, failed, "Samples that failed; their numbers are missing, never 0")
+        PageTable(heads, failed, "Samples that failed; their numbers are missing, never 0")
         if failed
         else "No sample failed.",
-        Table(["flag", "samples", "why", "which"], marked, "Valid results to be read with care")
+        PageTable(["flag", "samples", "why", "which"], marked, "Valid results to be read with care")
         if marked
         else "No sample carries a warning.",
     ]

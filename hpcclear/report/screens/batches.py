@@ -8,7 +8,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.report import failures, spread
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
 from hpcclear.results.content import Results
 
 MOST = 0.5
@@ -28,7 +28,7 @@ def compared(content: Content) -> Screen | None:
     return Screen(
         f"{len(every)} files of samples, beside each other",
         header=("quantity", *every),
-        rows=tuple(Row(label, tuple(cells)) for label, *cells in rows),
+        rows=tuple(ScreenRow(label, tuple(cells)) for label, *cells in rows),
         trust=trusted(dict.fromkeys(worries)),
     )
 
@@ -61,7 +61,7 @@ def samples(content: Content) -> Screen | None:
     else:
         headline = f"f = {labels.quantity(float(np.nanmean(f)), unit)}"
     rows = [
-        Row(line.label, (line.text.partition(" (")[0], _interval(line)))
+        ScreenRow(line.label, (line.text.partition(" (")[0], _interval(line)))
         for line in shown.values()
         if line.label.startswith("P95 peak") or line.label.startswith("P99")
     ]
@@ -70,7 +70,7 @@ def samples(content: Content) -> Screen | None:
             labels.quantity(float(np.nanmin(f)), unit),
             labels.quantity(float(np.nanmax(f)), unit),
         )
-        rows.insert(0, Row("range of f", (" to ".join(ends), "")))
+        rows.insert(0, ScreenRow("range of f", (" to ".join(ends), "")))
     share = _share(found, Flag.BEYOND_HERTZ)
     return Screen(
         headline,
@@ -176,7 +176,7 @@ def map_of_motion(content: Content) -> Screen | None:
                 "quality",
             )
         )
-    rows = tuple(Row(regime.meaning, (f"{n}",)) for regime, n in kinds)
+    rows = tuple(ScreenRow(regime.meaning, (f"{n}",)) for regime, n in kinds)
     return Screen(
         headline, (f"{cells} cells over {axes}", f"f: {labels.objective(found)}"),
         "the contact model is outside its range" if share > MOST else "",

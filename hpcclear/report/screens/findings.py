@@ -9,7 +9,7 @@ from hpcclear.report import identified, targets
 from hpcclear.report.figures import effects as screening
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
 from hpcclear.results.content import Results
 
 
@@ -41,7 +41,9 @@ def machine(content: Content) -> Screen | None:
         Tile(label, text.partition(" (")[0], within=text.partition(" (")[2].rstrip(")"))
         for label, text in unknown
     ]
-    rows = tuple(Row(line.label, (line.text,)) for line in lines if line.label != "calibration")
+    rows = tuple(
+        ScreenRow(line.label, (line.text,)) for line in lines if line.label != "calibration"
+    )
     return Screen(
         headline,
         (f"measured records: {found.sizes['record']}",) if known else (),
@@ -79,7 +81,7 @@ def effects(content: Content) -> Screen | None:
     )
     verdicts = ("yes", "no", "undecided")
     rows = tuple(
-        Row(
+        ScreenRow(
             screening.label(screening.named(found, k)),
             (
                 screening.shown(float(found["change"][k, 0]), float(found["limit"][k, 0])),
@@ -122,14 +124,14 @@ def accuracy(content: Content) -> Screen | None:
     own = targets.settings(found)
     ways = [(target, targets.cheapest(found, target)) for target in targets.TARGETS]
     rows = [
-        Row(
+        ScreenRow(
             f"error of {100 * target:g} %",
             ("not reached", "") if way is None else (way.words, targets.seconds(way.seconds)),
         )
         for target, way in ways
     ]
     if own is not None:
-        rows.append(Row("your settings", (own.words, targets.seconds(own.seconds))))
+        rows.append(ScreenRow("your settings", (own.words, targets.seconds(own.seconds))))
         headline = f"Your settings: error of f at most {100 * own.error:.2g} %, {targets.seconds(own.seconds)} per design"
     else:
         reached = [(target, way) for target, way in ways if way is not None]

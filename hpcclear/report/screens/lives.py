@@ -8,9 +8,9 @@ from hpcclear.base.arrays import Booleans
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures.labels import quantity
 from hpcclear.report.html.content import Content
-from hpcclear.report.html.markup import Table
+from hpcclear.report.html.markup import PageTable
 from hpcclear.report.parts import SectionOf
-from hpcclear.report.screen import Bar, Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.report.screen import Level, Screen, ScreenRow, ShareBar, Tile, Trust, trusted
 from hpcclear.results.content import Results
 from hpcclear.statistics.random.survival import fewest, order_interval, quantiles
 
@@ -36,8 +36,8 @@ def screen(content: Content) -> Screen | None:
     if not followed(lives).any():
         failed = (Trust(Level.RED, text, "lives") for text in _failed(lives))
         return Screen("Every service life failed", trust=trusted(failed))
-    rows = tuple(Row(name, tuple(cells)) for name, *cells in _clearances(lives))
-    causes = [Bar(f"{name}, {joint}", share, np.nan) for joint, name, share in _inputs(lives)]
+    rows = tuple(ScreenRow(name, tuple(cells)) for name, *cells in _clearances(lives))
+    causes = [ShareBar(f"{name}, {joint}", share, np.nan) for joint, name, share in _inputs(lives)]
     named = ", ".join(f"{one.label} {one.share:.2f}" for one in causes)
     return Screen(
         _headline(lives),
@@ -179,7 +179,7 @@ def section(content: Content) -> list[object] | None:
     for joint, name, share in _inputs(lives):
         word = "dominant" if share >= DOMINATES else "largest"
         rows.append([f"{word} input, {joint}", f"{name}, squared rank correlation {share:.2f}"])
-    return [Table(["quantity", "result"], rows, "Service lives")]
+    return [PageTable(["quantity", "result"], rows, "Service lives")]
 
 
 def _clearances(lives: Results) -> list[tuple[str, str, str, str]]:

@@ -8,7 +8,7 @@ from hpcclear.base.outcome import Flag, Regime, Status
 from hpcclear.report import bearings
 from hpcclear.report.figures import labels
 from hpcclear.report.html.content import Content
-from hpcclear.report.screen import Level, Row, Screen, Tile, Trust, trusted
+from hpcclear.report.screen import Level, Screen, ScreenRow, Tile, Trust, trusted
 from hpcclear.results.content import Results
 
 
@@ -41,7 +41,7 @@ def screen(content: Content) -> Screen | None:
         tuple(tiles),
         header if loads else (),
         tuple(
-            Row(
+            ScreenRow(
                 bearings.named(one.joint),
                 (
                     labels.quantity(one.peak, "N"),

@@ -25,10 +25,10 @@ from hpcclear.report.merit import (
 )
 from hpcclear.report.parts import Recommended
 from hpcclear.report.screen import (
-    Bar,
     Level,
-    Row,
     Screen,
+    ScreenRow,
+    ShareBar,
     Span,
     Tile,
     Trust,
@@ -197,7 +197,7 @@ def _constraints(best: Results) -> Iterator[Results]:
         yield from (own for own in every if int(own["constraint_verdict"]) != ABSENT)
 
 
-def _rows(best: Results, base: Results | None) -> Iterator[Row]:
+def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
     """Design variables, with their place in the ranges of the study."""
     spans = _spans(best, base)
     for one in labels.design_variables(best):
@@ -208,7 +208,7 @@ def _rows(best: Results, base: Results | None) -> Iterator[Row]:
         words = re.split(", from | about ", str(one.attrs.get("long_name", "")))[0]
         label = short if words in ("", short) else words if "." in short else f"{short}, {words}"
         before = () if base is None else (labels.value(base[name]),)
-        yield Row(label, (*before, labels.value(one)), spans.get(name))
+        yield ScreenRow(label, (*before, labels.value(one)), spans.get(name))
 
 
 def _spans(best: Results, base: Results | None) -> dict[str, Span]:
@@ -238,7 +238,7 @@ def _spans(best: Results, base: Results | None) -> dict[str, Span]:
     }
 
 
-def _remark(of: Recommended, rows: tuple[Row, ...]) -> str:
+def _remark(of: Recommended, rows: tuple[ScreenRow, ...]) -> str:
     found = []
     if any(row.span and row.span.bound for row in rows):
         found.append("Orange: active bound.")
@@ -336,18 +336,18 @@ def _failures(of: Recommended) -> Iterator[Trust]:
         yield Trust(Level.GREEN, "No simulation failed", "quality")
 
 
-def _bars(of: Recommended) -> tuple[list[Bar], str]:
+def _bars(of: Recommended) -> tuple[list[ShareBar], str]:
     """Contributions to the variance of the recommended design; where these are not known, total Sobol indices."""
     own, found = of.of_best("contributions"), of.files.get("sensitivity")
     if own is not None and np.isfinite(own["contribution"].to_numpy()).any():
-        return list(map(Bar._make, scatter.shares(own))), "".join(scatter.tighten(own))
+        return list(map(ShareBar._make, scatter.shares(own))), "".join(scatter.tighten(own))
     if found is not None and "sobol_total" in found:
         rows = zip(
             *(found[name].to_numpy() for name in ("parameter", "sobol_total", "sobol_total_error")),
             strict=True,
         )
         bars = [
-            Bar(str(n), float(v), scatter.HALF_WIDTH * float(e))
+            ShareBar(str(n), float(v), scatter.HALF_WIDTH * float(e))
             for n, v, e in rows
             if np.isfinite(v)
         ]

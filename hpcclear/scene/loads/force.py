@@ -41,7 +41,6 @@ class ForceLoad(SizedLoad):
     unit: ClassVar[str] = "N"
 
     def _check(self) -> None:
-        super()._check()
         force = None if self.force is None else [self.force.x, self.force.y]
         size = self.size if self.size is not None else self.size_by_time
         check_one_of("force", force, size, "Write force = [x, y], or size and direction")

@@ -24,7 +24,6 @@ class TorqueLoad(SizedLoad):
     unit: ClassVar[str] = "N*m"
 
     def _check(self) -> None:
-        super()._check()
         remedy = "Write torque, or torque_by_time = [[time, torque], ...]"
         check_one_of("torque", self.torque, self.torque_by_time, remedy)
 

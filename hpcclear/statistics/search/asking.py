@@ -27,7 +27,7 @@ Function = Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
 
 
 @dataclass(frozen=True)
-class Task:
+class SearchTask:
     """What a search is made for.
 
     Attributes
@@ -71,7 +71,7 @@ class Search(Protocol):
         """Take objectives (n, m), not finite where they failed, and total violations (n,), 0 where no constraint is broken."""
 
 
-def made(maker: Callable[[Task], Any], name: str, task: Task) -> Search:
+def made(maker: Callable[[SearchTask], Any], name: str, task: SearchTask) -> Search:
     """The search of a name.
 
     Raises
@@ -92,7 +92,9 @@ def made(maker: Callable[[Task], Any], name: str, task: Task) -> Search:
     return search
 
 
-def minimise(search: Search, function: Function, task: Task, size: int, name: str = "") -> Front:
+def minimise(
+    search: Search, function: Function, task: SearchTask, size: int, name: str = ""
+) -> Front:
     """Carry out a search.
 
     Parameters
@@ -128,7 +130,7 @@ def minimise(search: Search, function: Function, task: Task, size: int, name: st
 class _Met:
     """What a search has met."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: SearchTask) -> None:
         self.task, self.objectives = task, task.objectives
         nothing = np.empty((0, len(task.bounds))), np.empty((0, task.objectives))
         self.archive = Archive(task.settings.archive_capacity, *nothing)

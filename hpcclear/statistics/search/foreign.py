@@ -19,7 +19,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.extras import installing
-from hpcclear.statistics.search.asking import KEY, Task
+from hpcclear.statistics.search.asking import KEY, SearchTask
 
 ALGORITHMS = {
     "AGEMOEA": "age",
@@ -43,7 +43,7 @@ UNKNOWN = 1e30
 """Violation of a design whose objectives are not finite."""
 
 
-def __getattr__(name: str) -> Callable[[Task], "Pymoo"]:
+def __getattr__(name: str) -> Callable[[SearchTask], "Pymoo"]:
     """The maker of an algorithm of pymoo, by its name: what the registry of searches finds here."""
     if name not in ALGORITHMS:
         raise AttributeError(name)
@@ -61,7 +61,7 @@ class Pymoo:
         The algorithm's seed is drawn from its generator.
     """
 
-    def __init__(self, algorithm: Any, task: Task) -> None:
+    def __init__(self, algorithm: Any, task: SearchTask) -> None:
         from pymoo.core.problem import Problem
 
         shape = {"n_var": len(task.bounds), "n_obj": task.objectives, "n_ieq_constr": 1}
@@ -103,12 +103,12 @@ def is_algorithm(source: object) -> bool:
     return all(hasattr(source, name) for name in ("setup", "ask", "tell"))
 
 
-def adapted(source: object, task: Task) -> Pymoo:
+def adapted(source: object, task: SearchTask) -> Pymoo:
     """The search of an algorithm of pymoo, or of a class of them that needs no arguments."""
     return Pymoo(source() if isinstance(source, type) else copy.deepcopy(source), task)
 
 
-def _begun(name: str, task: Task) -> Pymoo:
+def _begun(name: str, task: SearchTask) -> Pymoo:
     """An algorithm with its own settings."""
     try:
         importlib.import_module("pymoo")

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
 from hpcclear.statistics.search import asking, children
-from hpcclear.statistics.search.asking import Function, Task
+from hpcclear.statistics.search.asking import Function, SearchTask
 from hpcclear.statistics.search.pareto import Archive, Front
 from hpcclear.statistics.search.settings import SwarmSettings
 
@@ -168,7 +168,7 @@ class ParticleSwarm:
         self._positions[chosen] = born
 
 
-def swarm(task: Task) -> ParticleSwarm:
+def swarm(task: SearchTask) -> ParticleSwarm:
     """The swarm of a task."""
     return ParticleSwarm(task.bounds, task.iterations, task.rng, settings=task.settings)
 
@@ -186,5 +186,5 @@ def minimise(
     """Run a swarm to its end (`hpcclear.statistics.search.asking.minimise`); other parameters and errors: `ParticleSwarm`."""
     settings = SwarmSettings() if settings is None else settings
     search = ParticleSwarm(bounds, iterations, rng, settings=settings, start=start)
-    task = Task(np.array(bounds, dtype=float), 0, rng, iterations, settings)
+    task = SearchTask(np.array(bounds, dtype=float), 0, rng, iterations, settings)
     return asking.minimise(search, function, task, size)
