@@ -508,3 +508,18 @@ def test_the_accuracy_of_a_study_is_read_where_verification_had_it() -> None:
     whole["study"]["accuracy"] = asked
     with pytest.raises(InputError, match=r"stands in \[study\] already"):
         load_scene(whole)
+
+
+def test_a_kind_adds_to_what_is_checked_of_its_kind() -> None:
+    called = []
+
+    class Kind(Table):
+        def _check(self) -> None:
+            called.append("kind")
+
+    class Special(Kind):
+        def _check(self) -> None:
+            called.append("special")
+
+    Special.model_validate({})
+    assert called == ["kind", "special"]

@@ -192,7 +192,7 @@ def _note(context: click.Context, option: click.Parameter, given: bool) -> None:
 
 
 def detailed() -> bool:
-    """Whether the user asked for all results; not outside of a command."""
+    """Whether all results are requested; not outside of a command."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(DETAILED))
 

@@ -34,7 +34,7 @@ def describe(
 ) -> None:
     """Print the first screen of results, then the files that were written.
 
-    `asked`: lines that the user asked for besides. `details`: whether all sections of the page follow; by default as the option
+    `asked`: further lines that were requested. `details`: whether all sections of the page follow; by default as the option
     ``--details`` says.
     """
     out = console()
@@ -77,7 +77,7 @@ def describe_response(response: Results, output: Path, details: bool | None = No
 
 
 def fitted(first: Screen, most: int) -> list[Text]:
-    """Return a first screen in at most so many lines: rows of the table go first, then what is surely right, then advice."""
+    """Return a first screen in at most so many lines: rows of the table go first, then green lines, then advice."""
     rows, trust, steps = len(first.rows), len(first.trust), min(len(first.steps), 2)
     while True:
         lines = list(_lines(first, rows, trust, steps))
@@ -129,7 +129,7 @@ def _lines(first: Screen, rows: int, trust: int, steps: int) -> Iterator[Text]:
         )
         yield from (Text(" " * 14 + line) for line in lines[1:])
     for label, text in (("scatter", first.causes), ("note", first.remark)):
-        yield from _labelled(label, text.replace("Orange: active bound.", "").strip())
+        yield from _labelled(label, text)
     for k, text in enumerate(first.steps[:steps]):
         yield from _labelled("" if k else "next", text)
 

@@ -116,7 +116,7 @@ def percent(share: float) -> str:
 
 
 def change(after: Sequence[float], before: Sequence[float]) -> tuple[str, bool | None]:
-    """Return a change in words, and whether it is surely downwards (None: undecided), of values with ends of their intervals.
+    """Return a change in words, and whether it is significantly downwards (None: undecided), of values with their intervals.
 
     The interval is that of independent estimates, which is no narrower than that of simulations at common random numbers.
     """

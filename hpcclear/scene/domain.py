@@ -5,7 +5,7 @@ as r = I / (m L^2/12), because its bounds depend on the mass.
 """
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,9 @@ from hpcclear.scene.planar import slender_inertia
 from hpcclear.scene.study import Study
 from hpcclear.scene.tables import SceneTables
 from hpcclear.scene.variables import StudyVariable
+
+ON_BOUND = 5e-3
+"""Share of a variable's range within which a design sits on its bound."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,18 @@ def box(scene: SceneTables, names: Sequence[str] | None = None, widen: Iterable[
     lower, upper = (np.array(side, dtype=np.float64) for side in zip(*bounds, strict=True))
     lower.flags.writeable = upper.flags.writeable = False
     return Box(chosen, lower, upper)
+
+
+def shares(scene: SceneTables, design: Mapping[str, float]) -> Array:
+    """Where the variables of a design lie in their ranges, from 0 to 1, shape (d,); raises InputError as `box`."""
+    names, region = tuple(design), box(scene, tuple(design))
+    at = to_coordinates(scene, names, np.array([list(design.values())]))[0]
+    return np.asarray((at - region.lower) / (region.upper - region.lower))
+
+
+def bound_at(share: float) -> str:
+    """The bound on which a variable sits at this share of its range: "lower", "upper", or ""."""
+    return "lower" if abs(share) < ON_BOUND else "upper" if abs(share - 1.0) < ON_BOUND else ""
 
 
 def _reaches(study: Study, widen: Iterable[str]) -> dict[str, tuple[float, float]]:

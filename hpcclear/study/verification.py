@@ -11,7 +11,7 @@ from hpcclear.base.verdict import Verdict, best, together
 from hpcclear.report.constraints import ABSENT
 from hpcclear.results import dataset
 from hpcclear.scene.cases import Case
-from hpcclear.scene.domain import box, to_coordinates
+from hpcclear.scene.domain import bound_at, shares
 from hpcclear.statistics.search.certainty import Compared
 from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.study.goals import excess, most_of, names_of, wanted
@@ -21,9 +21,6 @@ from hpcclear.study.run import Result, StudyRun
 
 ROUND_OFF = 1.0001
 """Half-width over the one requested up to which an accuracy is reached."""
-
-ON_BOUND = 5e-3
-"""Share of a variable's range within which a design sits on its bound."""
 
 
 def original(run: StudyRun) -> list[Choice]:
@@ -157,16 +154,8 @@ def _nearest(rows: Sequence[int], verdicts: Sequence[Verdict], broken: Array) ->
 
 def _on_bounds(run: StudyRun, choice: Choice) -> str:
     """Variables of a design that sit on a bound, and on which: "m2 lower, u2 upper"."""
-    names = tuple(choice.design)
-    region = box(run.scene, names)
-    values = np.array([list(choice.design.values())])
-    place = (to_coordinates(run.scene, names, values)[0] - region.lower) / (
-        region.upper - region.lower
-    )
-    ends = np.where(
-        abs(place) < ON_BOUND, "lower", np.where(abs(place - 1) < ON_BOUND, "upper", "")
-    )
-    return ", ".join(f"{name} {end}" for name, end in zip(names, ends, strict=True) if end)
+    ends = map(bound_at, shares(run.scene, choice.design))
+    return ", ".join(f"{name} {end}" for name, end in zip(choice.design, ends, strict=True) if end)
 
 
 def _goals(run: StudyRun, table: NamedDesigns, true: Result) -> dict[str, Array]:

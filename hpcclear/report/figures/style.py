@@ -186,7 +186,7 @@ def grid(rows: int, columns: int, height: float, **options: object) -> "tuple[Fi
 
 
 def settle(axes: "Sequence[Axes] | np.ndarray") -> None:
-    """Fix tick sizes now (matplotlib makes ticks late, by then the style is gone) and thin them, by the room of each panel."""
+    """Fix tick sizes now (matplotlib makes ticks late, by then the style is gone) and thin them, by the size of each panel."""
     for axis in np.ravel(np.asarray(axes, dtype=object)):
         for one in (axis, *axis.child_axes):
             one.tick_params(labelsize=SMALL, length=2.0, pad=2.0)

@@ -39,7 +39,7 @@ from hpcclear.report.screen import (
     within,
 )
 from hpcclear.results.content import Results
-from hpcclear.scene.domain import box, to_coordinates
+from hpcclear.scene.domain import bound_at, shares
 from hpcclear.scene.loading import scene_of_text
 
 MOST = 0.5
@@ -77,7 +77,7 @@ def screen(content: Content) -> Screen | None:
         tuple(tiles),
         ("design", *(("today",) if base is not None and not kept else ()), column),
         rows,
-        _remark(of, rows),
+        _remark(of),
         trusted(_trust(of)),
         tuple(bars),
         causes,
@@ -213,42 +213,32 @@ def _rows(best: Results, base: Results | None) -> Iterator[ScreenRow]:
 
 def _spans(best: Results, base: Results | None) -> dict[str, Span]:
     """Where the variables of a design lie in their ranges, by name; none where the scene does not say."""
-    active = str(best["on_bounds"].item()) if "on_bounds" in best else ""
-    ends = dict(part.rsplit(" ", 1) for part in active.split(", ") if part)
     try:
         scene = scene_of_text(str(best.attrs.get("scene", "")), "scene")
         known = scene.study.names if scene.study is not None else ()
-        names = [
-            str(v.name)
-            for v in labels.design_variables(best)
-            if str(v.name) in known and np.isfinite(float(v))
+        designs = [
+            {
+                name: float(one[name])
+                for v in labels.design_variables(best)
+                if (name := str(v.name)) in known and np.isfinite(float(v))
+            }
+            for one in (best if base is None else base, best)
         ]
-        region = box(scene, names)
-        designs = [best if base is None else base, best]
-        values = np.array([[float(one[name]) for name in names] for one in designs])
-        places = (to_coordinates(scene, names, values) - region.lower) / (
-            region.upper - region.lower
-        )
+        before, after = (np.clip(shares(scene, design), 0.0, 1.0) for design in designs)
     except InputError:
         return {}
-    low, high = np.clip(places, 0.0, 1.0)
     return {
-        name: Span(float(low[k]), float(high[k]), ends.get(name, ""))
-        for k, name in enumerate(names)
+        name: Span(float(low), float(high), bound_at(high))
+        for name, low, high in zip(designs[0], before, after, strict=True)
     }
 
 
-def _remark(of: Recommended, rows: tuple[ScreenRow, ...]) -> str:
-    found = []
-    if any(row.span and row.span.bound for row in rows):
-        found.append("Orange: active bound.")
+def _remark(of: Recommended) -> str:
+    """Whether other designs are as good."""
     twins = alike.others(of.ours, of.best)
-    if twins:
-        spans = alike.spans(of.ours, of.best, twins)
-        found.append(
-            f"{len(twins) + 1} equivalent designs{spans and f' ({spans})'}: choose by cost."
-        )
-    return " ".join(found)
+    spans = alike.spans(of.ours, of.best, twins) if twins else ""
+    more = spans and f" ({spans})"
+    return f"{len(twins) + 1} equivalent designs{more}: choose by cost." if twins else ""
 
 
 def _missed(best: Results) -> str:
