@@ -22,17 +22,9 @@ import matplotlib
 import numpy as np
 import xarray as xr
 from many_ranks import fitted
-from scaling_model import (
-    POLICIES,
-    WORK,
-    Costs,
-    Outcome,
-    simulate,
-    simulate_sums,
-)
+from scaling_model import POLICIES, WORK, Costs, Outcome, simulate
 
 from hpcclear.base.outcome import OUTCOME
-from hpcclear.ensemble.parts import part_length
 from hpcclear.ranks.schedule import HandOut, Need
 from hpcclear.results.provenance import provenance
 
@@ -40,7 +32,6 @@ LANES = 32
 RANKS = (2, 8, 32, 100, 300, 1000, 3000, 10_000, 100_000)
 LONGER = {"measured samples": 1, "10 times as long": 10, "100 times as long": 100}
 LIMIT = 0.9
-SUMS = "sums"
 
 
 # ---- measurements ------------------------------------------------------------------------------------
@@ -119,31 +110,6 @@ def handed_cost() -> float:
     return seconds_each(hand_out, 200, 500)
 
 
-def partial_cost() -> float:
-    """Seconds of root for a part of a block that arrives summed up: unpickled and merged."""
-    from hpcclear.ensemble.parts import packed, partial_of, unpacked
-    from hpcclear.statistics.streams.accumulator import Accumulator
-    from hpcclear.statistics.streams.summary import summarise
-
-    blocks, length = 40, 512
-    sums = Accumulator((blocks + 1) * 4096)
-    sums.part = length
-    records = np.zeros(4096, OUTCOME)
-    records["sample"] = np.arange(4096)
-    records["objective"] = np.random.default_rng(1).random(4096)
-    sums.add(records)
-    edges = sums.edges
-    assert edges is not None  # block 0 is in
-    one = summarise(records[:length], edges, length)
-    firsts, kind = sums.parts_left(), partial_of(OUTCOME)
-    messages = [pickle.dumps(packed(kind, k, one)) for k in range(len(firsts))]
-    started = time.process_time()
-    for message in messages:
-        for record in pickle.loads(message):  # made a moment ago, in this process
-            sums.add_part(int(firsts[record["sample"]]), length, unpacked(record))
-    return (time.process_time() - started) / len(messages)
-
-
 def start_up() -> float:
     """Seconds from the start of a process to its first finished simulation, compiled code on disk."""
     program = (
@@ -171,7 +137,6 @@ def measure(samples: int) -> Costs:
         message=message,
         record=max(line.sample - handed, 0.0),
         handed=handed,
-        partial=partial_cost(),
         start=start_up(),
         batch=max(line.message - message, 0.0),
     )
@@ -182,15 +147,14 @@ def measure(samples: int) -> Costs:
 
 def model(costs: Costs, ranks: tuple[int, ...], seed: int = 1) -> xr.Dataset:
     """Every policy on every number of ranks, for samples as measured and for longer ones."""
-    names = [*POLICIES, SUMS]
+    names = list(POLICIES)
     shape = (len(LONGER), len(names), len(ranks))
     table = {name: np.full(shape, np.nan) for name in Outcome._fields}
     for a, longer in enumerate(LONGER.values()):
         chosen = costs._replace(samples=costs.samples * longer)
         for b, name in enumerate(names):
             for c, count in enumerate(ranks):
-                run = simulate_sums if name == SUMS else simulate
-                found = run(chosen, count, POLICIES.get(name, POLICIES["package"]), seed=seed)
+                found = simulate(chosen, count, POLICIES[name], seed=seed)
                 for key, value in found._asdict().items():
                     table[key][a, b, c] = value
     dims = ("samples", "policy", "ranks")
@@ -225,9 +189,7 @@ def draw(data: xr.Dataset, path: Path) -> None:
 
     figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.0), sharey=True, layout="constrained")
     for axis, length in zip(axes, data["samples"].values, strict=True):
-        for style, policy in zip(
-            ("-o", "-s", "-^", "-v", "-D"), data["policy"].values, strict=True
-        ):
+        for style, policy in zip(("-o", "-s", "-^", "-v"), data["policy"].values, strict=True):
             shown = data["efficiency"].sel(samples=length, policy=policy)
             axis.plot(data["ranks"], shown, style, markersize=3, linewidth=1, label=policy)
         start = WORK / (WORK + data["cost_start"].item())
@@ -241,34 +203,25 @@ def draw(data: xr.Dataset, path: Path) -> None:
     figure.savefig(path, dpi=200)
 
 
-def bottleneck(data: xr.Dataset, length: str, policy: str) -> str:
+def bottleneck(data: xr.Dataset, length: str) -> str:
     """Where the package's policy falls below the limit, and what root does there."""
-    chosen = data.sel(samples=length, policy=policy)
+    chosen = data.sel(samples=length, policy="package")
     short = chosen["efficiency"].values < LIMIT
     if not short.any():
-        return f"{policy}: above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"
+        return f"above {LIMIT} up to {int(chosen['ranks'][-1])} ranks"
     first = int(np.argmax(short))
     ranks = int(chosen["ranks"][first])
     mean = float(data["cost_sample"].sel(quantile=0.5)) * LONGER[length]
-    parts = WORK / (mean * part_length(round(ranks * WORK / mean), ranks, 4096, mean))
-    each = (
-        {
-            "sums taken in": float(data["cost_partial"]) * parts,
-        }
-        if policy == SUMS
-        else {
-            "records taken in": float(data["cost_record"]) * WORK / mean,
-            "points handed out": float(data["cost_handed"]) * WORK / mean,
-        }
-    )
-    message = float(data["cost_message"]) + (policy != SUMS) * float(data["cost_batch"])
-    each |= {
+    message = float(data["cost_message"]) + float(data["cost_batch"])
+    each = {
+        "records taken in": float(data["cost_record"]) * WORK / mean,
+        "points handed out": float(data["cost_handed"]) * WORK / mean,
         "messages": message * float(chosen["requests"][first]) / ranks,
     }
     name = max(each, key=lambda key: each[key])
     load = float(chosen["root_load"][first])
     return (
-        f"{policy}: below {LIMIT} from {ranks} ranks on; root is busy {load:.0%} of the time,\n"
+        f"below {LIMIT} from {ranks} ranks on; root is busy {load:.0%} of the time,\n"
         f"  most of it with {name} ({each[name] * 1e3:.2g} ms for each rank and {WORK:g} s of work)"
     )
 
@@ -288,7 +241,7 @@ def report(data: xr.Dataset) -> str:
             row = data["efficiency"].sel(samples=length, ranks=count).values
             shown = zip(row, widths, strict=True)
             lines.append(f"{count:>8}" + "".join(f"{value:>{width}.3f}" for value, width in shown))
-        lines += [bottleneck(data, str(length), name) for name in ("package", SUMS)]
+        lines.append(bottleneck(data, str(length)))
     return "\n".join(lines)
 
 

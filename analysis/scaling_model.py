@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.ensemble.parts import part_length
 from hpcclear.ranks.schedule import QUANTUM, TAIL, Allotment, Need, allot
 from hpcclear.ranks.team import FLUSH_INTERVAL
-from hpcclear.statistics.streams.summary import BLOCK
 
 LANES = 32
 LATENCY = 5e-6  # s, network
@@ -33,7 +31,6 @@ class Costs(NamedTuple):
     message: float  # root, to take in and answer one message
     record: float  # root, for each finished record
     handed: float  # root, for each sample handed out
-    partial: float  # root, for each part of a block that arrives summed up already
     start: float  # from the launch of a process to its first simulation
     batch: float = 0.0  # root, besides, for a message with records, however many
 
@@ -192,10 +189,10 @@ class _Root:
         return self.left == 0 and not self.asking and self._own <= 0.0
 
 
-def _run(root: _Root, idle: float | None = None) -> Outcome:
-    """Until nothing is left; `idle`: what a rank loses at its end, in items, half of its lanes by default."""
+def _run(root: _Root) -> Outcome:
+    """Until nothing is left; at its end a rank loses half of its lanes."""
     team, costs = root.team, root.costs
-    idle = 0.5 * team.lanes if idle is None else idle
+    idle = 0.5 * team.lanes
     while not root.over:
         if root.asking and root.asking[0][0] <= root.now:
             root.answer()
@@ -262,21 +259,3 @@ def _saturated(costs: Costs, ranks: int, total: int, work: float, requests: floa
     )
     makespan = max(serving, work)
     return Outcome(work / makespan, serving / makespan, makespan, ranks * requests)
-
-
-def simulate_sums(
-    costs: Costs, ranks: int, policy: Policy, *, work: float = WORK, seed: int = 1
-) -> Outcome:
-    """`simulate` for statistics, whose ranks make their own points and send sums of parts of blocks.
-
-    Root's load goes with the parts, whose length is the package's own choice (`hpcclear.ensemble.parts.part_length`).
-    """
-    total = max(round(ranks * work / costs.mean), ranks)
-    length = part_length(total, ranks, BLOCK, costs.mean)
-    rng = np.random.default_rng(seed)
-    mean, spread = length * costs.mean, math.sqrt(length) * float(costs.samples.std())
-    parts = np.maximum(rng.normal(mean, spread, 2000), 0.1 * mean)
-    # points are made where they are used; a part is handed out as two numbers, within its message
-    summed = costs._replace(samples=parts, record=costs.partial, handed=0.0, batch=0.0)
-    team = _Team(summed, ranks, 1, seed)
-    return _run(_Root(summed, team, max(total // length, 1), policy), 0.5 * LANES / length)

@@ -8,7 +8,7 @@ from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.points import Points
-from hpcclear.statistics.streams.summary import BINS, BLOCK, LEAF
+from hpcclear.statistics.streams import BINS, BLOCK
 
 
 def run_key(scene: Scene, command: str) -> dict[str, str]:
@@ -35,5 +35,5 @@ def sample_key(scene: Scene, points: Points) -> dict[str, str]:
 
 def statistics_key(scene: Scene, samples: int) -> dict[str, str]:
     """The key of `sample --statistics`: the run's, and how so many samples are summed up."""
-    layout = f"{samples} in a tree over blocks of {BLOCK} and leaves of {LEAF}, {BINS} bins"
+    layout = f"{samples} in blocks of {BLOCK}, {BINS} bins"
     return {**run_key(scene, "sample --statistics"), "statistics": layout}

@@ -10,7 +10,7 @@ import numpy as np
 from hpcclear.ensemble.samples import samples_of
 from hpcclear.results import collection, dataset
 from hpcclear.scene.sampling import MonteCarloPoints
-from hpcclear.statistics.streams.summary import BLOCK
+from hpcclear.statistics.streams import BLOCK
 
 if TYPE_CHECKING:
     from hpcclear.base.objectives import Objective

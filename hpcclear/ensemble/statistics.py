@@ -1,7 +1,7 @@
 """Direct Monte Carlo of any size: points made on demand, statistics kept, samples only on request."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,33 +12,24 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
 from hpcclear.ensemble.identity import statistics_key
-from hpcclear.ensemble.parts import (
-    PartsProgress,
-    make_summariser,
-    part_length,
-    partial_of,
-    unpacked,
-)
 from hpcclear.ensemble.raw import NAMES, RawFiles
 from hpcclear.ensemble.samples import saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks import leading
-from hpcclear.ranks.schedule import COLUMNS, PointSource, Task
+from hpcclear.ranks.progress import LongProgress
+from hpcclear.ranks.schedule import Task
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import collection, dataset, files, netcdf
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
-from hpcclear.statistics.streams.accumulator import Accumulator
-from hpcclear.statistics.streams.summary import BLOCK, QUANTITIES, Summary, rows_of
+from hpcclear.statistics.streams import BLOCK, QUANTITIES, Accumulator, Summary, rows_of
 
 STAGE = "statistics"
 
 TOGETHER = 256
-"""Blocks of samples that are handed out in one stage where root keeps them."""
-
-_BUSY = COLUMNS.index("busy")
+"""Blocks of samples that are handed out in one stage."""
 
 
 class _Left:
@@ -161,7 +152,6 @@ class _Streaming:
     ) -> None:
         session.describe(scene)
         self._payload = payload_of(scene, points.page(0))
-        self._design = scene.resolved()
         self._objective = scene.objective
         self._points = points
         self._session = session
@@ -189,19 +179,13 @@ class _Streaming:
         return Accumulator(len(self._points), self._session.record, on_block=write)
 
     def run(self) -> Results:
-        """Simulate, and write the statistics.
-
-        Ranks send samples of the first block, which decides the histograms, of blocks that an earlier run left begun, and
-        where root keeps samples of all blocks. Of the rest they send sums of parts.
-        """
-        sums, seconds = self._sums, 0.0
+        """Simulate, and write the statistics; at first the block that decides the histograms."""
+        sums = self._sums
+        style = self._session.options.style
         with saving(self._save):
-            some = TOGETHER if self._files is not None else int(sums.edges is None)
-            while (left := sums.remaining(some)).size:
-                seconds = self._run_samples(left)
-                some = TOGETHER if self._files is not None else 0
-            if not sums.complete:
-                self._run_parts(seconds)
+            with LongProgress("samples", style, sums.total, sums.taken) as progress:
+                while (left := sums.remaining(1 if sums.edges is None else TOGETHER)).size:
+                    self._simulate(left, progress)
             if self._files is not None:
                 with self._session.ranks.stage("files"), self._session.ranks.writing():
                     message = self._files.finish()
@@ -224,55 +208,23 @@ class _Streaming:
         if time.monotonic() - self._saved > self._checkpoint.interval:
             self._save()
 
-    def _run(self, task: Task, points: PointSource, take: Callable[[np.ndarray], None]) -> None:
-        style, sums = self._session.options.style, self._sums
-        leading.run_points(
-            self._session.ranks,
-            task,
-            points,
-            on_records=take,
-            save=self._save_when_due,
-            progress=PartsProgress("samples", style, sums.total, sums.taken),
-            keep=False,
-        )
-
-    def _run_samples(self, left: Integers) -> float:
-        """Let ranks send the samples of these numbers (n,); returns seconds of a rank for one."""
+    def _simulate(self, left: Integers, progress: LongProgress) -> None:
+        """Simulate the samples of these numbers (n,)."""
 
         def take(records: np.ndarray) -> None:
             numbered = records.copy()
             numbered["sample"] = left[records["sample"]]
             self._sums.add(numbered)
 
-        spent = self._session.ranks.stage_seconds
-        before = spent[STAGE][:, _BUSY].sum() if STAGE in spent else 0.0
-        task = Task(STAGE, make_evaluator, self._payload, self._session.record)
-        self._run(task, _Left(self._points, left), take)
-        return float(spent[STAGE][:, _BUSY].sum() - before) / len(left)
-
-    def _run_parts(self, seconds: float) -> None:
-        """Hand out what is left as parts; `seconds` of a rank for a sample, 0 if not known."""
-        sums = self._sums
-        if not sums.part:
-            sums.part = part_length(
-                sums.total - sums.taken, self._session.ranks.size, BLOCK, seconds
-            )
-        firsts = sums.parts_left()
-        payload = {
-            "make": make_evaluator,
-            "samples": self._payload,
-            "design": self._design,
-            "total": len(self._points),
-            "edges": sums.edges,
-            "length": sums.part,
-        }
-
-        def take(records: np.ndarray) -> None:
-            for record in records:
-                sums.add_part(int(firsts[record["sample"]]), sums.part, unpacked(record))
-
-        task = Task(STAGE, make_summariser, payload, partial_of(self._session.record))
-        self._run(task, firsts[:, None].astype(float), take)
+        leading.run_points(
+            self._session.ranks,
+            Task(STAGE, make_evaluator, self._payload, self._session.record),
+            _Left(self._points, left),
+            on_records=take,
+            save=self._save_when_due,
+            progress=progress,
+            keep=False,
+        )
 
 
 def statistics_dataset(
@@ -304,9 +256,9 @@ def _of_quantity(name: str, summary: Summary, edges: Array, joints: int) -> dict
     """Variables of one quantity; scalars lose the axis of joints."""
     rows = [k for k, (quantity, _) in enumerate(rows_of(joints)) if quantity == name]
     chosen = rows if FIELDS[name].per else rows[0]
-    known = summary.count > 0
+    known = summary.number > 0
     return {
-        f"{name}_count": summary.count[chosen],
+        f"{name}_count": summary.number[chosen],
         f"{name}_mean": np.where(known, summary.mean, np.nan)[chosen],
         f"{name}_deviation": summary.deviation[chosen],
         f"{name}_minimum": np.where(known, summary.minimum, np.nan)[chosen],

@@ -4,7 +4,6 @@ Root follows the lives (`hpcclear.dynamics.wear.life`) in parallel: what all of 
 simulated on all ranks and kept in the checkpoint; a resumed run requests the same again and finds it done.
 """
 
-import contextlib
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -185,19 +184,16 @@ def follow(
     for number in range(len(joints.clearance)):
         asking = life(joints[number], plan, relief)
         _go_on(number, asking, None, going, ended)
-    progress = LivesProgress("wear", style)
-    with contextlib.ExitStack() as stack:
-        stack.callback(progress.finish)
+    with LivesProgress("wear", style, len(joints.clearance)) as progress:
         while going:
-            parts = [asked.done for _, asked in going.values()]
-            progress.lives(len(joints.clearance), len(ended), parts)
+            progress.lives(len(ended), [asked.done for _, asked in going.values()])
             answers = _simulated(scene, states, going, ranks, checkpoint, progress, first)
             first += sum(len(one) for one in answers)
             waiting, going = going, {}
             for (number, (asking, _)), answer in zip(waiting.items(), answers, strict=True):
                 seen = _seen(answer, worn, len(scene.joint_labels), relief)
                 _go_on(number, asking, seen, going, ended)
-        progress.lives(len(joints.clearance), len(ended), [])
+        progress.lives(len(ended), [])
     return [ended[number] for number in range(len(joints.clearance))]
 
 

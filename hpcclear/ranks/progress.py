@@ -5,7 +5,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, TextIO
+from typing import Any, Literal, Self, TextIO
 
 import numpy as np
 
@@ -127,37 +127,46 @@ class Progress:
         self._bar.refresh()
 
 
-class LivesProgress(Progress):
-    """How far service lives are, which need one design after the other, with a forecast of the time left.
+class LongProgress(Progress):
+    """Progress over designs that come one after the other: each calls `start` and `close`; shown is the state of all.
 
-    Designs call `start` and `close`, as any do; what is shown is the state of all lives until `finish`.
+    A context, at whose end the final state is shown. `total`: samples of all of them, of which `done` are there already.
     """
 
-    _done = -1
-
-    def lives(self, total: int, over: int, parts: Sequence[float]) -> None:
-        """Of `total` lives, `over` are over; of each other one this part of the simulations is done, from 0 to 1."""
-        self._lives, self._over, self._behind = total, over, (over + sum(parts)) / total
+    def __init__(self, label: str, style: Style, total: int, done: int = 0) -> None:
+        super().__init__(label, style)
+        self._whole, self._before, self._going = total, done, False
 
     def start(self, total: int, completed: np.ndarray) -> None:
         """Begin with a further design of `total` samples, of which the records `completed` are there already."""
-        if self._done < 0:
-            super().start(self._lives, np.empty(0))
+        if not self._going:
+            super().start(self._whole, np.broadcast_to(0, self._before))
+            self._going = True
         self._done += completed.size
         self._failed += _failures(completed)
 
     def close(self) -> None:
-        """Show nothing: a design is done, the lives are not."""
+        """Show nothing: a design is done, others follow."""
 
-    def finish(self) -> None:
-        """Show the final state."""
-        if self._done >= 0:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._going:
             super().close()
+
+
+class LivesProgress(LongProgress):
+    """How far service lives are, which need one design after the other, with a forecast of the time left; `total`: lives."""
+
+    def lives(self, over: int, parts: Sequence[float]) -> None:
+        """`over` lives are over; of each other one this part of the simulations is done, from 0 to 1."""
+        self._over, self._behind = over, (over + sum(parts)) / self._whole
 
     def text(self) -> str:
         """Lives that are over, part of the simulations done, their number and failures."""
         failed = f", {self._failed} failed" if self._failed else ""
-        share = f"{self._over}/{self._lives} service lives finished ({100.0 * self._behind:.0f} %)"
+        share = f"{self._over}/{self._whole} service lives finished ({100.0 * self._behind:.0f} %)"
         return f"{share}, {self._done} simulations{failed}"
 
     def _eta(self) -> str:
@@ -167,7 +176,7 @@ class LivesProgress(Progress):
 
     def _draw(self) -> None:
         self._bar.update(
-            0, completed=self._behind * self._lives, state=f"{self.text()}, {self._eta()}"
+            0, completed=self._behind * self._whole, state=f"{self.text()}, {self._eta()}"
         )
         self._bar.refresh()
 

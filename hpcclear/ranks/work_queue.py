@@ -63,9 +63,7 @@ class WorkQueue:
     @property
     def suspects(self) -> list[int]:
         """Samples in hand, ascending, if the worker raised an exception; else none."""
-        if not self._inside:
-            return []
-        return getattr(self._worker, "samples_in_hand", None) or sorted(self._in_hand)
+        return sorted(self._in_hand) if self._inside else []
 
     def take(self, index: np.ndarray, points: np.ndarray, ask_below: int) -> None:
         """Queue a block: indices of shape (n,), points of shape (n, d); an empty one says that there is no more."""

@@ -1,1 +1,0 @@
-"""Summaries of samples that merge in any order to the same bits."""
