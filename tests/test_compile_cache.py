@@ -100,14 +100,12 @@ def test_one_of_many_makes_a_file_and_the_others_wait(tmp_path):
     """A lock is of an open file: threads exclude each other as processes do."""
     path, made = tmp_path / "code", []
 
-    def make(number):
-        with kept.alone(path):
-            if kept.read(path) is None:
-                time.sleep(0.02)
-                made.append(number)
-                kept.write(path, b"code")
+    def make():
+        time.sleep(0.02)
+        made.append(path)
+        return b"code"
 
-    threads = [threading.Thread(target=make, args=(number,)) for number in range(20)]
+    threads = [threading.Thread(target=kept.made, args=(path, make)) for _ in range(20)]
     for thread in threads:
         thread.start()
     for thread in threads:

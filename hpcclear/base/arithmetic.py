@@ -9,7 +9,6 @@ import math
 import operator
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -185,12 +184,12 @@ def value_of(text: str, variables: Mapping[str, Array | float]) -> Array:
     """A formula that `names_in` let through, of variables that are numbers or arrays of one shape."""
     operators = {**_SIGNS, ast.Pow: operator.pow}  # of arrays
 
-    def made(node: ast.expr) -> Any:
+    def made(node: ast.expr) -> Array | float:
         match node:
             case ast.Name():
                 return variables[node.id]
-            case ast.Constant():
-                return node.value
+            case ast.Constant(value=float() as number):
+                return number
             case ast.UnaryOp():
                 return -made(node.operand)
             case ast.BinOp():

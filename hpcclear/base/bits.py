@@ -7,12 +7,12 @@ The lowering (`hpcclear.base.lowering.arithmetic`) has instructions of its own f
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import register_jitable
+from numba.extending import intrinsic, register_jitable
 
-from hpcclear.base.jit import emitted, lane_function
+from hpcclear.base.jit import lane_function
 
 
-@emitted
+@intrinsic
 def bits_of(typingctx, x):
     """The bits of a double as a whole number."""
 
@@ -22,7 +22,7 @@ def bits_of(typingctx, x):
     return types.int64(types.float64), codegen
 
 
-@emitted
+@intrinsic
 def double_of(typingctx, n):
     """The double that a whole number is the bits of."""
 
@@ -94,7 +94,7 @@ def beyond(array, offset):
     return array[offset:]
 
 
-@emitted
+@intrinsic
 def call_at(typingctx, address, arrays):
     """Call the C function at an address with the places of a tuple's arrays; it returns nothing.
 

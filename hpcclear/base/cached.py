@@ -8,16 +8,16 @@ start of a command, and code that is compiled already calls nothing of it. Numba
 """
 
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import MethodType
-from typing import Any
+from typing import TypeVar
 
 from numba import config, njit
 from numba.core import environment
-from numba.core.caching import Cache, NullCache
-from numba.core.registry import cpu_target
+from numba.core.caching import Cache, IndexDataCacheFile, NullCache
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
@@ -25,6 +25,8 @@ from hpcclear.base import kept
 from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.lock import Lock
 from hpcclear.base.width import asked_width, features
+
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 @contextmanager
@@ -69,10 +71,10 @@ def _environment(module: str, constants: list[object], name: str) -> environment
     return made
 
 
-_usual_environment: Any = getattr(environment, "_rebuild_env", None)
+_usual_environment = getattr(environment, "_rebuild_env", environment.Environment)
 
 
-def _load_overload(cache: Any, signature: Any, context: Any) -> Any:
+def _load_overload(cache: Cache, signature: object, context: object) -> object:
     """Load the machine code of a signature; None where it is not on disk. In place of `Cache.load_overload`."""
     rtsys.initialize(context)  # counts of references, which compiled code links to
     with cache._guard_against_spurious_io_errors(), _set("_rebuild_env", _environment, environment):
@@ -86,16 +88,16 @@ class _Files:
     index that names the code of another signature.
     """
 
-    def __init__(self, usual: Any) -> None:
+    def __init__(self, usual: IndexDataCacheFile) -> None:
         self._start = Path(usual._cache_path) / str(usual._index_name).removesuffix(".nbi")
         self._of = source_key(), usual._version, usual._source_stamp
         self._locks: dict[Path, Lock | None] = {}
 
-    def _path(self, key: Any) -> Path:
+    def _path(self, key: object) -> Path:
         name = kept.digest(repr((self._of, key)).encode()).hex()[:32]
         return self._start.with_name(f"{self._start.name}.{name}.code")
 
-    def load(self, key: Any) -> Any:
+    def load(self, key: object) -> object:
         """What is kept for a key; where that is nothing, None, and this process alone compiles it until `release`."""
         path = self._path(key)
         content = kept.read(path)
@@ -106,7 +108,7 @@ class _Files:
             content = kept.read(path)  # by whoever had the lock before
         return None if content is None else pickle.loads(content)
 
-    def save(self, key: Any, data: Any) -> None:
+    def save(self, key: object, data: object) -> None:
         """Keep what was compiled for a key."""
         kept.write(self._path(key), dumps(data))
 
@@ -119,7 +121,7 @@ class _Files:
             kept.unlock(self._locks.popitem()[1])
 
 
-def _compile(compiled: Any, *signature: Any) -> Any:
+def _compile(compiled: CPUDispatcher, *signature: object) -> object:
     """Compile a function, or load it from this package's cache. In place of its own `compile`."""
     if isinstance(compiled._cache, NullCache):
         _keep(compiled)
@@ -130,25 +132,23 @@ def _compile(compiled: Any, *signature: Any) -> Any:
             compiled._cache._cache_file.release()
 
 
-def _keep(compiled: Any) -> None:
+def _keep(compiled: CPUDispatcher) -> None:
     """Give one function a cache, with this way of loading; Numba's own stays where a version of it has other names."""
     with _set("CACHE_DIR", chosen_folder()), suppress(RuntimeError):  # no place can be written to
         compiled.enable_caching()  # reads the folder
     found = compiled._cache
-    known = hasattr(Cache, "_load_overload") and _usual_environment is not None
+    known = hasattr(Cache, "_load_overload") and hasattr(environment, "_rebuild_env")
     if known and isinstance(found, Cache):
         found.load_overload = MethodType(_load_overload, found)
         found._cache_file = _Files(found._cache_file)
         found._impl.locator.ensure_cache_path = lambda: None  # `_Files` makes it
 
 
-def cached(function: object, **options: object) -> Any:
+def cached(function: Function, **options: object) -> Function:
     """Compile a function for Python at its first call, or load it; `options` as those of `numba.njit`."""
     compiled = njit(error_model="numpy", **options)(function)
-    compiled.compile = MethodType(
-        _compile, compiled
-    )  # most functions of a program are never called
-    return compiled
+    compiled.compile = MethodType(_compile, compiled)  # most functions are never called
+    return compiled  # type: ignore[no-any-return]
 
 
 _prepare()

@@ -9,6 +9,7 @@ import contextlib
 import hashlib
 import os
 import platform
+import re
 from functools import cache
 from pathlib import Path
 
@@ -25,14 +26,10 @@ def _compiled_sources(root: Path) -> list[Path]:
     # of laws the texts are, each named by its content
     kernel = ("layout", "physics", "contacts", "linkage", "stepping")
     parts = {path for room in kernel for path in (root / "dynamics" / room).rglob("*.py")}
-    parts |= {path for path in root.rglob("*.py") if _compiles(path.read_bytes())}
+    compiles = re.compile(rb"jit|numba|llvmlite|base\.cached")  # or emits what is compiled
+    parts |= {path for path in root.rglob("*.py") if compiles.search(path.read_bytes())}
     names = ("numbered.py", "outcome.py", "unrolled.py")
     return sorted(parts | {root / "base" / name for name in names})
-
-
-def _compiles(source: bytes) -> bool:
-    """Whether a file has what is compiled, or what emits it."""
-    return any(word in source for word in (b"jit", b"numba", b"llvmlite", b"base.cached"))
 
 
 @cache

@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from hpcclear.base import host
 from hpcclear.base.plain import plain
@@ -23,13 +22,15 @@ _BAD_NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES, errn
 _BOXED = re.compile(r"\bnp\.(?:\w+\(([^()]*)\)|(True|False)_)")
 
 
-def unboxed(value: Any) -> Any:
+def unboxed(value: object) -> object:
     """Return a value with plain numbers for NumPy's, whose `repr` names their type, also inside lists, tuples and dicts."""
     if hasattr(value, "tolist"):  # NumPy need not be loaded
         return value.tolist()
     if isinstance(value, dict):
         return {unboxed(key): unboxed(entry) for key, entry in value.items()}
-    return type(value)(map(unboxed, value)) if type(value) in (list, tuple) else value
+    if type(value) is list or type(value) is tuple:
+        return type(value)(map(unboxed, value))
+    return value
 
 
 class InputError(ValueError):

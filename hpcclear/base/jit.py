@@ -1,22 +1,15 @@
 """How this package compiles: the decorators, and the width of its vectors."""
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import llvmlite.binding
 from numba import njit
-from numba.core.extending import intrinsic
 
-from hpcclear.base.cached import cached, features_in_use
+from hpcclear.base.cached import Function, cached, features_in_use
 
 FASTMATH = {"contract", "nsz", "arcp"}
 """Rewrites allowed in the kernel: none that changes what NaN or a clip does, none that reorders a sum."""
-
-
-def emitted(function: Callable[..., Any]) -> Any:
-    """What compiled code calls by the name of a function that emits it for Numba, of any arguments for a checker of types."""
-    return intrinsic(function)
 
 
 def doubles_in_a_vector() -> int:
@@ -57,8 +50,8 @@ def narrow_vectors() -> None:
     """
 
 
-_written: dict[Any, str] = {}
-_apart: set[Any] = set()
+_written: dict[object, str] = {}
+_apart = set[object]()
 
 
 def written_kind(function: object) -> str | None:
@@ -66,7 +59,7 @@ def written_kind(function: object) -> str | None:
     return _written.get(function) if isinstance(function, Hashable) else None
 
 
-def lane_function(function: Callable[..., object]) -> Any:
+def lane_function(function: Function) -> Function:
     """Compile what runs inside a loop over lanes: inlined, branch-free, vectorised there."""
     compiled = njit(forceinline=True, error_model="numpy", fastmath=FASTMATH)(function)
     _written[compiled] = "lane"
@@ -78,7 +71,7 @@ def stands_apart(function: object) -> bool:
     return function in _apart
 
 
-def apart(compiled: object) -> Any:
+def apart(compiled: Function) -> Function:
     """Have a function optimised on its own before it is inlined; to stand above the decorator that compiles.
 
     For sums of products: which of two products is fused with their sum goes by the order the compiler has put them in, and
@@ -89,7 +82,7 @@ def apart(compiled: object) -> Any:
     return compiled
 
 
-def scalar_function(function: Callable[..., object]) -> Any:
+def scalar_function(function: Function) -> Function:
     """Compile what runs for one lane or one point at a time."""
     compiled = cached(function)
     _written[compiled] = "scalar"

@@ -12,7 +12,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 from hpcclear.base.lock import Lock
@@ -89,23 +89,30 @@ def _say(text: str) -> None:
     _said.append(text)
 
 
-@contextlib.contextmanager
-def alone(path: Path) -> Iterator[None]:
-    """In the block no other process makes this file; where there are no locks, or one is held too long, others may."""
-    held = lock(path)
-    try:
-        yield
-    finally:
-        unlock(held)
+def made(path: Path, make: Callable[[], bytes]) -> bytes:
+    """Content of a file that is kept, or that one process makes while others wait; see `lock`."""
+    content = read(path)
+    if content is None:
+        held = lock(path)
+        try:
+            content = read(path)  # by whoever had the lock before
+            if content is None:
+                content = make()
+                write(path, content)
+        finally:
+            unlock(held)
+    return content
 
 
 def lock(path: Path) -> Lock | None:
     """Take the lock of a file that is to be made; return what `unlock` takes, None where it cannot be had.
 
-    It ends with the process that holds it. One who has waited looks for the file that was made before making it.
+    It ends with the process that holds it. Where there are none, or one is held too long, others may make the file. One
+    who has waited looks for the file that was made before making it.
     """
     global _given_up
-    wanted, began, said = _lock_of(path), time.monotonic(), False
+    wanted = Lock(path.parent, f"{path.name}.lock")
+    began, said = time.monotonic(), False
     with contextlib.suppress(OSError):  # no file can be made there, or the file system has no locks
         while not wanted.take():
             if _given_up:
@@ -128,7 +135,3 @@ def unlock(held: Lock | None) -> None:
     if held is not None:
         with contextlib.suppress(OSError):
             held.release()
-
-
-def _lock_of(path: Path) -> Lock:
-    return Lock(path.parent, f"{path.name}.lock")

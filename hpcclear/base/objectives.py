@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cache
 from inspect import Parameter, Signature, signature
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from hpcclear.base.arrays import Array, Booleans, Records
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import FIELDS, IMPACTS, LEVELS, RESPONSES, WIDEST
 
-Function = Callable[..., Any]
+Function = Callable[..., Array | float]
 
 RECORDED = {"objective": "m"} | {
     name: FIELDS[name].unit.removeprefix("1")

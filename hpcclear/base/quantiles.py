@@ -9,7 +9,7 @@ themselves are those of scipy.stats and scipy.special.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, log1p, sqrt
+from math import inf
 from typing import Any, Protocol
 
 import numpy as np
@@ -189,24 +189,3 @@ class Named(Cut):
         from scipy import stats  # most of a second, which few scenes need
 
         return getattr(stats, self.name)(**dict(self.parameters))
-
-
-def lognormal(mean: float, deviation: float, lower: float = -inf, upper: float = inf) -> Named:
-    """A lognormal with that mean and standard deviation, both of all of it, before it is cut off."""
-    variance = log1p((deviation / mean) ** 2)
-    middle = mean / sqrt(1.0 + (deviation / mean) ** 2)
-    return Named("lognorm", (("s", sqrt(variance)), ("scale", middle)), lower, upper)
-
-
-def beta(shapes: tuple[float, float], lower: float, upper: float) -> Named:
-    """A beta distribution over ``[lower, upper]``."""
-    over = ("a", shapes[0]), ("b", shapes[1]), ("loc", lower), ("scale", upper - lower)
-    return Named("beta", over, lower, upper)
-
-
-def weibull(
-    scale: float, shape: float, location: float, lower: float = -inf, upper: float = inf
-) -> Named:
-    """A Weibull distribution from `location` on."""
-    entries = ("c", shape), ("loc", location), ("scale", scale)
-    return Named("weibull_min", entries, lower, upper)

@@ -189,7 +189,7 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
         If the text is not a number with a unit, it may be read in two ways, or the unit has another dimension.
     """
     number, unit = quantity(text, target, decided)
-    value = of_unit(number, unit, target)
+    value = _product(Fraction(number), factor(unit, target), target)
     note_turns(text.strip(), number, unit, target)
     return value
 
@@ -214,11 +214,6 @@ def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
             "a number in quotes has no unit", f"Drop the quotes for a number in {shown}"
         )
     return number, unit
-
-
-def of_unit(number: str, unit: str, target: str) -> float:
-    """A decimal number of a unit as the nearest float in `target`; raises UnitError."""
-    return _product(Fraction(number), factor(unit, target), target)
 
 
 def _product(number: Fraction | Decimal, size: Fraction, target: str = "") -> float:

@@ -4,7 +4,9 @@ A name in a scene file is one of ours (``"normal"``), that of an installed packa
 of the Python file ``module.py`` beside the scene file. See `Registry`, and docs/extending.md for what each kind has to offer.
 """
 
-from hpcclear.base.objectives import LEVEL, OURS, level_of
+from collections.abc import Callable
+
+from hpcclear.base.objectives import LEVEL, OURS, Objective, level_of
 from hpcclear.plugins.registry import Registry
 from hpcclear.plugins.sources import raised, run_source, trusting, using
 
@@ -23,12 +25,14 @@ __all__ = [
     "using",
 ]
 
-CONTACT_LAWS = Registry("contact law", "hpcclear.contact_laws")
-FRICTION_LAWS = Registry("friction law", "hpcclear.friction_laws")
-OBJECTIVES = Registry("objective", "hpcclear.objectives")
-DISTRIBUTIONS = Registry("distribution", "hpcclear.distributions", needs=("ppf",))
-SURROGATES = Registry("surrogate", "hpcclear.surrogates")
-SEARCHES = Registry("search", "hpcclear.searches")
+CONTACT_LAWS = Registry[object]("contact law", "hpcclear.contact_laws")
+FRICTION_LAWS = Registry[object]("friction law", "hpcclear.friction_laws")
+OBJECTIVES = Registry[Objective]("objective", "hpcclear.objectives")
+DISTRIBUTIONS = Registry[Callable[..., object]](
+    "distribution", "hpcclear.distributions", needs=("ppf",)
+)
+SURROGATES = Registry[Callable[..., object]]("surrogate", "hpcclear.surrogates")
+SEARCHES = Registry[Callable[..., object]]("search", "hpcclear.searches")
 
 for _name, _objective in OURS.items():
     OBJECTIVES.add(_name, _objective)

@@ -4,7 +4,7 @@ import importlib
 import re
 from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple, TypeVar, cast
 
 from hpcclear.base.errors import InputError, nearest
 from hpcclear.plugins.sources import REFERENCE, digest, note_package, run_source, texts_in_use
@@ -18,7 +18,10 @@ class _Offered(NamedTuple):
     version: str
 
 
-class Registry:
+Plugin = TypeVar("Plugin")
+
+
+class Registry(Generic[Plugin]):
     """Plug-ins of one kind by their names.
 
     Parameters
@@ -59,7 +62,7 @@ class Registry:
         installed = {point.name for point in entry_points(group=self.group)}
         return (*self._ours, *sorted(installed - self._ours.keys()))
 
-    def get(self, name: str, texts: Mapping[str, str] | None = None) -> Any:
+    def get(self, name: str, texts: Mapping[str, str] | None = None) -> Plugin:
         """What a name stands for.
 
         Parameters
@@ -75,10 +78,10 @@ class Registry:
             There is no such plug-in, its file or package cannot be run, or it lacks what this kind needs.
         """
         if name in self._ours:
-            return self._of_ours(name)
+            return cast(Plugin, self._of_ours(name))
         for names, maker in self._families:
             if matched := names.fullmatch(name):
-                return maker(matched)
+                return cast(Plugin, maker(matched))
         found = REFERENCE.fullmatch(name)
         if found is None:
             value = self._installed(name)
@@ -89,7 +92,7 @@ class Registry:
         if missing:
             reason = f"has no {', no '.join(missing)}: a {self.kind} needs {', '.join(self.needs)}"
             raise InputError(self.kind, name, reason, "Add what is missing")
-        return value
+        return cast(Plugin, value)
 
     def origin(self, name: str, texts: Mapping[str, str] | None = None) -> str:
         """Where a plug-in that was taken comes from, in words; "" for one of ours."""

@@ -47,7 +47,7 @@ class Plugins(Table):
 class PluginName(Converted):
     """An entry that names a plug-in of some kind."""
 
-    registry: Registry
+    registry: Registry[object]
 
     def convert(self, value: object) -> str:
         """The name, known to be there; an error for validators where it is none."""

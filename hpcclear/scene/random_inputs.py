@@ -3,7 +3,7 @@ scipy.stats, and plug-ins."""
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from math import inf
+from math import inf, log1p, sqrt
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -52,18 +52,23 @@ def _normal(entries: Mapping[str, Any]) -> quantiles.Quantiles:
 
 def _beta(entries: Mapping[str, Any]) -> quantiles.Quantiles:
     middle, reach = _middle_and_reach(entries)
-    return quantiles.beta(
-        entries["shapes"], *entries.get("range", (middle - reach, middle + reach))
-    )
+    lower, upper = entries.get("range", (middle - reach, middle + reach))
+    a, b = entries["shapes"]
+    over = ("a", a), ("b", b), ("loc", lower), ("scale", upper - lower)
+    return quantiles.Named("beta", over, lower, upper)
 
 
 def _lognormal(entries: Mapping[str, Any]) -> quantiles.Quantiles:
-    return quantiles.lognormal(entries["mean"], entries["deviation"], *_ends(entries))
+    """By mean and standard deviation of all of it, before it is cut off."""
+    square = (entries["deviation"] / entries["mean"]) ** 2
+    over = ("s", sqrt(log1p(square))), ("scale", entries["mean"] / sqrt(1.0 + square))
+    return quantiles.Named("lognorm", over, *_ends(entries))
 
 
 def _weibull(entries: Mapping[str, Any]) -> quantiles.Quantiles:
-    location = entries.get("location", 0.0)
-    return quantiles.weibull(entries["scale"], entries["shape"], location, *_ends(entries))
+    begin = entries.get("location", 0.0)
+    over = ("c", entries["shape"]), ("loc", begin), ("scale", entries["scale"])
+    return quantiles.Named("weibull_min", over, *_ends(entries))
 
 
 def _worn(entries: Mapping[str, object]) -> quantiles.Quantiles:

@@ -79,7 +79,7 @@ class Scene(ConsistentTables):
             As `load_scene`.
         """
         content = self.resolved()
-        altered = unboxed({**(changes or {}), **more})
+        altered = {path: unboxed(one) for path, one in {**(changes or {}), **more}.items()}
         for path, value in altered.items():
             check_path(path)
             content = entry_replaced(content, path, value)

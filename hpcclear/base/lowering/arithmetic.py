@@ -3,7 +3,6 @@
 import ast
 import operator
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -14,6 +13,7 @@ from hpcclear.base.lowering.values import (
     VECTOR,
     WHOLE,
     Array,
+    Value,
     is_known,
     rebuilt,
     whole,
@@ -29,7 +29,7 @@ _BITS = {
     ast.RShift: "ashr",
 }
 _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+_OPERATORS: dict[type[ast.AST], Callable[..., Value]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
     ast.BitOr: operator.or_, ast.BitAnd: operator.and_, ast.LShift: operator.lshift,
@@ -46,7 +46,7 @@ class Arithmetic:
 
     # ---- numbers --------------------------------------------------------------------------------
 
-    def value(self, known: Any) -> Any:
+    def value(self, known: Value) -> Value:
         """Something of Python as a value."""
         if isinstance(known, bool | np.bool_):
             return ir.Constant(TRUTH, int(known))
@@ -69,7 +69,7 @@ class Arithmetic:
         place.initializer, place.global_constant, place.linkage = content, True, "internal"
         return Array(self.builder.gep(place, [whole(0), whole(0)]), tuple(map(whole, known.shape)))
 
-    def cast(self, value: Any, kind: ir.Type) -> Any:
+    def cast(self, value: Value, kind: ir.Type) -> Value:
         """A number as one of a type that holds it."""
         b, value = self.builder, self.value(value)
         if value.type == kind:
@@ -88,13 +88,13 @@ class Arithmetic:
             return ir.Constant(DOUBLE, float(value.constant))
         return b.uitofp(value, DOUBLE) if value.type == TRUTH else b.sitofp(value, DOUBLE)
 
-    def both(self, one: Any, other: Any) -> tuple[Any, Any, ir.Type]:
+    def both(self, one: Value, other: Value) -> tuple[Value, Value, ir.Type]:
         """Two numbers as of one type, and the type."""
         one, other = self.value(one), self.value(other)
         kind = wider(one.type, other.type)
         return self.cast(one, kind), self.cast(other, kind), kind
 
-    def truth(self, value: Any) -> Any:
+    def truth(self, value: Value) -> Value:
         """Whether a number is not zero."""
         if is_known(value):
             return bool(value)
@@ -104,7 +104,7 @@ class Arithmetic:
             return self.builder.icmp_signed("!=", value, whole(0))
         return self.builder.fcmp_unordered("!=", value, ir.Constant(DOUBLE, 0.0))
 
-    def binary(self, op: type[ast.operator], one: Any, other: Any) -> Any:
+    def binary(self, op: type[ast.operator], one: Value, other: Value) -> Value:
         """One number combined with another."""
         if is_known((one, other)):
             return _OPERATORS[op](one, other)
@@ -130,7 +130,7 @@ class Arithmetic:
         assert op is ast.FloorDiv
         return b.sub(b.sdiv(one, other), b.zext(less, WHOLE))
 
-    def compared(self, op: type[ast.cmpop], one: Any, other: Any) -> Any:
+    def compared(self, op: type[ast.cmpop], one: Value, other: Value) -> Value:
         """Whether one number compares so with another."""
         if is_known((one, other)) or op in (ast.Is, ast.IsNot):
             return _OPERATORS[op](one, other)
@@ -140,13 +140,13 @@ class Arithmetic:
         kept = self.builder.fcmp_unordered if op is ast.NotEq else self.builder.fcmp_ordered
         return kept(_COMPARED[op], one, other)
 
-    def intrinsic(self, name: str, arguments: list[Any]) -> Any:
+    def intrinsic(self, name: str, arguments: list[Value]) -> Value:
         """A function of LLVM, of doubles."""
         kind = ir.FunctionType(DOUBLE, [DOUBLE] * len(arguments))
         function = self.builder.module.declare_intrinsic(name, [DOUBLE], kind)
         return self.builder.call(function, arguments)
 
-    def place(self, array: Array, index: list[Any]) -> Any:
+    def place(self, array: Array, index: list[Value]) -> Value:
         """The address of what an index names, or where a row begins."""
         offset, *others = map(self.value, index)
         for length, one in zip(array.shape[1:], others, strict=False):
@@ -157,69 +157,69 @@ class Arithmetic:
 
     # ---- functions of Python, and those that views of memory are made with ----------------------
 
-    def _call_max(self, *values: Any) -> Any:
+    def _call_max(self, *values: Value) -> Value:
         return self._extreme(ast.Gt, values)
 
-    def _call_min(self, *values: Any) -> Any:
+    def _call_min(self, *values: Value) -> Value:
         return self._extreme(ast.Lt, values)
 
-    def _extreme(self, op: type[ast.cmpop], values: Iterable[Any]) -> Any:
+    def _extreme(self, op: type[ast.cmpop], values: Iterable[Value]) -> Value:
         first, *others = values
         for one in others:
             first, one, _ = self.both(first, one)
             first = self.builder.select(self.compared(op, one, first), one, first)
         return first
 
-    def _call_abs(self, value: Any) -> Any:
+    def _call_abs(self, value: Value) -> Value:
         negative = self.builder.icmp_signed("<", value, whole(0))
         return self.builder.select(negative, self.builder.neg(value), value)
 
-    def _call_int(self, value: Any) -> Any:
+    def _call_int(self, value: Value) -> Value:
         return (
             self.builder.fptosi(value, WHOLE) if value.type == DOUBLE else self.cast(value, WHOLE)
         )
 
-    def _call_float(self, value: Any) -> Any:
+    def _call_float(self, value: Value) -> Value:
         return self.cast(value, DOUBLE)
 
-    def _call_floor(self, value: Any) -> Any:
+    def _call_floor(self, value: Value) -> Value:
         return self._call_int(self.intrinsic("llvm.floor", [value]))
 
-    def _call_isfinite(self, value: Any) -> Any:
+    def _call_isfinite(self, value: Value) -> Value:
         none = self.builder.fsub(value, value)
         return self.builder.fcmp_ordered("ord", none, none)
 
-    def _call_sign(self, value: Any) -> Any:
+    def _call_sign(self, value: Value) -> Value:
         nothing = self.value(0.0)
         below = self.builder.select(self.compared(ast.Lt, value, nothing), self.value(-1.0), value)
         return self.builder.select(self.compared(ast.Gt, value, nothing), self.value(1.0), below)
 
-    def _call_len(self, value: Any) -> Any:
+    def _call_len(self, value: Value) -> Value:
         return value.shape[0] if isinstance(value, Array) else len(value)
 
-    def _call_carray(self, place: Any, shape: Any) -> Any:
+    def _call_carray(self, place: Value, shape: Value) -> Value:
         return Array(place, shape if isinstance(shape, tuple) else (shape,))
 
-    def _call_beyond(self, array: Array, offset: Any) -> Any:
+    def _call_beyond(self, array: Array, offset: Value) -> Value:
         return Array(self.builder.gep(array.data, [offset]), array.shape)
 
-    def _call_call_at(self, address: Any, arrays: tuple[Array, ...]) -> None:
+    def _call_call_at(self, address: Value, arrays: tuple[Array, ...]) -> None:
         places = [one.data for one in arrays]
         function = ir.FunctionType(ir.VoidType(), [place.type for place in places])
         self.builder.call(self.builder.inttoptr(address, function.as_pointer()), places)
 
     # ---- what `bits` and `jit` have --------------------------------------------------------------
 
-    def _call_bits_of(self, value: Any) -> Any:
+    def _call_bits_of(self, value: Value) -> Value:
         return self.builder.bitcast(value, WHOLE)
 
-    def _call_double_of(self, value: Any) -> Any:
+    def _call_double_of(self, value: Value) -> Value:
         return self.builder.bitcast(value, DOUBLE)
 
-    def _call_no_less(self, value: Any, least: Any) -> Any:
+    def _call_no_less(self, value: Value, least: Value) -> Value:
         return self._extreme(ast.Gt, (self.cast(value, DOUBLE), least))
 
-    def _call_no_more(self, value: Any, most: Any) -> Any:
+    def _call_no_more(self, value: Value, most: Value) -> Value:
         return self._extreme(ast.Lt, (self.cast(value, DOUBLE), most))
 
     def _call_narrow_vectors(self) -> None:
@@ -228,26 +228,26 @@ class Arithmetic:
 
     # ---- vectors of eight -----------------------------------------------------------------------
 
-    def _row(self, array: Array, row: Any) -> Any:
+    def _row(self, array: Array, row: Value) -> Value:
         """Address of a row of a flat array, as that of a vector."""
         start = self.builder.mul(row, whole(VECTOR.count))
         return self.builder.bitcast(self.builder.gep(array.data, [start]), VECTOR.as_pointer())
 
-    def _call_fetch(self, array: Array, row: Any) -> Any:
+    def _call_fetch(self, array: Array, row: Value) -> Value:
         return self.builder.load(self._row(array, row), align=_ALIGNED)
 
-    def _call_put(self, array: Array, row: Any, vector: Any) -> None:
+    def _call_put(self, array: Array, row: Value, vector: Value) -> None:
         place = self._row(array, row)
         self.builder.store(self.cast(vector, VECTOR), place, align=_ALIGNED)
 
-    def _call_spread(self, number: Any) -> Any:
+    def _call_spread(self, number: Value) -> Value:
         return self.cast(number, VECTOR)
 
-    def _call_above(self, vector: Any, yes: Any, no: Any) -> Any:
+    def _call_above(self, vector: Value, yes: Value, no: Value) -> Value:
         is_above = self.builder.fcmp_ordered(">", vector, self.cast(0.0, VECTOR))
         return self.builder.select(is_above, self.cast(yes, VECTOR), self.cast(no, VECTOR))
 
-    def _call_size(self, vector: Any) -> Any:
+    def _call_size(self, vector: Value) -> Value:
         bits = self.builder.bitcast(vector, ir.VectorType(WHOLE, VECTOR.count))
         mask = ir.Constant(bits.type, [whole((1 << 63) - 1)] * VECTOR.count)
         return self.builder.bitcast(self.builder.and_(bits, mask), VECTOR)

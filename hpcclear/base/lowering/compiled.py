@@ -2,9 +2,9 @@
 
 import ctypes
 import linecache
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import llvmlite.binding as llvm
 from llvmlite import ir
@@ -14,10 +14,10 @@ from hpcclear.base import kept
 from hpcclear.base.cached import features_in_use
 from hpcclear.base.code_folder import chosen_folder, source_key
 from hpcclear.base.lowering.statements import Function, definition_of
-from hpcclear.base.lowering.values import DOUBLE, WHOLE, Kind, flat, kind_of, types_of
+from hpcclear.base.lowering.values import DOUBLE, WHOLE, Flags, Kind, Value, flat, kind_of, types_of
 
 
-def _target() -> Any:
+def _target() -> llvm.TargetMachine:
     """The processor that code is for, as Numba has it: with the features of `hpcclear.base.width` or of the user's settings."""
     return cpu_target.target_context.codegen()._tm
 
@@ -25,7 +25,7 @@ def _target() -> Any:
 class _Code(NamedTuple):
     """A function's optimised code, by its name in it, and the kind of its result."""
 
-    module: Any
+    module: llvm.ModuleRef
     name: str
     result: Kind
 
@@ -38,15 +38,15 @@ class _Program:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.known: dict[Any, _Code] = {}
+        self.known: dict[tuple[object, ...], _Code] = {}
 
     def code(
-        self, function: Any, kinds: Sequence[Kind], flags: Any, name: str, inlined: bool = False
+        self, function: Value, kinds: Sequence[Kind], flags: Flags, name: str, inlined: bool = False
     ) -> _Code:
         """Optimised code of a function for arguments of these kinds."""
         called: dict[str, _Code] = {}
 
-        def call(other: Any, kinds: tuple[Kind, ...]) -> tuple[str, Kind]:
+        def call(other: Value, kinds: tuple[Kind, ...]) -> tuple[str, Kind]:
             options = other.targetoptions
             fast = options.get(
                 "fastmath", flags
@@ -70,7 +70,7 @@ class _Program:
         return _Code(module, name, lowered.result)
 
 
-def _optimised(written: ir.Module, called: Sequence[Any]) -> Any:
+def _optimised(written: ir.Module, called: Sequence[llvm.ModuleRef]) -> llvm.ModuleRef:
     """A module after LLVM's passes: cheap ones, which bring what it calls into it, then all."""
     target = _target()
     module = llvm.parse_assembly(str(written))
@@ -78,7 +78,7 @@ def _optimised(written: ir.Module, called: Sequence[Any]) -> Any:
     module.triple = target.triple
     module.verify()
 
-    def builder(level: int, vectors: bool, unrolled: bool) -> Any:
+    def builder(level: int, vectors: bool, unrolled: bool) -> llvm.PassBuilder:
         options = llvm.create_pipeline_tuning_options()
         options.speed_level, options.loop_vectorization, options.loop_unrolling = (
             level,
@@ -107,8 +107,8 @@ def _optimised(written: ir.Module, called: Sequence[Any]) -> Any:
 
 
 def optimised_module(
-    function: Any, kinds: Sequence[Kind], flags: Any, name: str, **known: Any
-) -> Any:
+    function: Value, kinds: Sequence[Kind], flags: Flags, name: str, **known: Value
+) -> llvm.ModuleRef:
     """Return the optimised code of a function by a name, which `str` shows; other arguments as of `Compiled`."""
     others = iter(kinds)
     parameters = [one.arg for one in definition_of(function).args.args]
@@ -116,21 +116,9 @@ def optimised_module(
     return _Program(name).code(function, every, flags, name).module
 
 
-def assembly_of(module: Any) -> str:
+def assembly_of(module: llvm.ModuleRef) -> str:
     """Return the assembly of optimised code."""
     return str(_target().emit_assembly(module))
-
-
-def _kept(path: Path, compiled: Callable[[], bytes]) -> bytes:
-    """What stands in a file of the cache, or is compiled by one process while others wait."""
-    content = kept.read(path)
-    if content is None:
-        with kept.alone(path):
-            content = kept.read(path)  # by whoever had the lock before
-            if content is None:
-                content = compiled()
-                kept.write(path, content)
-    return content
 
 
 class Compiled:
@@ -151,7 +139,12 @@ class Compiled:
     """
 
     def __init__(
-        self, function: Any, kinds: Sequence[Kind], flags: Any, result: Any = None, **known: Any
+        self,
+        function: Value,
+        kinds: Sequence[Kind],
+        flags: Flags,
+        result: Value = None,
+        **known: Value,
     ) -> None:
         plain = getattr(function, "py_func", function)
         asked = repr((
@@ -165,17 +158,17 @@ class Compiled:
             module = optimised_module(function, kinds, flags, name, **known)
             return bytes(_target().emit_object(module))
 
-        code = _kept(path, compiled)
+        code = kept.made(path, compiled)
         engine = (
             cpu_target.target_context.codegen()._engine._ee
         )  # which keeps the machine code of this process
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
         self.address = int(engine.get_function_address(name))
-        passed: dict[Any, Any] = {DOUBLE: ctypes.c_double, WHOLE: ctypes.c_int64}
+        passed: dict[ir.Type, type] = {DOUBLE: ctypes.c_double, WHOLE: ctypes.c_int64}
         numbers = [passed.get(one, ctypes.c_void_p) for kind in kinds for one in types_of(kind)]
         self._call = ctypes.PYFUNCTYPE(result, *numbers)(self.address)
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: object) -> Value:
         """Call it with Python's numbers, and arrays by their addresses."""
         return self._call(*flat(arguments))

@@ -7,7 +7,6 @@ import ast
 import math
 from collections.abc import Callable
 from functools import reduce
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -17,6 +16,7 @@ from hpcclear.base.lowering.values import (
     DOUBLE,
     WHOLE,
     Array,
+    Value,
     is_known,
     rebuilt,
     whole,
@@ -37,28 +37,28 @@ _FOLDED = (len, int, float, min, max, abs, range, written_out)
 class Expressions(Arithmetic):
     """Expressions of one function; `hpcclear.base.lowering.statements.Function` has the rest of it."""
 
-    def read(self, name: str) -> Any:
+    def read(self, name: str) -> Value:
         """The value of a local, or of a name of the module."""
         raise NotImplementedError
 
-    def called(self, function: Any, arguments: list[Any], named: dict[str, Any]) -> Any:
+    def called(self, function: Value, arguments: list[Value], named: dict[str, Value]) -> Value:
         """What a function of the kernel returns."""
         raise NotImplementedError
 
     # ---- expressions ----------------------------------------------------------------------------
 
-    def expression(self, node: ast.expr) -> Any:
+    def expression(self, node: ast.expr) -> Value:
         """The value of an expression."""
         return getattr(self, f"_of_{type(node).__name__}")(node)
 
-    def _of_Constant(self, node: ast.Constant) -> Any:
+    def _of_Constant(self, node: ast.Constant) -> Value:
         return node.value
 
-    def _of_Name(self, node: ast.Name) -> Any:
+    def _of_Name(self, node: ast.Name) -> Value:
         return self.read(node.id)
 
-    def _of_Tuple(self, node: ast.Tuple) -> Any:
-        items: tuple[Any, ...] = ()
+    def _of_Tuple(self, node: ast.Tuple) -> Value:
+        items: tuple[Value, ...] = ()
         for one in node.elts:
             if isinstance(one, ast.Starred):
                 items += self.expression(one.value)
@@ -66,14 +66,14 @@ class Expressions(Arithmetic):
                 items += (self.expression(one),)
         return items
 
-    def _of_Attribute(self, node: ast.Attribute) -> Any:
+    def _of_Attribute(self, node: ast.Attribute) -> Value:
         return getattr(self.expression(node.value), node.attr)
 
-    def _of_BinOp(self, node: ast.BinOp) -> Any:
+    def _of_BinOp(self, node: ast.BinOp) -> Value:
         one = self.expression(node.left)
         return self.binary(type(node.op), one, self.expression(node.right))
 
-    def _of_UnaryOp(self, node: ast.UnaryOp) -> Any:
+    def _of_UnaryOp(self, node: ast.UnaryOp) -> Value:
         value = self.expression(node.operand)
         if isinstance(node.op, ast.Not):
             test = self.truth(value)
@@ -85,8 +85,8 @@ class Expressions(Arithmetic):
             return self.builder.neg(value)
         return self.builder.fsub(self.cast(self.value(-0.0), value.type), value)
 
-    def _of_Compare(self, node: ast.Compare) -> Any:
-        def link(k: int, one: Any) -> Any:
+    def _of_Compare(self, node: ast.Compare) -> Value:
+        def link(k: int, one: Value) -> Value:
             other = self.expression(node.comparators[k])
             found = self.compared(type(node.ops[k]), one, other)
             if k + 1 == len(node.ops):
@@ -95,8 +95,8 @@ class Expressions(Arithmetic):
 
         return link(0, self.expression(node.left))
 
-    def _of_BoolOp(self, node: ast.BoolOp) -> Any:
-        def link(k: int) -> Any:
+    def _of_BoolOp(self, node: ast.BoolOp) -> Value:
+        def link(k: int) -> Value:
             found = self.expression(node.values[k])
             if k + 1 == len(node.values):
                 return found
@@ -107,14 +107,14 @@ class Expressions(Arithmetic):
 
         return link(0)
 
-    def _of_IfExp(self, node: ast.IfExp) -> Any:
+    def _of_IfExp(self, node: ast.IfExp) -> Value:
         return self.either(
             self.truth(self.expression(node.test)),
             lambda: self.expression(node.body),
             lambda: self.expression(node.orelse),
         )
 
-    def either(self, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+    def either(self, test: Value, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
         """The value of one of two branches; of the one that is taken, where that is known."""
         if is_known(test):
             return yes() if test else no()
@@ -126,7 +126,7 @@ class Expressions(Arithmetic):
             ends.append((branch(), b.block))
         return self.merged(ends)
 
-    def merged(self, ends: list[tuple[Any, ir.Block]]) -> Any:
+    def merged(self, ends: list[tuple[Value, ir.Block]]) -> Value:
         """The value that comes out of the ends of blocks, behind which it goes on."""
         b = self.builder
         if len(ends) == 1:
@@ -134,7 +134,7 @@ class Expressions(Arithmetic):
             b.position_at_end(block)
             return value
         values, blocks = zip(*ends, strict=True)
-        cast = [[] for _ in ends]  # type: list[list[Any]]
+        cast = [[] for _ in ends]  # type: list[list[Value]]
         shape = self._cast(values, blocks, cast)
         last = b.append_basic_block()
         for block in blocks:
@@ -148,7 +148,9 @@ class Expressions(Arithmetic):
                 chosen[-1].add_incoming(value, block)
         return shape(iter(chosen))
 
-    def _cast(self, values: Any, blocks: Any, cast: list[list[Any]]) -> Callable[[Any], Any]:
+    def _cast(
+        self, values: Value, blocks: Value, cast: list[list[Value]]
+    ) -> Callable[[Value], Value]:
         """Put numbers that differ by block into `cast`, as of one type; what makes one value of those that are chosen."""
         first = values[0]
         if all(value is first for value in values):
@@ -162,7 +164,7 @@ class Expressions(Arithmetic):
             column.append(self.cast(value, kind))
         return next
 
-    def _of_Subscript(self, node: ast.Subscript) -> Any:
+    def _of_Subscript(self, node: ast.Subscript) -> Value:
         owner, index = self.expression(node.value), node.slice
         if isinstance(index, ast.Slice):
             low, high = (self.value(self.expression(end)) for end in (index.lower, index.upper))  # type: ignore[arg-type]
@@ -173,7 +175,7 @@ class Expressions(Arithmetic):
             return found.item() if isinstance(found, np.generic) else found
         return self.item(owner, list(known) if isinstance(known, tuple) else [known])
 
-    def item(self, owner: Any, index: list[Any]) -> Any:
+    def item(self, owner: Value, index: list[Value]) -> Value:
         """What an index names: a number, a row, a part of a tuple."""
         owner = self.value(owner) if isinstance(owner, np.ndarray) else owner
         if isinstance(owner, Array):
@@ -192,7 +194,7 @@ class Expressions(Arithmetic):
             )
         return chosen
 
-    def _of_Call(self, node: ast.Call) -> Any:
+    def _of_Call(self, node: ast.Call) -> Value:
         function = self.expression(node.func)
         arguments = list(map(self.expression, node.args))
         named = {str(one.arg): self.expression(one.value) for one in node.keywords}

@@ -10,7 +10,6 @@ import linecache
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -21,7 +20,9 @@ from hpcclear.base.lowering.values import (
     DOUBLE,
     WHOLE,
     Array,
+    Flags,
     Kind,
+    Value,
     flat,
     gathered,
     is_known,
@@ -39,14 +40,14 @@ def _definitions(path: str) -> dict[str, ast.FunctionDef]:
     return {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
-def definition_of(function: Any) -> ast.FunctionDef:
+def definition_of(function: Value) -> ast.FunctionDef:
     """The syntax tree of a function at the top of its module (compiled or not)."""
     function = getattr(function, "py_func", function)
     return _definitions(function.__code__.co_filename)[function.__name__]
 
 
 @cache
-def _returns_inside_a_loop(function: Any) -> bool:
+def _returns_inside_a_loop(function: Value) -> bool:
     loops = (n for n in ast.walk(definition_of(function)) if isinstance(n, ast.For | ast.While))
     return any(isinstance(n, ast.Return) for loop in loops for n in ast.walk(loop))
 
@@ -58,23 +59,23 @@ class _Wider(Exception):
 class _Frame:
     """One call that is written out: its names, and where it leaves."""
 
-    def __init__(self, function: Any, number: int) -> None:
+    def __init__(self, function: Value, number: int) -> None:
         self.node = definition_of(function)
         self.names = getattr(function, "py_func", function).__globals__
         self.number = number
         found = (n for n in ast.walk(self.node) if isinstance(n, ast.Name))
         self.assigned = Counter(n.id for n in found if isinstance(n.ctx, ast.Store))
-        self.slots: dict[str, Any] = {}
-        self.bound: dict[str, Any] = {}
+        self.slots: dict[str, Value] = {}
+        self.bound: dict[str, Value] = {}
         self.loops: list[ir.Block] = []
-        self.returned: dict[ir.Block, Any] = {}
+        self.returned: dict[ir.Block, Value] = {}
 
 
 class Function(Expressions):
     """One function for arguments of given kinds, lowered into a module of its own."""
 
     def __init__(
-        self, function: Any, kinds: Sequence[Kind], name: str, flags: Any, call: Any
+        self, function: Value, kinds: Sequence[Kind], name: str, flags: Flags, call: Value
     ) -> None:
         self.kind = written_kind(function) or "lane"
         self.lowers, self.kinds = function, kinds
@@ -108,7 +109,7 @@ class Function(Expressions):
 
     # ---- names and calls ------------------------------------------------------------------------
 
-    def read(self, name: str) -> Any:
+    def read(self, name: str) -> Value:
         """Value of a name: of a local, of the function's module, or a builtin."""
         here = self.frame
         if name in here.slots:
@@ -117,7 +118,7 @@ class Function(Expressions):
             return here.bound[name]
         return here.names[name] if name in here.names else getattr(builtins, name)
 
-    def bind(self, name: str, value: Any) -> None:
+    def bind(self, name: str, value: Value) -> None:
         """Let a local have a value; a number that another may follow gets a place in memory."""
         here = self.frame
         known = is_known(value) and here.assigned[name] <= 1
@@ -135,7 +136,7 @@ class Function(Expressions):
             here.bound.pop(name, None)
         self.builder.store(self.cast(value, kind), here.slots[name])
 
-    def enter(self, values: dict[str, Any]) -> None:
+    def enter(self, values: dict[str, Value]) -> None:
         """Lower the body of the present call for values of its parameters."""
         here = self.frame
         for name, value in values.items():
@@ -146,7 +147,7 @@ class Function(Expressions):
                 here.bound[name] = value
         self.several(here.node.body)
 
-    def called(self, function: Any, arguments: list[Any], named: dict[str, Any]) -> Any:
+    def called(self, function: Value, arguments: list[Value], named: dict[str, Value]) -> Value:
         """What another function returns for these values."""
         plain = function.py_func
         names = [one.arg for one in definition_of(plain).args.args]
@@ -159,7 +160,7 @@ class Function(Expressions):
             return self.inlined(function, values)
         return self.beside(function, list(values.values()))
 
-    def inlined(self, function: Any, values: dict[str, Any]) -> Any:
+    def inlined(self, function: Value, values: dict[str, Value]) -> Value:
         """What a function returns that is written out here."""
         self.calls += 1
         outer, self.frame = self.frame, _Frame(function, self.calls)
@@ -169,7 +170,7 @@ class Function(Expressions):
         returned, self.frame = self.frame.returned, outer
         return self.merged([(value, block) for block, value in returned.items()])
 
-    def beside(self, function: Any, arguments: list[Any]) -> Any:
+    def beside(self, function: Value, arguments: list[Value]) -> Value:
         """What a function of its own returns."""
         arguments = [self.value(a) if isinstance(a, np.ndarray) else a for a in arguments]
         kinds = tuple(kind_of(one, known=True) for one in arguments)
@@ -212,7 +213,7 @@ class Function(Expressions):
     def _do_Assign(self, node: ast.Assign) -> None:
         self.assign(node.targets[0], self.expression(node.value))
 
-    def assign(self, target: ast.expr, value: Any) -> None:
+    def assign(self, target: ast.expr, value: Value) -> None:
         """Assign a value to a target of any form."""
         if isinstance(target, ast.Name):
             self.bind(target.id, value)
@@ -227,7 +228,7 @@ class Function(Expressions):
             else:
                 self.store(value, self.address(owner, index))
 
-    def address(self, owner: Any, index: Any) -> Any:
+    def address(self, owner: Value, index: Value) -> Value:
         """Where an entry of an array stands."""
         places = list(map(self.value, index if isinstance(index, tuple) else [index]))
         return (
@@ -236,7 +237,7 @@ class Function(Expressions):
             else self.builder.gep(owner, places)
         )
 
-    def store(self, value: Any, place: Any) -> None:
+    def store(self, value: Value, place: Value) -> None:
         """Put a number into memory."""
         kind, value = place.type.pointee, self.value(value)
         if value.type == DOUBLE and kind == WHOLE:
@@ -325,7 +326,7 @@ class Function(Expressions):
 
         self.loop(body, test, last, lower)
 
-    def settle(self, target: ast.expr, item: Any) -> None:
+    def settle(self, target: ast.expr, item: Value) -> None:
         """Let the variables of a loop that is written out be an item, known for its turn."""
         if isinstance(target, ast.Tuple):
             for part, one in zip(target.elts, item, strict=True):
@@ -343,7 +344,7 @@ class Function(Expressions):
         else:
             self.give(value)
 
-    def give(self, value: Any) -> None:
+    def give(self, value: Value) -> None:
         """Leave the function with a value."""
         value = self.value(value)
         if isinstance(value, ir.Value):  # a bit alone has no place in what a caller is given
@@ -368,7 +369,7 @@ class Function(Expressions):
             self.builder.ret(together)
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: Value) -> bool:
     """Whether a value is one number, which a place in memory can hold."""
     if isinstance(value, ir.Value):
         return not isinstance(value.type, ir.PointerType)

@@ -1,12 +1,17 @@
 """What the lowering of a text computes with: numbers as LLVM's values, and arrays and tuples that are known by their parts."""
 
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from llvmlite import ir
 
 from hpcclear.base.eight import EIGHT
+
+Value: TypeAlias = ir.Value
+"""LLVM's, or what is known of Python (a number, a function, an array, None), or a tuple of these. llvmlite has no types."""
+Flags: TypeAlias = Collection[str]
+"""Rewrites that are allowed in arithmetic of doubles, as LLVM calls them."""
 
 DOUBLE, WHOLE, TRUTH = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 VECTOR = ir.VectorType(DOUBLE, EIGHT)
@@ -17,8 +22,8 @@ ORDER = [TRUTH, WHOLE, DOUBLE, VECTOR]
 class Array(NamedTuple):
     """An array by its place in memory and its lengths, all of them LLVM's values; C order."""
 
-    data: Any
-    shape: tuple[Any, ...]
+    data: Value
+    shape: tuple[Value, ...]
 
 
 def whole(number: int) -> ir.Constant:
@@ -34,24 +39,24 @@ def wider(one: ir.Type | None, other: ir.Type) -> ir.Type:
 class Kind(NamedTuple):
     """What an argument is, without its values: the same kinds have the same code."""
 
-    of: Any
+    of: Value
     """A type of numbers; "array" of `parts[0]` with `parts[1]` dimensions; a class of tuples; None; "known", not
     passed: `parts[1]` of the type `parts[0]`."""
-    parts: tuple[Any, ...] = ()
+    parts: tuple[Value, ...] = ()
 
 
 DOUBLES, COUNTS = Kind(DOUBLE.as_pointer()), Kind(WHOLE.as_pointer())
 """Places of numbers in memory."""
 
 
-def is_known(value: Any) -> bool:
+def is_known(value: Value) -> bool:
     """Whether a value is Python's, and not LLVM's or a tuple with some of LLVM's."""
     return (
         all(map(is_known, value)) if isinstance(value, tuple) else not isinstance(value, ir.Value)
     )
 
 
-def kind_of(value: Any, known: bool = False) -> Kind:
+def kind_of(value: Value, known: bool = False) -> Kind:
     """The kind of a value: of LLVM, or as Python has it; where it counts as `known`, what Python has is part of the kind."""
     if value is None:
         return Kind(None)
@@ -80,7 +85,7 @@ def types_of(kind: Kind) -> Iterator[ir.Type]:
             yield from types_of(part)
 
 
-def flat(value: Any) -> Iterator[Any]:
+def flat(value: Value) -> Iterator[Value]:
     """Numbers and places that a value is passed as; of an array of Python its address and lengths."""
     if isinstance(value, np.ndarray):
         assert value.flags.c_contiguous
@@ -93,7 +98,7 @@ def flat(value: Any) -> Iterator[Any]:
         yield value
 
 
-def gathered(kind: Kind, parts: Iterator[Any]) -> Any:
+def gathered(kind: Kind, parts: Iterator[Value]) -> Value:
     """The value of a kind from what it was passed as."""
     if kind.of == "array":
         return Array(next(parts), tuple(next(parts) for _ in range(kind.parts[1])))
@@ -106,7 +111,7 @@ def gathered(kind: Kind, parts: Iterator[Any]) -> Any:
     )
 
 
-def rebuilt(maker: type[Any], items: Iterable[Any]) -> Any:
+def rebuilt(maker: Callable[..., Value], items: Iterable[Value]) -> Value:
     """A tuple of a class, named or not."""
     return maker(*items) if hasattr(maker, "_fields") else tuple(items)
 
