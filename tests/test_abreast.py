@@ -11,7 +11,7 @@ from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import kind_of
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
-from hpcclear.dynamics.layout import RATES, START, START_CONTACTS
+from hpcclear.dynamics.layout import MAX_JOINTS, RATES
 from hpcclear.dynamics.layout.views import Outcome
 from hpcclear.dynamics.linkage.observe import observe
 from hpcclear.dynamics.setup.parameters import parameters
@@ -80,7 +80,7 @@ def test_a_film_is_the_same_in_any_number_of_lanes(model: str):
     start = start_states(scene, parameters(scene)).state(n)
     scale = np.r_[np.full(n, 4e-4), np.full(n, 1.0)]
     states = start + scale * np.random.default_rng(5).uniform(-1.0, 1.0, (count, 2 * n))
-    contacts = np.zeros((count, START - START_CONTACTS))
+    contacts = np.zeros((count, 2 * MAX_JOINTS))
     found = []
     for width in (1, DEFAULT_LANES):
         out = np.zeros((count, n + RATES))

@@ -12,6 +12,7 @@ from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import kind_of
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.layout.arguments import Stepped, rules_of
 from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.setup.problem import problem_of
 from hpcclear.dynamics.stepping.control import commit_measures
@@ -23,7 +24,7 @@ from hpcclear.dynamics.stepping.implicit.newton import observe_stages
 from hpcclear.scene import load_scene
 
 W = 4
-NONE_OPEN = at.Stepped(at.rules_of(at.Effects()), np.zeros(0, np.int64))
+NONE_OPEN = Stepped(rules_of(at.Effects()), np.zeros(0, np.int64))
 
 
 @lane_function
@@ -82,7 +83,7 @@ def test_what_does_not_fit_is_refused():
         tab.Tableau("long", 2, 1, many, many[0], many[0], "none")
     with pytest.raises(ValueError, match="not 3"):
         tab.Tableau("askew", 2, 1, many, many[0, :3], many[0, :3], "none")
-    with pytest.raises(ValueError, match=f"a row of Start holds {at.START} numbers, not 21"):
+    with pytest.raises(ValueError, match=f"a row of Start holds {Start.size} numbers, not 21"):
         Start(np.zeros((3, 21)))
 
 

@@ -12,7 +12,6 @@ from hpcclear.dynamics.linkage.loops import words_of
 from hpcclear.dynamics.linkage.parts import TableDrive
 from hpcclear.dynamics.planar.curves import angle_pieces
 from hpcclear.dynamics.planar.problem import linkage_of
-from hpcclear.dynamics.setup.problem import problem_of
 
 LINKAGES = Path(__file__).parent.parent / "jobs" / "linkages"
 ROCKER = load_scene(LINKAGES / "crank_rocker.toml").with_(
@@ -108,4 +107,3 @@ def test_tables_that_do_not_repeat_are_refused():
     both = ROCKER.with_({"mechanism.drives": {"main": main, "motor": round_and_round}})
     with pytest.raises(InputError, match="goes round"):
         linkage_of(both)
-    assert problem_of(driven(lambda s: START + 2 * math.pi * s)).effects.swinging is None

@@ -5,11 +5,10 @@ distance between two rows and can vectorise over the lanes without run-time chec
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.numbered import RowNumbers
 from hpcclear.base.outcome import MAX_JOINTS, WAVE_ROWS
 from hpcclear.laws.declared import LAW_NUMBERS
@@ -21,46 +20,49 @@ MAX_COORDINATES = 88
 the sets of a first-level cache, and a scene of few coordinates its speed. Only rows in use are touched."""
 
 
+class LaneLaw(Protocol):
+    """What is known here of a law or rate compiled into the lanes (`contacts.laws.InLanes`), 1 or None."""
+
+    latched: int | None
+    bristled: int | None
+    whole: int | None
+    largest: int | None
+
+
 class Effects(NamedTuple):
     """What is on (1) and what is off (None): None prunes the branch before it is compiled."""
 
-    joints: Any = None  # how many have clearance
+    joints: int = 0  # how many have clearance
     first: int = 0  # place of the first of them; the others follow
-    contact: Any = None  # the normal force's law and friction's, as `contacts.laws.InLanes`
-    friction: Any = None
+    contact: LaneLaw | None = None  # the normal force's law
+    friction: LaneLaw | None = None
     torque: int | None = None  # the body that gives the period is free, driven by a torque
-    baumgarte: int | None = None  # Cartesian coordinates with multipliers instead of minimal ones
     energies: int | None = None  # energy balance
     series: int | None = None  # friction forces and crank moment, for time series
     responses: int | None = None  # mean forces, drive moment, followed acceleration of each sample
     impacts: int | None = None  # measures of impact and noise of each sample
     sliding: int | None = None  # kinks of the laws, for the implicit method
-    swinging: int | None = None  # the drive that gives the period does not turn round
     wear: int | None = None  # sliding work of the joints with clearance
-    waves: Any = (
-        None  # surfaces that are out of round; how many waves around bearing and journal have:
-    )
+    waves: int | None = None  # surfaces are out of round; waves around bearing and journal:
     bearing_waves: int | None = None
     journal_waves: int | None = None
-    threshold: Any = None  # of the pressure, below which nothing wears
+    threshold: int | None = None  # of the pressure, below which nothing wears
     profile: int | None = None  # where around these the sliding work is done
-    films: Any = None  # names of laws of oil films, by places of joints
-    objective: Any = (
-        None  # the rate that the study's objective is made of, as `contacts.laws.InLanes`
-    )
+    films: tuple[str | None, ...] | None = None  # laws of oil films, by places of joints
+    objective: LaneLaw | None = None  # the rate that the study's objective is made of
 
     @property
-    def latched(self) -> Any:
+    def latched(self) -> int | None:
         """Whether the normal force's law requires the impact speed, which is `latched`."""
         return None if self.contact is None else self.contact.latched
 
     @property
-    def film_at(self) -> tuple[Any, ...]:
+    def film_at(self) -> tuple[str | None, ...]:
         """The same, of scenes without oil as well."""
         return self.films or (None,) * MAX_JOINTS
 
     @property
-    def bristled(self) -> Any:
+    def bristled(self) -> int | None:
         """Whether friction has bristles, a coordinate for each joint with clearance."""
         return None if self.friction is None else self.friction.bristled
 
@@ -75,7 +77,7 @@ def bristles_of(effects: Effects) -> int:
 
 def places_of(effects: Effects) -> range:
     """Places of the joints with clearance."""
-    return range(effects.first, effects.first + (effects.joints or 0))
+    return range(effects.first, effects.first + effects.joints)
 
 
 class Waves(NamedTuple):
@@ -370,42 +372,7 @@ AVERAGED = OF_BOOK(
 TOTAL = OF_BOOK("integrals over all revolutions, likewise", size=len(INTEGRATED))
 BOOK = OF_BOOK.end
 
-# ---- one finished sample --------------------------------------------------------------------------
-OF_OUTCOME = RowNumbers()
-OUT_STATUS = OF_OUTCOME("how it ended")
-OUT_OBJECTIVE = OF_OUTCOME("f of eq. 13", "m")
-OUT_SPREAD = OF_OUTCOME("standard deviation of f between averaged revolutions", "m")
-OUT_EVALUATIONS = OF_OUTCOME("of the motion")
-OUT_REVOLUTIONS = OF_OUTCOME("all that were simulated")
-OUT_TIME = OF_OUTCOME("of these", "s")
-OUT_ATTEMPTS = OF_OUTCOME("steps tried")
-OUT_STIFF_STEPS = OF_OUTCOME("implicit steps tried")
-OUT_MOMENT = OF_OUTCOME("largest size of the drive's moment", "N m")
-OUT_ACCELERATION = OF_OUTCOME("standard deviation of the followed acceleration", "m/s^2")
-OUT_FOLLOWED = OF_OUTCOME("its largest size", "m/s^2")
-OUT_PERIOD = OF_OUTCOME("mean length of an averaged revolution", "s")
-OUT_CYCLE = OF_OUTCOME("angle of the drive in a revolution", "rad")
-OUT_PEAK = OF_OUTCOME("largest contact force", "N", EACH)
-OUT_LATCHED = OF_OUTCOME("whole revolutions in contact", "", EACH)
-OUT_DEEPEST = OF_OUTCOME("largest penetration", "m", EACH)
-OUT_ACTIVE = OF_OUTCOME("contact whose impact speed is kept, at the end", "", EACH)
-OUT_INVERSE_IMPACT = OF_OUTCOME("1 / d'_0 there", "s/m", EACH)
-OUT_LARGEST_RATE = OF_OUTCOME("of the objective's", "", EACH)
-OUT_MEAN = OF_OUTCOME(
-    "time means over the averaged revolutions, in the order of INTEGRATED", size=len(INTEGRATED)
-)
-OUT_TOTAL = OF_OUTCOME("integrals over all revolutions, likewise", size=len(INTEGRATED))
-OUT_STATE = OF_OUTCOME("coordinates and velocities at the end", size=2 * MAX_COORDINATES)
-OUT = OF_OUTCOME.end
 
-# ---- one sample to come ---------------------------------------------------------------------------
-OF_START = RowNumbers()
-OF_START("coordinates and velocities", size=2 * MAX_COORDINATES)
-START_CONTACTS = OF_START("active flags, then 1/d'_0", size=2 * MAX_JOINTS)
-START = OF_START.end
-
-
-# ---- what the steppers hand on as one -------------------------------------------------------------
 @dataclass(frozen=True)
 class Joint:
     """Where the motion finds and leaves the numbers of one joint with clearance; steppers count from its place."""
@@ -433,65 +400,3 @@ class Joint:
 
 
 JOINTS = tuple(map(Joint, _PLACES))
-
-
-class Block(NamedTuple):
-    """The lanes of a stepper, flat: state and scratch, stage accelerations, parameters, sums.
-
-    `work`, `par` and `stages` are neighbours in memory, in this order, at distances that the compiler knows."""
-
-    work: Array
-    stages: Array
-    par: Array
-    book: Any
-
-
-class Queue(NamedTuple):
-    """Samples to come and samples done: parameters, starts, outcomes, slots in the order they finished, counters."""
-
-    par: Array
-    start: Array
-    out: Array
-    finished: Integers
-    counters: Integers
-
-
-class Method(NamedTuple):
-    """What a run is integrated with: its settings, the packed tableau, tabulated curves, what is measured, and the numbers by
-    which a stepper calls what is compiled apart from it (`stepping.special`)."""
-
-    settings: Array
-    weights: Array
-    tables: Array  # as `layout.curves.packed`
-    measures: Array  # as `measures_of`
-    numbers: Integers
-
-
-class Rules(NamedTuple):
-    """What a stepper has to know of the effects, as numbers 0 and 1: they change no compiled code."""
-
-    latched: int  # impacts are located, and their speed is kept
-    free: int  # a torque drives the crank: its angle is the last coordinate, and its turn ends a revolution
-    responses: int
-    impacts: int  # contacts are counted
-    profile: int  # where around joints sliding work is done is recorded
-    largest: int  # the objective is made of the largest value of its rate
-    begin: int  # places of open joints, from `begin` on
-    end: int  # and before `end`
-    curves: int  # tabulated ones, if steps end at rows of any
-
-
-def rules_of(effects: Effects, curves: int = 0) -> Rules:
-    """Those of a set of effects, and of so many tabulated curves at whose rows steps end."""
-    e = effects
-    largest = None if e.objective is None else e.objective.largest
-    flags = (e.latched, e.torque, e.responses, e.impacts, e.profile, largest)
-    places = places_of(e)
-    return Rules(*[int(flag is not None) for flag in flags] + [places.start, places.stop, curves])
-
-
-class Stepped(NamedTuple):
-    """What the functions of a stepper read: rules and measures."""
-
-    rules: Rules
-    measures: Array

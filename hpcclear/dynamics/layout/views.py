@@ -4,45 +4,51 @@ A view holds rows, shape (..., columns), and reads and writes what it names in p
 ``outcome.mean_gap`` shape (..., MAX_JOINTS); places without a joint hold 0.
 """
 
-from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any, Self, overload
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.numbered import RowNumbers
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout import settings
+
+EACH = at.MAX_JOINTS
 
 
 class Column:
-    """One column of a view's rows, or several."""
+    """`size` columns of a view's rows, every `step`-th; of the class itself the number of the first, as the kernel has it."""
 
-    def __init__(self, column: int | Sequence[int] | slice) -> None:
-        self.column = list(column) if isinstance(column, Sequence) else column
+    def __init__(self, first: int, size: int = 1, step: int = 1) -> None:
+        self.first = first
+        self.column = first if size == 1 else slice(first, first + step * size, step)
 
-    def __get__(self, view: Any, owner: type) -> Array:
+    @overload
+    def __get__(self, view: None, owner: type) -> int: ...
+
+    @overload
+    def __get__(self, view: "View", owner: type) -> Array: ...
+
+    def __get__(self, view: "View | None", owner: type) -> int | Array:
+        if view is None:
+            return self.first
         values: Array = view.rows[..., self.column]
         return values
 
-    def __set__(self, view: Any, values: Any) -> None:
+    def __set__(self, view: "View", values: Any) -> None:
         view.rows[..., self.column] = values
 
 
-def _of_joints(first: int, step: int = 1) -> Column:
-    return Column(slice(first, first + step * at.MAX_JOINTS, step))
+class Declared(RowNumbers):
+    """Columns numbered one behind the other as they are declared."""
 
-
-def _mean(rate: int) -> Column:
-    return Column(at.OUT_MEAN + at.place(rate))
+    def column(self, words: str, unit: str = "", size: int = 1) -> Column:
+        """The next ones."""
+        return Column(self(words, unit, size), size)
 
 
 def _entry(entry: int) -> Column:
-    return _of_joints(at.JOINT_BLOCKS + entry, at.JOINT_ROWS)
-
-
-def _total(rate: int) -> Column:
-    return Column(at.OUT_TOTAL + at.place(rate))
+    return Column(at.JOINT_BLOCKS + entry, EACH, at.JOINT_ROWS)
 
 
 class View:
@@ -78,17 +84,19 @@ class View:
 class Start(View):
     """Starts of samples: coordinates and velocities (of those the topology has), contact states."""
 
-    size = at.START
-
-    contacts = Column(slice(at.START_CONTACTS, at.START))  # active flags, then 1/d'_0
-    active = _of_joints(at.START_CONTACTS)
-    inverse_impact = _of_joints(at.START_CONTACTS + at.MAX_JOINTS)
-    moving = Column(slice(0, at.START_CONTACTS))  # all places of coordinates and velocities
+    _rows = Declared()
+    moving = _rows.column(
+        "all places of coordinates, then of velocities", size=2 * at.MAX_COORDINATES
+    )
+    contacts = Column(_rows.end, 2 * EACH)
+    active = _rows.column("contact whose impact speed is kept (1), or flight (0)", "", EACH)
+    inverse_impact = _rows.column("1 / d'_0 there", "s/m", EACH)
+    size = _rows.end
 
     @classmethod
     def at_rest(cls, samples: int) -> "Start":
         """Starts that are all zero."""
-        return cls(np.zeros((samples, at.START)))
+        return cls(np.zeros((samples, cls.size)))
 
     def coordinates(self, n: int) -> Array:
         """The n coordinates of a topology, shape (..., n)."""
@@ -120,61 +128,68 @@ class Outcome(View):
     Means are over the averaged revolutions, totals over all of them; those of rates that no effect requested are 0.
     """
 
-    size = at.OUT
+    _rows = Declared()
+    status = _rows.column("how it ended")
+    objective = _rows.column("f of eq. 13", "m")
+    spread = _rows.column("standard deviation of f between averaged revolutions", "m")
+    evaluations = _rows.column("of the motion")
+    revolutions = _rows.column("all that were simulated")
+    time = _rows.column("of these", "s")
+    attempts = _rows.column("steps tried")
+    stiff_steps = _rows.column("implicit steps tried")
+    peak_moment = _rows.column("largest size of the drive's moment", "N m")
+    acceleration_deviation = _rows.column(
+        "standard deviation of the followed acceleration", "m/s^2"
+    )
+    peak_acceleration = _rows.column("its largest size", "m/s^2")
+    period = _rows.column("mean length of an averaged revolution", "s")
+    cycle = _rows.column("angle of the drive in a revolution", "rad")
+    peak_force = _rows.column("largest contact force", "N", EACH)
+    latched = _rows.column("whole revolutions in contact", "", EACH)
+    deepest = _rows.column("largest penetration", "m", EACH)
+    contacts = Column(_rows.end, 2 * EACH)  # as of a start
+    active = _rows.column("contact whose impact speed is kept, at the end", "", EACH)
+    inverse_impact = _rows.column("1 / d'_0 there", "s/m", EACH)
+    largest_rate = _rows.column("of the objective's", "", EACH)
+    mean = _rows.column(
+        "time means over the averaged revolutions, in the order of INTEGRATED",
+        "",
+        len(at.INTEGRATED),
+    )
+    total = _rows.column("integrals over all revolutions, likewise", "", len(at.INTEGRATED))
+    moving = _rows.column(
+        "coordinates and velocities at the end, all places", "", 2 * at.MAX_COORDINATES
+    )
+    size = _rows.end
 
-    status = Column(at.OUT_STATUS)
-    objective = Column(at.OUT_OBJECTIVE)  # m
-    spread = Column(at.OUT_SPREAD)  # m, between averaged revolutions
-    period = Column(at.OUT_PERIOD)  # s, mean of the averaged revolutions
-    cycle = Column(at.OUT_CYCLE)  # rad of a revolution
-    mean_gap = _of_joints(at.OUT_MEAN)  # m
-    peak_force = _of_joints(at.OUT_PEAK)  # N
-    latched = _of_joints(at.OUT_LATCHED)
-    deepest = _of_joints(at.OUT_DEEPEST)  # m
-    evaluations = Column(at.OUT_EVALUATIONS)
-    revolutions = Column(at.OUT_REVOLUTIONS)
-    time = Column(at.OUT_TIME)  # s
-    drive_work = _total(at.DRIVE_POWER)  # J
-    absolute_drive_work = _total(at.ABS_DRIVE_POWER)
-    dissipated = _total(at.DISSIPATION)
-    load_work = _total(at.LOAD_POWER)
-    active = _of_joints(at.OUT_ACTIVE)
-    contacts = Column(slice(at.OUT_ACTIVE, at.OUT_INVERSE_IMPACT + at.MAX_JOINTS))  # as of a start
-    attempts = Column(at.OUT_ATTEMPTS)
-    stiff_steps = Column(at.OUT_STIFF_STEPS)
-    mean_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE))  # N
-    impact_power = _of_joints(at.OUT_MEAN + at.place(at.IMPACT_POWERS))  # W
-    square_force = _of_joints(at.OUT_MEAN + at.place(at.FORCE_SQUARES))  # N^2, mean square
-    flight = _of_joints(at.OUT_MEAN + at.place(at.FLIGHTS))  # share of the time without contact
-    begun = _of_joints(at.OUT_MEAN + at.place(at.BEGUN))  # 1/s, contacts that begin
-    frame_force = Column([at.OUT_MEAN + at.place(row) for row in (at.FRAME_X, at.FRAME_Y)])  # N
-    square_frame_force = _mean(at.FRAME_SQUARE)  # N^2
-    sliding_power = _of_joints(at.OUT_MEAN + at.place(at.SLIDING_POWERS))  # W, mean of F_N |v_t|
-    mean_rate = _of_joints(at.OUT_MEAN + at.place(at.OBJECTIVE_RATES))  # of the objective
-    largest_rate = _of_joints(at.OUT_LARGEST_RATE)
-    profile = Column(
-        slice(at.OUT_MEAN + at.place(at.PROFILES), at.OUT_MEAN + len(at.INTEGRATED))
-    )  # W, means of F_N |v_t| times waves of the contact's angle, as of `layout.waves_of`; NaN of those that are not there
-    sliding_work = _of_joints(at.OUT_TOTAL + at.place(at.SLIDING_POWERS))  # J
-    peak_moment = Column(at.OUT_MOMENT)  # N m
-    acceleration_deviation = Column(
-        at.OUT_ACCELERATION
-    )  # m/s^2, of the slider or of the followed point
-    peak_acceleration = Column(at.OUT_FOLLOWED)  # m/s^2, likewise
-    moving = Column(slice(at.OUT_STATE, at.OUT))  # all places of coordinates and velocities
+    mean_gap = Column(mean.first, EACH)  # m
+    mean_force = Column(mean.first + at.place(at.FORCE), EACH)  # N
+    impact_power = Column(mean.first + at.place(at.IMPACT_POWERS), EACH)  # W
+    square_force = Column(mean.first + at.place(at.FORCE_SQUARES), EACH)  # N^2, mean square
+    flight = Column(mean.first + at.place(at.FLIGHTS), EACH)  # share of the time without contact
+    begun = Column(mean.first + at.place(at.BEGUN), EACH)  # 1/s, contacts that begin
+    frame_force = Column(mean.first + at.place(at.FRAME_X), 2)  # N, along x and y
+    square_frame_force = Column(mean.first + at.place(at.FRAME_SQUARE))  # N^2
+    sliding_power = Column(mean.first + at.place(at.SLIDING_POWERS), EACH)  # W, mean of F_N |v_t|
+    mean_rate = Column(mean.first + at.place(at.OBJECTIVE_RATES), EACH)  # of the objective
+    profile = Column(mean.first + at.place(at.PROFILES), at.WAVE_ROWS)
+    """W, means of F_N |v_t| times waves of the contact's angle, as of `layout.waves_of`; NaN of those that are not there"""
+    drive_work = Column(total.first + at.WORKS)  # J; with its size, losses and load work: four
+    absolute_drive_work = Column(drive_work.first + 1)
+    dissipated = Column(drive_work.first + 2)
+    load_work = Column(drive_work.first + 3)
 
     def coordinates(self, n: int) -> Array:
         """The n coordinates of a topology at the end, shape (..., n)."""
-        return self.rows[..., at.OUT_STATE : at.OUT_STATE + n]
+        return self.moving[..., :n]
 
     def velocities(self, n: int) -> Array:
         """Their velocities, shape (..., n)."""
-        first = at.OUT_STATE + at.MAX_COORDINATES
-        return self.rows[..., first : first + n]
+        return self.moving[..., at.MAX_COORDINATES : at.MAX_COORDINATES + n]
 
     def end(self) -> Start:
         """Where the samples ended, to go on from; places that no coordinate has are 0."""
-        start = Start(np.empty((*self.rows.shape[:-1], at.START)))
+        start = Start(np.empty((*self.rows.shape[:-1], Start.size)))
         start.moving = np.nan_to_num(self.moving)
         start.contacts = self.contacts
         return start
@@ -183,29 +198,32 @@ class Outcome(View):
 class RunSettings(View):
     """Numbers that steer a run, one row."""
 
-    size = settings.SETTINGS
-
-    rtol = Column(settings.RTOL)
-    gap_tolerance = Column(settings.GAP_TOLERANCE)  # m
-    angle_tolerance = Column(settings.ANGLE_TOLERANCE)  # rad
-    impact_floor = Column(settings.IMPACT_FLOOR)  # m/s
-    transient = Column(settings.TRANSIENT)  # revolutions
-    averaged = Column(settings.AVERAGED)
-    max_steps = Column(settings.MAX_STEPS)
-    smallest_step = Column(settings.SMALLEST_STEP)
-    exponent = Column(settings.EXPONENT)  # of the step-size control
-    beta = Column(settings.BETA)
-    implicit = Column(settings.IMPLICIT)
-    cycle = Column(settings.CYCLE)  # rad
-    parameter_rows = Column(settings.PARAMETER_ROWS)
-    profiled = Column(settings.PROFILED)
-    senses = Column(settings.SENSES)
-    at_rest = Column(settings.AT_REST)  # rad
-    chosen = _of_joints(settings.CHOSEN)
-    atol = Column(slice(settings.ATOL, settings.WRAPS))  # all places
-    atol_coordinates = Column(slice(settings.ATOL, settings.ATOL + at.MAX_COORDINATES))
-    atol_velocities = Column(slice(settings.ATOL + at.MAX_COORDINATES, settings.WRAPS))
-    wraps = Column(slice(settings.WRAPS, settings.SETTINGS))
+    _rows = Declared()
+    rtol = _rows.column("relative tolerance")
+    gap_tolerance = _rows.column("an impact is located this well", "m")
+    angle_tolerance = _rows.column("likewise, for the end of a revolution of a free crank", "rad")
+    impact_floor = _rows.column("least latched impact speed", "m/s")
+    transient = _rows.column("revolutions")
+    averaged = _rows.column("revolutions")
+    max_steps = _rows.column("of a sample")
+    smallest_step = _rows.column("relative to the time")
+    exponent = _rows.column("of the step-size control")
+    beta = _rows.column("likewise, of the error before")
+    implicit = _rows.column("0 never, 1 where the motion is stiff, 2 always")
+    cycle = _rows.column(
+        "by which the driven body turns in a revolution; negative clockwise", "rad"
+    )
+    parameter_rows = _rows.column("how many parameters a sample has")
+    profiled = _rows.column("how many rates of profiles of wear there are to integrate")
+    at_rest = _rows.column("within which a crank that starts from rest may turn back", "rad")
+    senses = _rows.column("1 where explicit steps look out for the edge of stability")
+    chosen = _rows.column("of each joint: 1 where its gap counts for the objective", "", EACH)
+    atol_coordinates = _rows.column("absolute tolerances", "", at.MAX_COORDINATES)
+    atol_velocities = _rows.column("and of velocities", "", at.MAX_COORDINATES)
+    wraps = _rows.column(
+        "by which each coordinate is counted anew with a revolution", "rad", at.MAX_COORDINATES
+    )
+    size = _rows.end
 
 
 class Parameters(View):
@@ -232,17 +250,14 @@ class Parameters(View):
     journal_radius = _entry(at.JOURNAL_RADIUS)
     inverse_ramp = _entry(at.INVERSE_RAMP)
     steepness = _entry(at.STEEPNESS)  # s/m
-    film_scale = _entry(at.FILM_SCALE)
-    film_shear = _entry(at.FILM_SHEAR)
-    film_floor = _entry(at.FILM_FLOOR)
 
     @property
     def contact_numbers(self) -> Array:
         """Numbers of the law of contact, shape (..., MAX_JOINTS, LAW_NUMBERS), in the order of its ``read``."""
         blocks = self.rows[..., at.JOINT_BLOCKS : at.OWN]
         blocks = blocks.reshape(*blocks.shape[:-1], at.MAX_JOINTS, at.JOINT_ROWS)
-        found: Array = blocks[..., at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + at.LAW_NUMBERS]
-        return found
+        numbers: Array = blocks[..., at.CONTACT_NUMBERS : at.CONTACT_NUMBERS + at.LAW_NUMBERS]
+        return numbers
 
 
 class Rates(View):
@@ -250,12 +265,12 @@ class Rates(View):
 
     size = at.RATES
 
-    gap = _of_joints(at.GAP)  # m
-    force = _of_joints(at.FORCE)  # N, normal
-    friction = _of_joints(at.FRICTIONS)  # N
+    gap = Column(at.GAP, EACH)  # m
+    force = Column(at.FORCE, EACH)  # N, normal
+    friction = Column(at.FRICTIONS, EACH)  # N
     drive_moment = Column(at.DRIVE_MOMENT)  # N m
     followed_x = Column(at.FOLLOWED_ACCELERATION)  # m/s^2, of the followed point
     followed_y = Column(at.FOLLOWED_ACROSS)
     frame_x = Column(at.FRAME_X)  # N
     frame_y = Column(at.FRAME_Y)
-    powers = Column(slice(at.DRIVE_POWER, at.LOAD_POWER + 1))  # W: drive, its size, losses, load
+    powers = Column(at.DRIVE_POWER, 4)  # W: drive, its size, losses, load

@@ -49,11 +49,9 @@ def effects_of(
     return at.Effects(
         joints=count,
         first=next(iter(scene.open_places), 0),
-        swinging=_flag(not main.advance),
         contact=in_lanes(e.contact.declared) if e.contact is not None and count else None,
         friction=in_lanes(e.friction.declared) if e.friction.law != "none" and count else None,
         torque=_flag(isinstance(main, TorqueDrive) and bool(main.advance)),
-        baumgarte=_flag(scene.numerics.formulation == "baumgarte"),
         objective=rate_in_lanes(judge) if judge.whole or (judge.rate and count) else None,
         energies=_flag(scene.numerics.energy if energies is None else energies),
         series=_flag(series),

@@ -11,7 +11,7 @@ from numba import njit
 from hpcclear.base.bits import no_less, rough_exp2, rough_log2
 from hpcclear.base.jit import FASTMATH, lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import BETA, EXPONENT, MAX_STEPS, SMALLEST_STEP
+from hpcclear.dynamics.layout.views import RunSettings
 
 SHRINK = 0.2
 """What a rejected step shrinks to at most."""
@@ -109,8 +109,8 @@ def commit_rows(rules, work, W):
 @lane_function
 def judge_step(work, settings, W):
     """Accept or reject by the error, propose the next step; mark lanes that cannot go on for the scalar code."""
-    expo, beta = settings[EXPONENT], settings[BETA]
-    max_steps, smallest = settings[MAX_STEPS], settings[SMALLEST_STEP]
+    expo, beta = settings[RunSettings.exponent], settings[RunSettings.beta]
+    max_steps, smallest = settings[RunSettings.max_steps], settings[RunSettings.smallest_step]
     for i in range(W):
         error = work[at.ERROR * W + i]
         # not a number has a sign too, and a negative one would pass for a tiny error below

@@ -8,19 +8,14 @@ import numpy as np
 from hpcclear.base.arrays import Array, Booleans, Integers, aligned
 from hpcclear.base.lowering.values import kind_of
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import (
-    COUNTERS,
-    FINISHED,
-    KEPT,
-    MOTION,
-    MOTION_OF_EIGHT,
-    NEXT_SLOT,
-    OBSERVING,
-    OBSERVING_EIGHT,
-    PROFILE,
-    RECORDED,
-    SLOTS,
+from hpcclear.dynamics.layout.arguments import (
+    Asking,
+    Block,
+    Counter,
+    Method,
+    Queue,
     numbers_of,
+    rules_of,
 )
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
 from hpcclear.dynamics.linkage.observe import observe
@@ -75,7 +70,7 @@ class Lanes:
         bank[at.WORK * width : at.STAGES * width] = (
             1.0  # parameters: a resting lane divides by them
         )
-        self._block = at.Block(
+        self._block = Block(
             work=bank[: at.WORK * width],
             stages=bank[at.STAGES * width :],
             par=bank[at.WORK * width : at.STAGES * width],
@@ -87,9 +82,9 @@ class Lanes:
         effects = problem.effects._replace(sliding=sliding)
         self._observed = None if observed is None else observed._replace(sliding=sliding)
         measured = effects._replace(impacts=(observed or effects).impacts)
-        self._rules = at.rules_of(measured, problem.stopping_curves)
+        self._rules = rules_of(measured, problem.stopping_curves)
         measures = at.measures_of(observed or problem.effects)
-        self._method = at.Method(
+        self._method = Method(
             problem.settings().rows,
             problem.tableau.packed(),
             problem.tables,
@@ -98,7 +93,7 @@ class Lanes:
         )
         self._codes = Codes(0, 0, 0)
         self._budget = 256
-        self.counters = np.zeros(COUNTERS, np.int64)
+        self.counters = np.zeros(Counter.COUNT, np.int64)
         self._accept_queue(
             np.empty((0, problem.parameter_rows)), np.empty((0, Start.size)), np.empty(0, np.int64)
         )
@@ -119,16 +114,16 @@ class Lanes:
         self._step = make_stepper(self.width, kinds, implicit=stiff)
         implicit = batch_code().address if stiff else 0
         self._codes = Codes(special_code().address, explicit, implicit)
-        for row, width in zip((MOTION, MOTION_OF_EIGHT), widths, strict=True):
+        for row, width in zip((Asking.MOTION, Asking.MOTION_OF_EIGHT), widths, strict=True):
             self._method.numbers[row] = problem.motion(effects, width).address if width else 0
-        self._observer = int(self._method.numbers[MOTION])
+        self._observer = int(self._method.numbers[Asking.MOTION])
         if self._observed is not None:
-            for row, width in zip((OBSERVING, OBSERVING_EIGHT), widths, strict=True):
+            for row, width in zip((Asking.OBSERVING, Asking.OBSERVING_EIGHT), widths, strict=True):
                 address = problem.motion(self._observed, width).address if width else 0
                 self._method.numbers[row] = address
-            self._observer = int(self._method.numbers[OBSERVING])
+            self._observer = int(self._method.numbers[Asking.OBSERVING])
         if self._rules.profile:
-            self._method.numbers[PROFILE] = profile_code(effects, self.width).address
+            self._method.numbers[Asking.PROFILE] = profile_code(effects, self.width).address
         self._compiled = (
             True  # last: a stepper must not call what an interrupted compilation left out
         )
@@ -156,7 +151,7 @@ class Lanes:
     def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:
         count = len(labels)
         self._labels = labels
-        self._queue = at.Queue(
+        self._queue = Queue(
             par=np.ascontiguousarray(par),
             start=np.ascontiguousarray(start),
             out=np.full((count, Outcome.size), np.nan),
@@ -164,8 +159,8 @@ class Lanes:
             counters=self.counters,
         )
         self.counters[:] = 0
-        self.counters[SLOTS] = count
-        self.counters[KEPT] = self._kept
+        self.counters[Counter.SLOTS] = count
+        self.counters[Counter.KEPT] = self._kept
 
     @property
     def running(self) -> Booleans:
@@ -177,7 +172,7 @@ class Lanes:
     @property
     def waiting(self) -> int:
         """Samples queued that no lane has taken yet."""
-        return int(self.counters[SLOTS] - self.counters[NEXT_SLOT])
+        return int(self.counters[Counter.SLOTS] - self.counters[Counter.NEXT_SLOT])
 
     @property
     def pending(self) -> int:
@@ -194,7 +189,7 @@ class Lanes:
         self.queue(par, start, np.arange(len(par)))
         while self.step(NO_LIMIT):
             pass
-        self.counters[FINISHED] = 0
+        self.counters[Counter.FINISHED] = 0
         return self.problem.marked(Outcome(self._queue.out), par, start)
 
     def queue(self, par: Array, start: Start, labels: Integers) -> None:
@@ -215,7 +210,7 @@ class Lanes:
         book = self._block.book.reshape(at.BOOK, self.width)
         running = np.flatnonzero(self.running)
         slots = book[at.SAMPLE, running].astype(np.int64)
-        waiting = slice(int(self.counters[NEXT_SLOT]), int(self.counters[SLOTS]))
+        waiting = slice(int(self.counters[Counter.NEXT_SLOT]), int(self.counters[Counter.SLOTS]))
         held = self._labels[slots]
         # slots 0.. belong to the samples in lanes; their rows of the queue are never read again
         old = self._queue
@@ -223,7 +218,7 @@ class Lanes:
         new_start = np.concatenate([old.start[slots], old.start[waiting], start.rows])
         new_labels = np.concatenate([held, self._labels[waiting], labels])
         self._accept_queue(new_par, new_start, new_labels)
-        self.counters[NEXT_SLOT] = len(slots)
+        self.counters[Counter.NEXT_SLOT] = len(slots)
         book[at.SAMPLE, running] = np.arange(len(slots))
 
     def advance(self, seconds: float) -> None:
@@ -244,18 +239,18 @@ class Lanes:
     @property
     def record_full(self) -> bool:
         """Whether the record must be emptied before the stepper can go on."""
-        return 0 < len(self.record) < int(self.counters[RECORDED]) + self._kept
+        return 0 < len(self.record) < int(self.counters[Counter.RECORDED]) + self._kept
 
     def take_record(self) -> Array:
         """The recorded rows since the last call (a copy); the record is empty afterwards.
 
         Once the recorded samples are over, those that go on are no longer observed.
         """
-        rows = self.record[: int(self.counters[RECORDED])].copy()
-        self.counters[RECORDED] = 0
+        rows = self.record[: int(self.counters[Counter.RECORDED])].copy()
+        self.counters[Counter.RECORDED] = 0
         places = self._block.book[at.SAMPLE * self.width : (at.SAMPLE + 1) * self.width]
         if not (self.running & (places < self._kept)).any():
-            self._method.numbers[[OBSERVING, OBSERVING_EIGHT]] = 0
+            self._method.numbers[[Asking.OBSERVING, Asking.OBSERVING_EIGHT]] = 0
         return rows
 
     def step(self, budget: int) -> bool:
@@ -277,9 +272,9 @@ class Lanes:
 
     def collect(self) -> tuple[Integers, Outcome, Array]:
         """Labels (m,), outcomes and parameters (m, PARAMETERS) of what finished since the last call."""
-        count = int(self.counters[FINISHED])
+        count = int(self.counters[Counter.FINISHED])
         slots = self._queue.finished[:count].copy()
-        self.counters[FINISHED] = 0
+        self.counters[Counter.FINISHED] = 0
         par = self._queue.par[slots]
         start = Start(self._queue.start[slots])
         outcome = self.problem.marked(Outcome(self._queue.out[slots]), par, start)
@@ -324,17 +319,17 @@ class PrescribedSamples:
 
 def _outcomes(problem: Problem, par: Array) -> Array:
     """Rows of outcomes (m, OUT) of parameters (m, PARAMETERS): no gap, contact or work, which only a response has."""
-    rows = np.zeros((len(par), at.OUT))
+    rows = np.zeros((len(par), Outcome.size))
     revolutions = problem.transient + problem.averaged
-    rows[:, at.OUT_SPREAD] = 0.0 if problem.averaged > 1 else np.nan
-    rows[:, at.OUT_REVOLUTIONS] = revolutions
-    rows[:, at.OUT_TIME] = revolutions * par[:, at.PERIOD]
-    works = at.OUT_TOTAL + at.WORKS
+    rows[:, Outcome.spread] = 0.0 if problem.averaged > 1 else np.nan
+    rows[:, Outcome.revolutions] = revolutions
+    rows[:, Outcome.time] = revolutions * par[:, at.PERIOD]
+    works = Outcome.total + at.WORKS
     rows[:, works : works + 4] = np.nan
     known = (
-        (at.OUT_MOMENT, at.HELD_MOMENT),
-        (at.OUT_ACCELERATION, at.HELD_DEVIATION),
-        (at.OUT_FOLLOWED, at.HELD_PEAK),
+        (Outcome.peak_moment, at.HELD_MOMENT),
+        (Outcome.acceleration_deviation, at.HELD_DEVIATION),
+        (Outcome.peak_acceleration, at.HELD_PEAK),
     )
     for row, of_sample in known:
         rows[:, row] = par[:, of_sample]

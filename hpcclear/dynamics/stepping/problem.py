@@ -12,12 +12,12 @@ from hpcclear.base.outcome import Status
 from hpcclear.base.pieces import Pieces, breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.curves import packed
-from hpcclear.dynamics.layout.settings import STRICT
 from hpcclear.dynamics.layout.views import Outcome, Parameters, RunSettings, Start
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import modes_of
 from hpcclear.dynamics.linkage.rhs import compiled_motion
 from hpcclear.dynamics.stepping.explicit.tableau import Tableau
+from hpcclear.dynamics.stepping.sample import STRICT
 
 TORN = 0.25
 """Penetration over a bearing's radius from which on a result is none: contact laws are of small ones, the softest bearing

@@ -4,7 +4,7 @@ import numpy as np
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import KEPT, RECORDED
+from hpcclear.dynamics.layout.arguments import Counter
 
 # one row: time since the start of the run and of the revolution, its number, place of the sample in the queue, contact state,
 # works, measures, then q, v, a
@@ -40,8 +40,8 @@ def record_step(record, counters, work, stages, book, n, W):
     if record.shape[0] > 0:
         for lane in range(W):
             moved = work[at.ACCEPT * W + lane] * work[at.RUNNING * W + lane] == 1.0
-            if moved and book[at.SAMPLE * W + lane] < counters[KEPT]:
-                row = counters[RECORDED]
+            if moved and book[at.SAMPLE * W + lane] < counters[Counter.KEPT]:
+                row = counters[Counter.RECORDED]
                 record[row, TIME] = book[at.ELAPSED * W + lane] + work[at.TIME * W + lane]
                 record[row, TURN_TIME] = work[at.TIME * W + lane]
                 record[row, REVOLUTION] = book[at.REVOLUTION * W + lane]
@@ -60,6 +60,6 @@ def record_step(record, counters, work, stages, book, n, W):
                     record[row, STATE + k] = work[(at.Q + k) * W + lane]
                     record[row, STATE + n + k] = work[(at.V + k) * W + lane]
                     record[row, STATE + 2 * n + k] = stages[k * W + lane]
-                counters[RECORDED] = row + 1
-        full = counters[RECORDED] + counters[KEPT] > record.shape[0]
+                counters[Counter.RECORDED] = row + 1
+        full = counters[Counter.RECORDED] + counters[Counter.KEPT] > record.shape[0]
     return full

@@ -12,19 +12,8 @@ from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import (
-    ASKED,
-    COORDINATES,
-    COUNTERS,
-    FOUND,
-    LANE,
-    NUMBERS,
-    PARAMETER_ROWS,
-    SETTINGS,
-    SLOTS,
-    WIDTH,
-    rules_in,
-)
+from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Block, Counter, Queue, rules_in
+from hpcclear.dynamics.layout.views import Outcome, RunSettings, Start
 from hpcclear.dynamics.stepping.rows import next_rows, stop_at_rows
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
 from hpcclear.dynamics.stepping.stops import (
@@ -72,7 +61,12 @@ def end_of_step(rules, lane, W, n, block, settings, tables):
 @scalar_function
 def answer(numbers, rules, block, queue, settings, tables):
     """Do what is requested of one lane; by how much the number of running lanes changes is left in `FOUND`."""
-    asked, lane, W, n = numbers[ASKED], numbers[LANE], numbers[WIDTH], numbers[COORDINATES]
+    asked, lane, W, n = (
+        numbers[Asking.ASKED],
+        numbers[Asking.LANE],
+        numbers[Asking.WIDTH],
+        numbers[Asking.COORDINATES],
+    )
     ends = True
     status = UNFINISHED
     if asked == END_OF_STEP:
@@ -83,11 +77,11 @@ def answer(numbers, rules, block, queue, settings, tables):
         status = end_revolution(lane, W, block.work, block.book, settings)
         ends = status != UNFINISHED
     elif asked == END_OF_SAMPLE:
-        status = numbers[FOUND]
+        status = numbers[Asking.FOUND]
     before = block.work[at.RUNNING * W + lane]
     if ends:
         change_sample(lane, W, n, status, block, queue, settings)
-    numbers[FOUND] = int(block.work[at.RUNNING * W + lane] - before)
+    numbers[Asking.FOUND] = int(block.work[at.RUNNING * W + lane] - before)
 
 
 @scalar_function
@@ -96,19 +90,19 @@ def special(
 ):
     """`answer` for arrays at addresses."""
     of = carray(numbers, NUMBERS)
-    W = of[WIDTH]
-    block = at.Block(
+    W = of[Asking.WIDTH]
+    block = Block(
         carray(work, at.WORK * W),
         carray(stages, at.MAX_COORDINATES * W),
         carray(par, at.PARAMETERS * W),
         carray(book, at.BOOK * W),
     )
-    entries, counts = carray(settings, SETTINGS), carray(counters, COUNTERS)
-    slots = counts[SLOTS]
-    queue = at.Queue(
-        carray(queued, (slots, int(entries[PARAMETER_ROWS]))),
-        carray(starts, (slots, at.START)),
-        carray(out, (slots, at.OUT)),
+    entries, counts = carray(settings, RunSettings.size), carray(counters, Counter.COUNT)
+    slots = counts[Counter.SLOTS]
+    queue = Queue(
+        carray(queued, (slots, int(entries[RunSettings.parameter_rows]))),
+        carray(starts, (slots, Start.size)),
+        carray(out, (slots, Outcome.size)),
         carray(finished, slots),
         counts,
     )
@@ -127,11 +121,11 @@ def special_code() -> Compiled:
 @lane_function
 def ask(address, asked, lane, numbers, block, queue, method):
     """Have `special` do one thing for one lane. Returns the change of the number of running lanes."""
-    numbers[ASKED] = asked
-    numbers[LANE] = lane
+    numbers[Asking.ASKED] = asked
+    numbers[Asking.LANE] = lane
     arrays = (
         numbers, block.work, block.stages, block.par, block.book, method.settings, method.tables,
         queue.par, queue.start, queue.out, queue.finished, queue.counters,
     )  # fmt: skip
     call_at(address, arrays)
-    return numbers[FOUND]
+    return numbers[Asking.FOUND]

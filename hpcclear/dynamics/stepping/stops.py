@@ -3,14 +3,7 @@
 from hpcclear.base.jit import scalar_function as lane_event
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import (
-    ANGLE_TOLERANCE,
-    AT_REST,
-    CYCLE,
-    GAP_TOLERANCE,
-    IMPACT_FLOOR,
-    WRAPS,
-)
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.stepping.control import FIRST_PART, SHRINK
 from hpcclear.dynamics.stepping.events import (
     KINK_REACH,
@@ -37,7 +30,7 @@ def meet_impact(lane, W, work, settings, p):
     if work[(at.ACTIVE + p) * W + lane] == 1.0:
         return 2.0
     h = work[at.STEP * W + lane]
-    tolerance = settings[GAP_TOLERANCE]
+    tolerance = settings[RunSettings.gap_tolerance]
     d0 = work[(at.RATE_OLD + at.GAP + p) * W + lane]
     d1 = work[(at.RATE_NOW + at.GAP + p) * W + lane]
     m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane]
@@ -55,7 +48,9 @@ def meet_impact(lane, W, work, settings, p):
 @lane_event
 def latch_at_start(lane, W, work, settings, p):
     """Start joint p's contact at the start of this step, which is tried again."""
-    speed = max(work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane], settings[IMPACT_FLOOR])
+    speed = max(
+        work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane], settings[RunSettings.impact_floor]
+    )
     work[(at.ACTIVE + p) * W + lane] = 1.0
     work[(at.INVERSE_IMPACT + p) * W + lane] = 1.0 / speed
     work[at.FRESH * W + lane] = 1.0
@@ -64,7 +59,9 @@ def latch_at_start(lane, W, work, settings, p):
 @lane_event
 def latch(lane, W, work, settings, p):
     """Start joint p's contact at the end of this step: its approach speed is kept until the contact ends."""
-    speed = max(work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane], settings[IMPACT_FLOOR])
+    speed = max(
+        work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane], settings[RunSettings.impact_floor]
+    )
     work[(at.ACTIVE + p) * W + lane] = 1.0
     work[(at.INVERSE_IMPACT + p) * W + lane] = 1.0 / speed
     # within the tolerance of zero: a value just below would end the contact at once
@@ -102,7 +99,7 @@ def before_kink(lane, W, work, settings, p):
     """Fraction of this step at which joint p's gap changes sign; 2 if it does not, or so near an end that it does no harm."""
     d0 = work[(at.RATE_OLD + at.GAP + p) * W + lane]
     d1 = work[(at.RATE_NOW + at.GAP + p) * W + lane]
-    if d0 * d1 >= 0.0 or min(abs(d0), abs(d1)) <= settings[GAP_TOLERANCE]:
+    if d0 * d1 >= 0.0 or min(abs(d0), abs(d1)) <= settings[RunSettings.gap_tolerance]:
         return 2.0
     h = work[at.STEP * W + lane]
     m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane]
@@ -171,11 +168,11 @@ def stop_free_crank(lane, W, block, settings, last):
     if work[(at.VS + last) * W + lane] <= 0.0:
         starting = block.book[at.REVOLUTION * W + lane] == 0.0
         starting &= work[at.TIME * W + lane] < LONG_AT_REST * block.par[at.PERIOD * W + lane]
-        margin = settings[AT_REST] if starting else 0.0
-        if abs(work[(at.QS + last) * W + lane] - (end - settings[CYCLE])) >= margin:
+        margin = settings[RunSettings.at_rest] if starting else 0.0
+        if abs(work[(at.QS + last) * W + lane] - (end - settings[RunSettings.cycle])) >= margin:
             return STALLED
     beyond = work[(at.QS + last) * W + lane] - end
-    tolerance = settings[ANGLE_TOLERANCE]
+    tolerance = settings[RunSettings.angle_tolerance]
     work[at.ENDING * W + lane] = 1.0 if abs(beyond) <= tolerance else 0.0
     if beyond > tolerance:
         h = work[at.STEP * W + lane]
@@ -196,4 +193,4 @@ def stop_free_crank(lane, W, block, settings, last):
 def wrap_angles(lane, W, n, work, settings):
     """Count angles that go round with the revolutions anew with each, so that they keep their precision."""
     for k in range(n):
-        work[(at.Q + k) * W + lane] -= settings[WRAPS + k]
+        work[(at.Q + k) * W + lane] -= settings[RunSettings.wraps + k]

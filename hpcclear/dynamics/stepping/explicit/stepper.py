@@ -13,7 +13,8 @@ from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import Kind
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import GAP_TOLERANCE, PROFILE
+from hpcclear.dynamics.layout.arguments import Asking, Block, Stepped
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
 from hpcclear.dynamics.stepping.explicit.switching import settle_methods
@@ -40,7 +41,7 @@ def judge_steps(special, rules, n, numbers, block, queue, method, W):
     work, settings = block.work, method.settings
     change = 0.0
     judge_step(work, settings, W)
-    if flag_gaps(rules, work, block.par, n - 1, settings[GAP_TOLERANCE], W) > 0.0:
+    if flag_gaps(rules, work, block.par, n - 1, settings[RunSettings.gap_tolerance], W) > 0.0:
         for i in range(W):
             if work[at.SPECIAL * W + i] == 1.0:
                 change += ask(special, END_OF_STEP, i, numbers, block, queue, method)
@@ -75,7 +76,7 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
         narrow_vectors()
     settings, numbers, work = method.settings, method.numbers, block.work
     behind = beyond(work, at.STAGES * W), beyond(work, at.WORK * W)  # at known distances
-    block = at.Block(work, behind[0], behind[1], block.book)
+    block = Block(work, behind[0], behind[1], block.book)
     running = load_lanes(codes.special, numbers, block, queue, method, W)
     while budget > 0 and running > 0.0:
         budget -= 1
@@ -87,9 +88,9 @@ def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
             ask_implicit(codes.implicit, numbers, block, method, memory)
         running += judge_steps(codes.special, rules, n, numbers, block, queue, method, W)
         if rules.profile:
-            run_motion(numbers[PROFILE], work, method.tables)
+            run_motion(numbers[Asking.PROFILE], work, method.tables)
         peaks_inside(rules, work, block.par, W)
-        ended = commit(at.Stepped(rules, method.measures), work, block.stages, n, W)
+        ended = commit(Stepped(rules, method.measures), work, block.stages, n, W)
         full = record_step(record, queue.counters, work, block.stages, block.book, n, W)
         if ended > 0.0:
             running += end_revolutions(codes.special, numbers, block, queue, method, W)
@@ -110,8 +111,8 @@ class Codes(NamedTuple):
 def make_stepper(W: int, kinds: tuple[Kind, ...], *, implicit: bool = False) -> Compiled:
     """Return the compiled stepper for W lanes, of any number of coordinates and any joints.
 
-    Its arguments, of these kinds: the number of coordinates, `Codes`, `layout.Rules`, `layout.Block`, `layout.Queue`,
-    `layout.Method`; an array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the
+    Its arguments, of these kinds: the number of coordinates, `Codes`, and of `layout.arguments` `Rules`, `Block`, `Queue`,
+    `Method`; an array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the
     implicit method (see `columns.new_columns`); and the budget: how many block steps to take at most. It returns 1 while lanes
     are running. A response and an ensemble call the same machine code; ensembles want at least twice the vector length.
     """

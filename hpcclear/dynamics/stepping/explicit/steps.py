@@ -9,19 +9,8 @@ from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import (
-    ATOL,
-    COORDINATES,
-    MEASURES,
-    MOTION,
-    NUMBERS,
-    OBSERVING,
-    RTOL,
-    SENSES,
-    SETTINGS,
-    WIDTH,
-    rules_in,
-)
+from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Stepped, rules_in
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.linkage.rhs import run_observed
 from hpcclear.dynamics.stepping.control import coordinate, measure, place
 from hpcclear.dynamics.stepping.explicit import tableau as tab
@@ -148,20 +137,20 @@ def explicit_steps(W, stages, numbers, lanes, settings, weights, tables, measure
         narrow_vectors()
     of = carray(numbers, NUMBERS)
     work = carray(lanes, (at.STAGES + stages * at.MAX_COORDINATES) * W)
-    entries = carray(settings, SETTINGS)
+    entries = carray(settings, RunSettings.size)
     step = Step(
         work,
         beyond(work, at.STAGES * W),
         beyond(work, at.WORK * W),
         carray(weights, tab.PACKED),
-        of[COORDINATES],
-        entries[RTOL],
-        entries[ATOL:SETTINGS],
-        of[WIDTH] & 127,
+        of[Asking.COORDINATES],
+        entries[RunSettings.rtol],
+        entries[RunSettings.atol_coordinates : RunSettings.size],
+        of[Asking.WIDTH] & 127,
     )
-    effects = at.Stepped(rules_in(of), carray(measures, of[MEASURES]))
-    curves, senses = carray(tables, at.MAX_CURVES), entries[SENSES]
-    observing, motion = of[OBSERVING], of[MOTION]
+    effects = Stepped(rules_in(of), carray(measures, of[Asking.MEASURES]))
+    curves, senses = carray(tables, at.MAX_CURVES), entries[RunSettings.senses]
+    observing, motion = of[Asking.OBSERVING], of[Asking.MOTION]
     take_explicit_steps(effects, observing, motion, step, curves, senses, stages, W)
 
 

@@ -5,7 +5,7 @@ All that a scene which may be stiff has to pay for lanes that are not.
 
 from hpcclear.base.jit import lane_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import IMPLICIT
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.stepping.control import coordinate, count_up
 from hpcclear.dynamics.stepping.explicit import tableau as tab
 from hpcclear.dynamics.stepping.explicit.combine import stage_row
@@ -24,7 +24,7 @@ def settle_methods(memory, settings, work, W):
     """Decide, between steps, which lanes go on with which method. Returns how many take implicit steps."""
     count = 0.0
     if memory is not None:
-        always = 1.0 if settings[IMPLICIT] == 2.0 else 0.0
+        always = 1.0 if settings[RunSettings.implicit] == 2.0 else 0.0
         for i in range(W):
             stiff = work[at.STIFF * W + i]
             go = 1.0 if work[at.EDGE_SCORE * W + i] >= EDGE_LIMIT else 0.0

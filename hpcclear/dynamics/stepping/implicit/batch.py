@@ -15,16 +15,8 @@ from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import (
-    COORDINATES,
-    MEASURES,
-    MOTION_OF_EIGHT,
-    NUMBERS,
-    OBSERVING_EIGHT,
-    SETTINGS,
-    WIDTH,
-    rules_in,
-)
+from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Block, Stepped, rules_in
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.stepping.implicit import memory as mem
 from hpcclear.dynamics.stepping.implicit.columns import (
     adopt_start,
@@ -327,29 +319,32 @@ def is_held(m):
 def unpacked(numbers, work, stages, par, measures):
     """Numbers, effects and lanes from their addresses."""
     of = carray(numbers, NUMBERS)
-    W = of[WIDTH]
-    lanes = at.Block(
+    W = of[Asking.WIDTH]
+    lanes = Block(
         carray(work, at.WORK * W),
         carray(stages, at.MAX_COORDINATES * W),
         carray(par, at.PARAMETERS * W),
         None,
     )
-    return of, at.Stepped(rules_in(of), carray(measures, of[MEASURES])), lanes
+    return of, Stepped(rules_in(of), carray(measures, of[Asking.MEASURES])), lanes
 
 
 @scalar_function
 def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
     """`eight_steps` of all stiff lanes, with arrays at addresses."""
     of, effects, block = unpacked(numbers, work, stages, par, measures)
-    W = of[WIDTH]
+    W = of[Asking.WIDTH]
     moved = Moved(
-        of[OBSERVING_EIGHT], of[MOTION_OF_EIGHT], of[COORDINATES], carray(tables, at.MAX_CURVES)
+        of[Asking.OBSERVING_EIGHT],
+        of[Asking.MOTION_OF_EIGHT],
+        of[Asking.COORDINATES],
+        carray(tables, at.MAX_CURVES),
     )
     eights = carray(memory, ((W + COLUMNS - 1) // COLUMNS, mem.MEMORY))
     settle_columns(block.work, W, eights)
     for e in range(len(eights)):
         if is_held(eights[e]):
-            eight_steps(effects, moved, W, block, eights[e], carray(settings, SETTINGS))
+            eight_steps(effects, moved, W, block, eights[e], carray(settings, RunSettings.size))
 
 
 _KINDS = (COUNTS, *[DOUBLES] * 5, COUNTS, DOUBLES)

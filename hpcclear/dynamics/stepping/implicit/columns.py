@@ -3,7 +3,7 @@
 from hpcclear.base.arrays import Array, aligned
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import ATOL, PARAMETER_ROWS, RTOL
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.stepping.control import leave_rates, measure, place
 from hpcclear.dynamics.stepping.implicit import memory as mem
 from hpcclear.dynamics.stepping.implicit.control import fit_to_ramp, forget, go_on
@@ -76,12 +76,14 @@ def settle_columns(work, W, memory):
 @scalar_function
 def take_over(n, lane, W, par, m, i, settings):
     """Forget what the column held: the lane comes from the explicit method or is new."""
-    for k in range(int(settings[PARAMETER_ROWS])):
+    for k in range(int(settings[RunSettings.parameter_rows])):
         m[(mem.PAR + k) * COLUMNS + i] = par[k * W + lane]
     for k in range(n):
-        by_v = settings[ATOL + at.MAX_COORDINATES + k]
-        m[(mem.LEAST + k) * COLUMNS + i] = settings[ATOL + k] / settings[RTOL]
-        m[(mem.LEAST + N + k) * COLUMNS + i] = by_v / settings[RTOL]
+        by_v = settings[RunSettings.atol_coordinates + at.MAX_COORDINATES + k]
+        m[(mem.LEAST + k) * COLUMNS + i] = (
+            settings[RunSettings.atol_coordinates + k] / settings[RunSettings.rtol]
+        )
+        m[(mem.LEAST + N + k) * COLUMNS + i] = by_v / settings[RunSettings.rtol]
     forget(m, i)
     fit_to_ramp(par, lane, W, m, i, settings)
 

@@ -8,9 +8,10 @@ import math
 from hpcclear.base.bits import rough_exp2, rough_log2
 from hpcclear.base.jit import lane_function, scalar_function
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.settings import RTOL
+from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.stepping.implicit import memory as mem
 
+RTOL = RunSettings.rtol
 CHEAP_CONTRACTION, KEPT_TO = 0.002, 1.2
 """While Newton's iteration converges faster than this, a step that would grow by less keeps its size."""
 
