@@ -49,7 +49,7 @@ FEATURES = {
         "laws/film/* laws/reynolds.py dynamics/contacts/lubrication.py scene/surfaces.py "
         "report/bearings.py dynamics/lubrication/*",
     "bars that bend":
-        "dynamics/linkage/bending.py scene/planar.py dynamics/planar/swings.py dynamics/bending.py",
+        "dynamics/linkage/bending.py scene/planar.py dynamics/planar/tolerances.py dynamics/bending.py",
     "guides with clearance, friction of other joints":
         "dynamics/contacts/guide.py scene/joints.py dynamics/linkage/rubbing.py "
         "dynamics/linkage/guides.py report/figures/guides.py scene/study_tables.py",

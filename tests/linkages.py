@@ -9,11 +9,10 @@ from hpcclear.dynamics.linkage.parts import (
     Clearance,
     ConstantSpeed,
     Fixed,
-    GuideFriction,
     Harmonic,
+    IdealFriction,
     LooseSlide,
     LooseSlot,
-    PinFriction,
     Revolute,
     Slide,
     Slot,
@@ -295,7 +294,7 @@ def loosened(mechanism, *names, length=0.05, height=0.02, radius=1e-3):
 def rubbing(mechanism, *names, coefficient=0.2, radius=0.008):
     """A mechanism with friction in its named pins, all without clearance by default."""
     joints = tuple(
-        replace(j, friction=PinFriction(coefficient, radius * (1.0 + 0.2 * k), 0.3))
+        replace(j, friction=IdealFriction(coefficient, 0.3, radius * (1.0 + 0.2 * k)))
         if type(j) is Revolute and (not names or j.name in names)
         else j
         for k, j in enumerate(mechanism.joints)
@@ -303,7 +302,7 @@ def rubbing(mechanism, *names, coefficient=0.2, radius=0.008):
     return replace(mechanism, joints=joints)
 
 
-RUB = GuideFriction(0.15, 0.1)
+RUB = IdealFriction(0.15, 0.1)
 BLOWER = replace(ENGINE, by_speed=((0.0, 3.0), (12.0, 5.0), (25.0, 1.0), (40.0, -0.5)))
 HELD = (
     load(

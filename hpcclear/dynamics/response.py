@@ -30,9 +30,10 @@ from hpcclear.dynamics.evaluation.recorded.steps import (
     StepInstants,
 )
 from hpcclear.dynamics.evaluation.steady.wording import recorded
+from hpcclear.dynamics.linkage.passage import cubic
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import prescribed_series
-from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, period_of, refused_of
+from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
 from hpcclear.dynamics.planar.response import ResponseStates, pins_of, wound_up
 from hpcclear.dynamics.planar.response import labels as planar_labels
 from hpcclear.dynamics.planar.response import series as planar_series
@@ -72,8 +73,7 @@ def _works_between(sample: Recorded, piece: Piece, s: Array) -> Array:
     s = s[:, None]
     w0, w1 = steps.works[k], steps.works[after]
     p0, p1 = h * before, h * behind
-    d = w1 - w0
-    return w0 + s * (p0 + s * (3 * d - 2 * p0 - p1 + s * (p0 + p1 - 2 * d)))
+    return cubic(w0, p0, w1, p1, s)
 
 
 def simulate(
@@ -299,7 +299,7 @@ def _prescribed(scene: Scene) -> Found:
     record = outcome_records(*lanes.collect(), record_of(scene), responses_reported(problem))
     times, data = prescribed_series(scene, problem.transient + problem.averaged)
     first = problem.transient + problem.averaged - kept_revolutions(scene)
-    kept = times >= (first - 1e-9) * float(period_of(mechanism_of(scene.linkage)))
+    kept = times >= (first - 1e-9) * mechanism_of(scene.linkage).period.seconds
     kept[-1] = True  # of one that ends before
     return times[kept], {name: one[kept] for name, one in data.items()}, record
 

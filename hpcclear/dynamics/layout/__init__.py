@@ -80,27 +80,11 @@ def places_of(effects: Effects) -> range:
     return range(effects.first, effects.first + effects.joints)
 
 
-class Waves(NamedTuple):
-    """Where the waves around both surfaces of a joint stand among `WAVE_ROWS`: cosine and sine of one, of two and so on."""
-
-    bearing: int  # first row
-    bearing_count: int
-    journal: int
-    journal_count: int
-
-    def rows(self) -> range:
-        """All of them."""
-        return range(self.bearing, self.journal + 2 * self.journal_count)
-
-
-def waves_of(effects: Effects) -> tuple[Waves, ...]:
-    """Those of each place of joints, up to the last open one."""
-    bearing, journal = effects.bearing_waves or 0, effects.journal_waves or 0
-    stride = 2 * (bearing + journal)
-    return tuple(
-        Waves(k * stride, bearing, k * stride + 2 * bearing, journal)
-        for k in range(places_of(effects).stop)
-    )
+def wave_rows(effects: Effects) -> int:
+    """How many of `WAVE_ROWS` are in use: of each place up to the last open one those of the bearing, then of the journal,
+    cosine and sine of one wave, of two and so on."""
+    waves = (effects.bearing_waves or 0) + (effects.journal_waves or 0)
+    return 2 * waves * places_of(effects).stop
 
 
 # ---- parameters of one sample -------------------------------------------------------------------
@@ -150,7 +134,7 @@ JOINT_ROWS = OF_JOINT.end
 JOINT_BLOCKS = OF_SAMPLE("of all joints, one behind the other", size=MAX_JOINTS * JOINT_ROWS)
 OWN = OF_SAMPLE("what a linkage has of its own", size=192 + 16 * 64)
 WAVES = OF_SAMPLE(
-    "of surfaces that are out of round, in scenes that have such: those of `waves_of`, and for each another, its slope's",
+    "of surfaces that are out of round, in scenes that have such: those of `wave_rows`, and for each another, its slope's",
     size=2 * WAVE_ROWS,
 )
 THRESHOLDS = OF_SAMPLE(
@@ -213,7 +197,7 @@ ANGLES = WRITTEN(
 )
 """These and what follows are for profiles of wear only, and stand last, so that others need not pass over them."""
 PROFILES = WRITTEN(
-    "sliding powers times waves of these angles, in the order of `waves_of`",
+    "sliding powers times waves of these angles, in the order of `wave_rows`",
     "W",
     WAVE_ROWS,
     "profile",

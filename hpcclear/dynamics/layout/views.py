@@ -173,7 +173,8 @@ class Outcome(View):
     sliding_power = Column(mean.first + at.place(at.SLIDING_POWERS), EACH)  # W, mean of F_N |v_t|
     mean_rate = Column(mean.first + at.place(at.OBJECTIVE_RATES), EACH)  # of the objective
     profile = Column(mean.first + at.place(at.PROFILES), at.WAVE_ROWS)
-    """W, means of F_N |v_t| times waves of the contact's angle, as of `layout.waves_of`; NaN of those that are not there"""
+    """W, means of F_N |v_t| times waves of the contact's angle, as of `layout.wave_rows`; NaN of those that are not there"""
+    sliding_work = Column(total.first + at.place(at.SLIDING_POWERS), EACH)  # J
     drive_work = Column(total.first + at.WORKS)  # J; with its size, losses and load work: four
     absolute_drive_work = Column(drive_work.first + 1)
     dissipated = Column(drive_work.first + 2)

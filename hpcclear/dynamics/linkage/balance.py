@@ -210,7 +210,7 @@ class Balance:
                 frame, moved = self.moved_by(body.name).get(column, (GROUND, NOWHERE))
                 held[frame] = held.get(frame, NOWHERE) + moved
         for frame, moment in held.items():
-            whole = whole + self.kinematics.raised(frame, moment)
+            whole = whole + self.kinematics.rotated(frame, moment).y
         return -(whole * self.writer.parameter("gravity"))
 
     def _turning(self, column: Mover) -> Term:

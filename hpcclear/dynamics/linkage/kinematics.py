@@ -104,11 +104,13 @@ class Kinematics:
         time = named("time")
         if isinstance(drive, (ConstantSpeed, TorqueDrive)):  # the latter where it starts
             speed = write.parameter(f"{drive.name}_speed")
-            start = self._number(f"{frame}_start", self.start_of(drive, frame))
+            start = self.forest.mechanism.body(drive.body).start_angle
+            start = start - self.forest.offsets[drive.body]
+            started = self._number(f"{frame}_start", start)
             text = f"{drive.name}_speed * time"
             needs: tuple[Term, ...] = (speed, time)
-            if start:
-                text, needs = f"{frame}_start + {text}", (start, speed, time)
+            if started:
+                text, needs = f"{frame}_start + {text}", (started, speed, time)
             write.when_needed((name,), f"{name} = {text}", needs)
             return named(name), speed, ZERO
         if isinstance(drive, TableDrive):
@@ -147,11 +149,6 @@ class Kinematics:
             text, needs = f"{text} - {shift.name}", [*needs, shift]
         write.when_needed((name,), f"{name} = {text}", tuple(needs))
         return named(name), spin + gained, turn
-
-    def start_of(self, drive: ConstantSpeed | TorqueDrive, frame: str) -> float:
-        """Angle of a driven frame at time 0, rad."""
-        start = self.forest.mechanism.body(drive.body).start_angle
-        return start - self.forest.offsets[drive.body]
 
     def angle(self, body: str) -> Term:
         """Angle of a body that turns, from the x axis."""
@@ -319,10 +316,6 @@ class Kinematics:
         return found | {
             Mover(move.kind, move.body): (move.frame, move.direction) for move in point.moves
         }
-
-    def raised(self, frame: str, vector: Vector) -> Term:
-        """A frame's vector along the ground's y."""
-        return self.rotated(frame, vector).y
 
 
 def _extended(point: Point, frame: str, arm: Vector) -> Point:

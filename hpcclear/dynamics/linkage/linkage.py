@@ -1,6 +1,5 @@
 """A linkage as the kernel takes it: where its parameters stand, its texts in these rows, and their values."""
 
-from collections.abc import Mapping
 from functools import cached_property
 from types import ModuleType
 from typing import Any
@@ -126,11 +125,6 @@ class Linkage:
     def follows_a_point(self) -> bool:
         """Whether it is a point that responses follow."""
         return "." in self.follow
-
-    @property
-    def rows(self) -> Mapping[str, int]:
-        """Rows of the parameters of its own, by their names in its texts."""
-        return self._given
 
     @property
     def parameter_rows(self) -> int:

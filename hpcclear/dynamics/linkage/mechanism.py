@@ -152,15 +152,11 @@ def _records(m: Mechanism) -> Iterator[tuple[str, Any]]:
 
 
 def _names(m: Mechanism) -> None:
-    seen: set[str] = set()
     for key, one in _records(m):
         if not _NAME.fullmatch(one.name) or one.name == GROUND:
             raise InputError(
                 key, one.name, "is not a valid name", "Use letters, digits and _, and not 'ground'"
             )
-        if key in seen:
-            raise InputError(key, one.name, "is used twice", "Give each a name of its own")
-        seen.add(key)
         if "center" in getattr(one, "points", ()):
             raise InputError(
                 f"{key}.points.center", one.points["center"], "is reserved for the mass centre",
@@ -278,49 +274,24 @@ def _looked_up(m: Mechanism) -> None:
 
 
 def _numbers(m: Mechanism) -> None:
-    """Masses, inertias, clearances and the numbers of drives that have to be positive."""
+    """Inertias that have to be there, motion at all, and reactions that are known."""
     light = massless_angles(m)
     for body in m.bodies:
-        if not body.mass > 0:
-            raise InputError(
-                f"bodies.{body.name}.mass", body.mass, "a moving body needs a mass",
-                "Write its mass in kg",
-            )  # fmt: skip
-        if body.inertia < 0 or body.name in light:
+        if body.name in light:
             raise InputError(
                 f"bodies.{body.name}.inertia", body.inertia, "a body that may rotate about its mass centre needs an inertia",
                 "Write the moment of inertia about its mass centre in kg m2, or put an ideal pin off its mass centre",
             )  # fmt: skip
-    positive = {
-        Clearance: ("clearance", "bearing_radius", "stiffness"),
-        LooseSlide: ("clearance", "length", "height", "corner_radius", "stiffness"),
-        LooseSlot: ("clearance", "pin_radius", "stiffness"),
-        Harmonic: ("frequency",),
-    }
-    for key, one in _records(m):
-        for entry in positive.get(type(one), ()):
-            if not getattr(one, entry) > 0:
-                raise InputError(
-                    f"{key}.{entry}", getattr(one, entry), "must be above 0", "Write its size"
-                )
-        expected = getattr(one, "expected_speed", None) or getattr(one, "interval", None)
-        for entry in ("speed", "initial_speed", "amplitude"):
-            if getattr(one, entry, 1.0) == 0 and expected is None:
-                raise InputError(
-                    f"{key}.{entry}", 0.0, "there would be no motion", "Write a speed or amplitude"
-                )
+    for drive in m.drives:
+        if isinstance(drive, Harmonic) and drive.amplitude == 0:
+            raise InputError(
+                f"drives.{drive.name}.amplitude", 0.0, "there would be no motion", "Write an amplitude"
+            )  # fmt: skip
     for joint in m.ideal:
         if isinstance(joint, Revolute) and joint.friction is not None and modes_of(m):
             raise InputError(
                 f"joints.{joint.name}.friction", joint.friction.coefficient,
                 "reactions of pins are not modelled where a bar bends", "Remove it, or bending",
-            )  # fmt: skip
-    for joint in m.clearances:
-        if isinstance(joint, Clearance) and joint.clearance >= joint.bearing_radius:
-            raise InputError(
-                f"joints.{joint.name}.clearance", joint.clearance,
-                f"must be smaller than the bearing radius ({joint.bearing_radius:g} m)",
-                "Write the radial clearance R_B - R_J",
             )  # fmt: skip
 
 

@@ -38,9 +38,8 @@ def values(
             found |= {f"{joint.name}_cos": np.cos(angle), f"{joint.name}_sin": np.sin(angle)}
         rubs = getattr(joint, "friction", None)
         if rubs is not None:
-            radius = getattr(rubs, "radius", 1.0)  # of a pin: torques and speeds of turning
-            found[f"{joint.name}_coefficient"] = rubs.coefficient * radius
-            found[f"{joint.name}_inverse_ramp"] = radius / rubs.ramp_speed
+            found[f"{joint.name}_coefficient"] = rubs.coefficient * rubs.radius
+            found[f"{joint.name}_inverse_ramp"] = rubs.radius / rubs.ramp_speed
     _outside(trees, found)
     return found
 

@@ -68,12 +68,13 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PinFriction:
-    """Friction of a pin over its reaction, radius (m), and sliding speed (m/s) below which it falls linearly to 0."""
+class IdealFriction:
+    """Friction of a guide or pin over its reaction, sliding speed (m/s) below which it falls linearly to 0, and radius of the
+    pin (m), which makes torques of forces: 1 of a guide."""
 
     coefficient: float
-    radius: float
     ramp_speed: float
+    radius: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Revolute:
     name: str
     journal: str
     bearing: str
-    friction: PinFriction | None = field(default=None, kw_only=True)
+    friction: IdealFriction | None = field(default=None, kw_only=True)
     contacts: ClassVar[tuple[Contact, ...]] = ()
 
     @property
@@ -95,6 +96,8 @@ class Revolute:
 @dataclass(frozen=True)
 class Clearance(Revolute):
     """A journal that moves freely in a bearing larger than itself by the clearance, m."""
+
+    ideal: ClassVar[type] = Revolute
 
     clearance: float = 0.0
     bearing_radius: float = 0.0
@@ -111,19 +114,6 @@ class Clearance(Revolute):
     def gaps(self) -> tuple[Any, ...]:
         """Of its contacts at the start, m, below 0 in flight."""
         return (np.hypot(*self.start_eccentricity) - self.clearance,)
-
-    @property
-    def without_clearance(self) -> Revolute:
-        """The same without clearance."""
-        return Revolute(self.name, self.journal, self.bearing)
-
-
-@dataclass(frozen=True)
-class GuideFriction:
-    """Friction of a guide over its reaction, and the sliding speed (m/s) below which it falls linearly to 0."""
-
-    coefficient: float
-    ramp_speed: float
 
 
 @dataclass(frozen=True)
@@ -149,7 +139,7 @@ class Aligned:
 class Slide(Aligned):
     """A guide: the point moves along the line."""
 
-    friction: GuideFriction | None = None
+    friction: IdealFriction | None = None
 
 
 @dataclass(frozen=True)
@@ -158,6 +148,8 @@ class LooseSlide(Slide):
 
     Its x axis goes along the line but for tilt. At the start it is offset to the left of the line and tilted (rad).
     """
+
+    ideal: ClassVar[type] = Slide
 
     clearance: float = 0.0
     length: float = 0.0
@@ -196,11 +188,6 @@ class LooseSlide(Slide):
             for word in CORNERS
         }
 
-    @property
-    def without_clearance(self) -> Slide:
-        """The same without clearance."""
-        return Slide(self.name, self.point, self.line, self.angle)
-
 
 @dataclass(frozen=True)
 class Slot(Aligned):
@@ -213,6 +200,8 @@ class LooseSlot(Slot):
 
     At the start it is offset to the left of the line.
     """
+
+    ideal: ClassVar[type] = Slot
 
     clearance: float = 0.0
     pin_radius: float = 0.0
@@ -237,11 +226,6 @@ class LooseSlot(Slot):
     def start_eccentricity(self) -> tuple[Any]:
         """What the constraint of a slot without clearance is at the start: the offset."""
         return (self.start_offset,)
-
-    @property
-    def without_clearance(self) -> Slot:
-        """The same without clearance."""
-        return Slot(self.name, self.point, self.line, self.angle)
 
 
 @dataclass(frozen=True)

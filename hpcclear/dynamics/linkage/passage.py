@@ -97,7 +97,7 @@ class Passage:
         end = np.minimum(k + 1, len(known) - 1)
         h = (known[end] - known[k])[:, None]
         s = (times - known[k])[:, None] / np.where(h > 0.0, h, 1.0)
-        found: Array = _hermite(q[k], v[k] * h, q[end], v[end] * h, s).T
+        found: Array = cubic(q[k], v[k] * h, q[end], v[end] * h, s).T
         return found
 
     def passed(self, times: Array) -> Array:
@@ -119,7 +119,8 @@ class Passage:
         return found
 
 
-def _hermite(q0: Array, v0: Array, q1: Array, v1: Array, s: Array) -> Array:
+def cubic(q0: Array, v0: Array, q1: Array, v1: Array, s: Array) -> Array:
+    """Values at shares `s` of an interval, from values and rates times its length at both ends; they broadcast."""
     d = q1 - q0
     return q0 + s * (v0 + s * (3 * d - 2 * v0 - v1 + s * (v0 + v1 - 2 * d)))
 
@@ -204,7 +205,7 @@ class _Walker:
 
     def _along(self, a: WalkPose, b: WalkPose, s: float) -> Array:
         h = b.time - a.time
-        return _hermite(a.q, a.v * h, b.q, b.v * h, np.asarray(s))
+        return cubic(a.q, a.v * h, b.q, b.v * h, np.asarray(s))
 
     def _determinant(self, a: WalkPose, b: WalkPose, h: float, s: float) -> float:
         loops = self.loops

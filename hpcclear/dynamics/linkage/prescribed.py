@@ -79,11 +79,16 @@ def prescribed_motion(
             "Prescribe one angle for each degree of freedom, and make all joints ideal",
         )  # fmt: skip
     assembly, times = assemble(mechanism), np.asarray(times, float)
-    rounds = math.ceil(times.max(initial=0.0) / mechanism.period.seconds)
+    return _motion(assembly, _passed(assembly, times, gravity), times, gravity, curves or {})
+
+
+def _passed(assembly: Assembly, times: Array, gravity: float = 0.0) -> Passage:
+    """The walk through all instants (t,); InputError where it ends before."""
+    rounds = math.ceil(times.max(initial=0.0) / assembly.loops.mechanism.period.seconds)
     passage = passage_of(assembly, max(rounds, 1), gravity)
     if len(passage.passed(times)) < len(times):
         raise refusal(assembly, passage)
-    return _motion(assembly, passage, times, gravity, curves or {})
+    return passage
 
 
 def passage_of(assembly: Assembly, rounds: int, gravity: float = 0.0) -> Passage:
@@ -135,11 +140,10 @@ def why(assembly: Assembly, passage: Passage) -> str:
     """Where a walk ended, by the angle of the drive's body, and which bodies and joints hold one another there."""
     assert passage.ended is not None
     status, node = passage.ended
-    time = node.time
     loops, mechanism = assembly.loops, assembly.loops.mechanism
-    (q, v), *_ = cartesian(assembly, passage, node.q[:, None], node.v[:, None], np.array([time]))
-    pose = replace(assembly, q=q, v=v)
-    jacobian = loops.at(q, v, time).jacobian * loops.scales / loops.row_scales[:, None]
+    pose = pose_at(assembly, passage, node)
+    jacobian = loops.at(pose.q, pose.v, node.time).jacobian * loops.scales
+    jacobian = jacobian / loops.row_scales[:, None]
     left = np.linalg.svd(jacobian)[0][:, -1]  # the forces that hold one another
     held = {
         joint.name: float(np.linalg.norm(left[np.array(loops.owners) == f"joints.{joint.name}"]))
@@ -187,6 +191,13 @@ def cartesian(assembly: Assembly, passage: Passage, q: Array, v: Array, times: A
     return found
 
 
+def pose_at(assembly: Assembly, passage: Passage, node: WalkPose) -> Assembly:
+    """The linkage at a pose of its walk."""
+    times = np.array([node.time])
+    ((q, v),) = cartesian(assembly, passage, node.q[:, None], node.v[:, None], times)
+    return replace(assembly, q=q, v=v)
+
+
 def passed_through(assembly: Assembly, times: Array) -> Array:
     """Coordinates and velocities (t, 2, n) at instants (t,), s, that rise from 0.
 
@@ -195,10 +206,7 @@ def passed_through(assembly: Assembly, times: Array) -> Array:
     InputError
         Where the mechanism comes to a dead centre.
     """
-    rounds = math.ceil(times.max(initial=0.0) / assembly.loops.mechanism.period.seconds)
-    passage = passage_of(assembly, max(rounds, 1))
-    if len(passage.passed(times)) < len(times):
-        raise refusal(assembly, passage)
+    passage = _passed(assembly, times)
     shown, filled = _beside(passage, times)
     return filled(cartesian(assembly, passage, *passage.at(shown), shown))
 

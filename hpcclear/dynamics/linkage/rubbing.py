@@ -176,7 +176,7 @@ class RubbingGuide(Rubbing):
 
 
 class RubbingPin(Rubbing):
-    """Friction of a pin: `parts.PinFriction` has its radius in both parameters, so that sliding is turning here.
+    """Friction of a pin: `parts.IdealFriction` has its radius in both parameters, so that sliding is turning here.
 
     In a tree its reaction is what the bodies beyond it require: inertia and weight, less the forces on them.
     """

@@ -11,7 +11,6 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble, placed
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import split
 from hpcclear.dynamics.linkage.prescribed import passed_through
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.dynamics.planar.turning import without_clearance
@@ -76,30 +75,10 @@ def _path(ideal: Mechanism, place: str) -> Path:
     share = np.linspace(0.0, 1.0, INSTANTS * drive.turns + 1)
     assembly = assemble(ideal)
     times = share * drive.seconds
-    rows = passed_through(assembly, times)
-    seen = [placed(replace(assembly, q=q, v=v), place)[:2] for q, v in rows]
-    where, speed = np.array(seen).T
+    q, v = np.moveaxis(passed_through(assembly, times), 0, -1)
+    where, speed, *_ = placed(replace(assembly, q=q, v=v), place)
     path: Path = CubicHermiteSpline(share, where, speed * drive.seconds)
     return path
-
-
-def rigid_acceleration(
-    mechanism: Mechanism, place: str, rows: Array, angle: Array, spin: Array
-) -> Array:
-    """Acceleration x + iy (t,) of a place of a body, m/s2.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (3, t)
-        Accelerations of the body's mass centre and of its angle.
-    angle, spin : ndarray, shape (t,)
-        Of the body, rad and rad/s.
-    """
-    name, point = split(place)
-    body = mechanism.body(name)
-    arm = (complex(*body.points[point]) - complex(*body.center)) * np.exp(1j * angle)
-    found: Array = rows[0] + 1j * rows[1] + (1j * rows[2] - spin**2) * arm
-    return found
 
 
 def ideal_path(mechanism: Mechanism, place: str) -> Path | None:

@@ -1,5 +1,6 @@
 """Linkages without clearance whose drives prescribe everything: time series and extremes, nothing integrated."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,22 +9,16 @@ from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.assembly import placed
+from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Slide,
-    TableDrive,
-    as_complex,
-    seconds_of,
-    split,
-    straight_of,
-)
+from hpcclear.dynamics.linkage.parts import Slide, TableDrive, seconds_of, split, straight_of
+from hpcclear.dynamics.linkage.passage import cubic
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
-from hpcclear.dynamics.planar.path import rigid_acceleration
-from hpcclear.dynamics.planar.problem import linkage_of, period_of, scene_of
+from hpcclear.dynamics.planar.problem import linkage_of, scene_of
 from hpcclear.dynamics.planar.response import at_places, bodies_and_points, moved, pins_of
 from hpcclear.dynamics.planar.tables import curves_of, mechanism_of
 from hpcclear.dynamics.planar.turning import passage
@@ -132,7 +127,7 @@ def _crossed(levels: Array, place: Array, rate: Array, times: Array) -> Array:
     rising = b[k] > a[k]
     for _ in range(50):
         s = 0.5 * (low + high)
-        there = _between(a[k], h * rate[k], b[k], h * rate[k + 1], s)
+        there = cubic(a[k], h * rate[k], b[k], h * rate[k + 1], s)
         beyond = (there > level) == rising
         low, high = np.where(beyond, low, s), np.where(beyond, s, high)
     return np.asarray(times[k] + h * s) if len(k) else np.zeros(0)
@@ -143,38 +138,11 @@ def _within(count: Integers) -> Integers:
     return np.asarray(np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count))
 
 
-def _between(d0: Array, m0: Array, d1: Array, m1: Array, s: Array) -> Array:
-    c2, c3 = 3.0 * (d1 - d0) - 2.0 * m0 - m1, 2.0 * (d0 - d1) + m0 + m1
-    return np.asarray(d0 + s * (m0 + s * (c2 + s * c3)))
-
-
-def _motion_of(held: Prescribed, body: str) -> tuple[Array, Array, Array]:
-    """Mass centre and angle of a body (3, t), their velocities and accelerations."""
-    forest = held.assembly.loops.forest
-    columns = [forest.index(kind, body) for kind in ("x", "y", "angle")]
-    still = np.zeros(len(held.times))
-    q, v, a = (
-        np.array([still if column is None else motion[:, column] for column in columns])
-        for motion in (held.q, held.v, held.a)
-    )
-    q[2] += forest.offsets[body]
-    return q, v, a
-
-
 def _distance(held: Prescribed, first: str, second: str) -> tuple[Array, Array]:
     """Distance of two places (t,), m, and its rate."""
-    apart, moving = np.zeros((2, len(held.times)), complex)
-    mechanism = held.assembly.loops.mechanism
-    for place, sign in ((first, 1.0), (second, -1.0)):
-        name, point = split(place)
-        if name == GROUND:
-            apart += sign * as_complex(mechanism.ground[point])
-            continue
-        q, v, _ = _motion_of(held, name)
-        body = mechanism.body(name)
-        arm = (as_complex(body.points[point]) - as_complex(body.center)) * np.exp(1j * q[2])
-        apart += sign * (as_complex(q[:2]) + arm)
-        moving += sign * (as_complex(v[:2]) + 1j * v[2] * arm)
+    pose = replace(held.assembly, q=held.q.T, v=held.v.T)
+    (one, fast, *_), (two, slow, *_) = (placed(pose, place) for place in (first, second))
+    apart, moving = one - two, fast - slow
     return np.abs(apart), (apart.conj() * moving).real / np.maximum(np.abs(apart), 1e-300)
 
 
@@ -185,8 +153,12 @@ def _followed_acceleration(linkage: Linkage, held: Prescribed) -> Array:
         return np.full(len(held.times), np.nan)
     guides = [j for j in mechanism.joints if isinstance(j, Slide) and split(j.point)[0] == follow]
     place = follow if "." in follow else guides[0].point
-    q, v, rows = _motion_of(held, split(place)[0])
-    found = rigid_acceleration(mechanism, place, rows, q[2], v[2])
+    pose = replace(held.assembly, q=held.q.T, v=held.v.T)
+    here, _, _, spin = placed(pose, place)
+    name = split(place)[0]
+    centre = placed(pose, f"{name}.{CENTER}", mechanism.body(name).center)[0]
+    # as velocities follow from velocities, but for what the turning needs
+    found = placed(replace(pose, v=held.a.T), place)[1] - spin**2 * (here - centre)
     return found if "." in follow else (found * np.exp(-1j * guides[0].angle)).real
 
 
@@ -200,7 +172,7 @@ def prescribed_series(scene: Scene, revolutions: int) -> tuple[Array, dict[str, 
     """
     mechanism, tables = mechanism_of(scene.linkage), scene.linkage
     count = scene.output.instants_per_revolution or PER_REVOLUTION
-    period, cycle = float(period_of(mechanism)), at.TURN * turns_of(tables)
+    period, cycle = mechanism.period.seconds, at.TURN * turns_of(tables)
     times = np.linspace(0.0, revolutions * period, revolutions * count + 1)
     gravity = scene.effects.gravity
     walk = passage(mechanism, gravity, revolutions)

@@ -15,17 +15,8 @@ from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, turning
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    ConstantSpeed,
-    Harmonic,
-    Slide,
-    TableDrive,
-    TorqueDrive,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, ConstantSpeed, Slide, split
 from hpcclear.dynamics.linkage.trees import forest
-from hpcclear.dynamics.planar import bristles, swings
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.scene import Scene
@@ -62,7 +53,7 @@ def linkage_of(scene: Scene) -> Linkage:
         check_inertias(mechanism)
     follow = scene.linkage.followed or guided(mechanism)
     _check_followed(scene, follow)
-    bristles.check_room(scene, len(forest(mechanism, cartesian).coordinates))
+    _check_room(scene, len(forest(mechanism, cartesian).coordinates))
     return Linkage(
         mechanism,
         follow=follow,
@@ -96,6 +87,28 @@ def _check_followed(scene: Scene, follow: str) -> None:
             scene.objective_key, name, "no point is followed",
             'Name it: mechanism.followed = "body.point"',
         )  # fmt: skip
+
+
+def _check_room(scene: Scene, others: int) -> None:
+    """InputError if the kernel cannot hold so many coordinates, and the bristles beside them."""
+    count = others + scene.bristles
+    if count <= at.MAX_COORDINATES:
+        return
+    most = f"{count} coordinates, of {at.MAX_COORDINATES} at most"
+    if others <= at.MAX_COORDINATES:
+        raise InputError(
+            "effects.friction.law", scene.effects.friction.law, f"needs one for each joint with clearance: {most}",
+            'Write law = "coulomb", or make some of the joints ideal',
+        )  # fmt: skip
+    if scene.numerics.formulation == "baumgarte":
+        raise InputError(
+            "numerics.formulation", "baumgarte", f"has three for each body: {most}",
+            'Write formulation = "minimal", or use fewer bodies',
+        )  # fmt: skip
+    bodies = len(scene.linkage.bodies)
+    raise InputError(
+        "mechanism.bodies", bodies, f"have {most}", "Use fewer bodies, joints with clearance or modes of bending"
+    )  # fmt: skip
 
 
 def guided(mechanism: Mechanism) -> str:
@@ -176,19 +189,6 @@ def check_columns(scene: Scene, points: Points | None) -> None:
                 )  # fmt: skip
 
 
-def period_of(mechanism: Any) -> Any:
-    """Length of a revolution, s; of samples, (m,)."""
-    drive = mechanism.period
-    if isinstance(drive, TableDrive):
-        return drive.seconds
-    if isinstance(drive, Harmonic):
-        return 1.0 / drive.frequency
-    if isinstance(drive, TorqueDrive) and drive.interval is not None:
-        return drive.interval
-    speed = drive.usual_speed if isinstance(drive, TorqueDrive) else drive.speed
-    return at.TURN * drive.turns / np.abs(speed)
-
-
 def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
     """Kernel parameters of each sample but for those of the joints, shape (samples, PARAMETERS)."""
     check_columns(scene, points)
@@ -196,7 +196,7 @@ def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
     sample = sample_of(scene, points)
     p = np.ones((get.size, linkage.parameter_rows))
     p[:, at.JOINT_BLOCKS : at.OWN] = 0.0
-    period = period_of(sample)
+    period = sample.period.seconds
     turns = turns_of(scene.linkage)
     p[:, at.PERIOD] = period
     p[:, at.SPEED] = at.TURN * turns / period
@@ -239,31 +239,6 @@ def driven_length(mechanism: Mechanism) -> Any:
     apart = (np.hypot(a[0] - b[0], a[1] - b[1]) for a, b in combinations(places, 2))
     longest: Any = reduce(np.maximum, apart, np.float64(0.0))
     return np.where(longest > 0.0, longest, 1.0)
-
-
-def absolute_tolerances(scene: Scene) -> tuple[float, ...]:
-    """Absolute tolerances of coordinates, then velocities: a, 10 a/m, 1000 a/s, 50000 a/(m s) with a for lengths.
-
-    With the default a = rtol times 1 mm they stand for 1 mm, 0.01 rad, 1 m/s and 50 rad/s. Where the driven body's points move
-    slower than 25 m/s the velocities' are less in proportion: what is small is set by the mechanism's own speed.
-    """
-    if is_prescribed(scene):
-        return ()
-    linkage = linkage_of(scene)
-    a = scene.numerics.absolute_tolerance
-    angles = [one.kind == "angle" for one in linkage.forest.coordinates[scene.modes :]]
-    speed = at.TURN / float(period_of(linkage.mechanism)) * float(driven_length(linkage.mechanism))
-    rate = 1e3 * min(1.0, speed / 25.0)
-    first, second = bristles.tolerances(scene, float(period_of(linkage.mechanism)))
-    bent = swings.tolerances(linkage.mechanism, a, rate * a)
-    return (
-        *first,
-        *bent,
-        *(10.0 * a if angle else a for angle in angles),
-        *second,
-        *(rate * a for _ in bent),
-        *((50.0 if angle else 1.0) * rate * a for angle in angles),
-    )
 
 
 @lru_cache(maxsize=64)

@@ -23,7 +23,7 @@ from hpcclear.scene.driving import (
     PlanarSpeed,
     PlanarTable,
 )
-from hpcclear.scene.joints import IdealPinFriction, Materials
+from hpcclear.scene.joints import Materials
 from hpcclear.scene.planar import (
     Planar,
     PlanarBody,
@@ -118,7 +118,7 @@ def _compliances(both: Materials) -> tuple[float, float]:
 
 def _joint(joint: Any) -> parts.Joint:
     if isinstance(joint, PlanarRevolute):
-        return _part(parts.Revolute, joint, friction=_rubbing(joint.friction))
+        return _part(parts.Revolute, joint, friction=_rubbing(joint))
     if isinstance(joint, PlanarClearance):
         both, start = _compliances(joint.materials), joint.start_eccentricity
         stiffness = contact_stiffness(*both, joint.bearing_radius, joint.clearance)
@@ -129,7 +129,7 @@ def _joint(joint: Any) -> parts.Joint:
         return _part(parts.Fixed, joint)
     slide = isinstance(joint, PlanarSlide)
     if joint.clearance is None and slide:
-        return _part(parts.Slide, joint, friction=_rubbing(joint.friction))
+        return _part(parts.Slide, joint, friction=_rubbing(joint))
     if joint.clearance is None:
         return _part(parts.Slot, joint)
     radius = joint.corner_radius if slide else joint.pin_radius
@@ -139,10 +139,8 @@ def _joint(joint: Any) -> parts.Joint:
     return loose
 
 
-def _rubbing(table: Any) -> Any:
-    """Friction of a guide, or of a pin, which has a radius."""
-    kind = parts.PinFriction if isinstance(table, IdealPinFriction) else parts.GuideFriction
-    return None if table is None else _part(kind, table)
+def _rubbing(joint: Any) -> parts.IdealFriction | None:
+    return None if joint.friction is None else _part(parts.IdealFriction, joint.friction)
 
 
 def _drive(drive: Any) -> parts.Drive:

@@ -5,27 +5,23 @@ near singular where it hardly passes. With clearance a change point is for the d
 ideal joints alone depend on one another there.
 """
 
-from dataclasses import replace
-from typing import Protocol
+from dataclasses import fields, replace
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
 from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, with_numbers
-from hpcclear.dynamics.linkage.numbers import values
+from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.parts import (
     ConstantSpeed,
     Joint,
     Loose,
     TorqueDrive,
 )
-from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose, clear
-from hpcclear.dynamics.linkage.prescribed import angle_of, cartesian, passage_of, refusal
-from hpcclear.dynamics.linkage.trees import Forest
+from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose
+from hpcclear.dynamics.linkage.prescribed import angle_of, passage_of, pose_at, refusal
 
 DEPENDENT = 1e-3
 """Smallest singular value of the ideal joints' constraints, rows scaled to 1, at which they depend on one another at a change
@@ -45,7 +41,6 @@ NEAR_CHANGE = 0.1
 
 def without_clearance(mechanism: Mechanism) -> Mechanism:
     """The mechanism with pins in place of clearances, and a drive of constant speed in place of a torque."""
-
     drives = tuple(
         ConstantSpeed(d.name, d.body, d.usual_speed, d.period, d.turns)
         if isinstance(d, TorqueDrive)
@@ -58,7 +53,10 @@ def without_clearance(mechanism: Mechanism) -> Mechanism:
 def pinned(mechanism: Mechanism) -> tuple[Joint, ...]:
     """The joints of a mechanism, none with clearance."""
     return tuple(
-        joint.without_clearance if isinstance(joint, Loose) else joint for joint in mechanism.joints
+        joint.ideal(*(getattr(joint, one.name) for one in fields(joint.ideal) if not one.kw_only))
+        if isinstance(joint, Loose)
+        else joint
+        for joint in mechanism.joints
     )
 
 
@@ -135,18 +133,16 @@ def _narrowest(walk: Passage) -> WalkPose | None:
 
 def _closes(assembly: Assembly, walk: Passage, node: WalkPose) -> bool:
     """Whether the loops close, to rounding, at a pose where they change branch; else they pass very near to it."""
-    ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time]))
-    error = np.abs(assembly.loops.at(q, v, node.time).error).max()
-    return bool(error <= CLOSED * np.abs(q).max())
+    pose = pose_at(assembly, walk, node)
+    error = np.abs(assembly.loops.at(pose.q, pose.v, node.time).error).max()
+    return bool(error <= CLOSED * np.abs(pose.q).max())
 
 
 def _dependent(mechanism: Mechanism, assembly: Assembly, walk: Passage, node: WalkPose) -> bool:
     """Whether the constraints of the ideal joints and drives depend on one another at a pose of the twin."""
-    time = np.array([node.time])
-    ((q, v),) = cartesian(assembly, walk, node.q[:, None], node.v[:, None], time)
-    loops = assembly.loops
+    pose, loops = pose_at(assembly, walk, node), assembly.loops
     rows = np.array([not is_open(mechanism, owner) for owner in loops.owners], bool)
-    jacobian = (loops.at(q, v, node.time).jacobian * loops.scales)[rows]
+    jacobian = (loops.at(pose.q, pose.v, node.time).jacobian * loops.scales)[rows]
     jacobian = jacobian / np.linalg.norm(jacobian, axis=1)[:, None]
     return bool(np.linalg.svd(jacobian)[1][-1] < DEPENDENT)
 
@@ -168,67 +164,10 @@ def changes(mechanism: Mechanism, gravity: float, rounds: int) -> tuple[float, .
     if found is None or found[1].ended is not None:
         return ()
     assembly, walk = found
-    angles = []
-    for node in walk.changes:
-        ((q, v),) = cartesian(
-            assembly, walk, node.q[:, None], node.v[:, None], np.array([node.time])
-        )
-        angles.append(angle_of(replace(assembly, q=q, v=v)))
-    return tuple(sorted(angles))
+    return tuple(sorted(angle_of(pose_at(assembly, walk, node)) for node in walk.changes))
 
 
 def loops_of(structure: Mechanism) -> Loops | None:
     """The loop-closure constraints of samples' twins, of what the samples have in common; None if they are not to be judged."""
     twin = twin_of(structure)
     return None if twin is None else Loops(twin, trees=True)
-
-
-class Made(Protocol):
-    """Samples (m) put together, as `hpcclear.dynamics.setup.start.Samples` has them."""
-
-    numbers: Mechanism
-    closed: Booleans
-
-    def mechanism(self, row: int) -> Mechanism:
-        """One sample by itself."""
-
-    def coordinates(self, forest: Forest) -> tuple[Array, Array]:
-        """Coordinates and velocities (n, m) of a forest; NaN of samples that do not close."""
-
-
-def statuses(loops: Loops | None, samples: Made, gravity: float, rounds: int) -> Integers:
-    """Statuses (m,) of samples: whether each can turn.
-
-    Parameters
-    ----------
-    loops : Loops or None
-        Of `loops_of`; they take the samples' numbers.
-    rounds : int
-        Revolutions that one without clearance is walked through.
-    """
-    closed = samples.closed
-    found = np.where(closed, int(Status.OK), int(Status.CANNOT_TURN))
-    if loops is None or not closed.any():
-        return found
-    for row in np.flatnonzero(closed & ~_clear(loops, samples)).tolist():
-        try:
-            refusal = refused(samples.mechanism(row), gravity, rounds)
-        except InputError:
-            refusal = None
-        found[row] = int(Status.OK if refusal is None else refusal[0])
-    return found
-
-
-def _clear(loops: Loops, samples: Made) -> Booleans:
-    """Which samples (m,) are certain to turn."""
-    sample = samples.numbers
-    tables: dict[str, object] = {
-        "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,
-        "ground": sample.ground, "loads": (),
-    }  # fmt: skip
-    numbers = with_numbers(loops.mechanism, **tables)
-    loops.take(values(numbers))
-    main = numbers.period
-    seconds: Array = np.broadcast_to(np.asarray(main.seconds, float), len(samples.closed))
-    start, _ = samples.coordinates(loops.forest)
-    return clear(loops, start, seconds, getattr(main, "turns", 1))

@@ -10,9 +10,9 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.contacts.declared import Shape
 from hpcclear.dynamics.contacts.registry import GEOMETRIES
 from hpcclear.dynamics.layout.views import Parameters
-from hpcclear.dynamics.planar import bristles
 from hpcclear.dynamics.planar.prescribed import held_extremes
 from hpcclear.dynamics.planar.problem import is_prescribed, parameters_of
+from hpcclear.dynamics.planar.tolerances import SMOOTH
 from hpcclear.dynamics.setup.further import (
     further_rows,
     has_waves,
@@ -143,7 +143,7 @@ def _film_parameters(scene: Scene, get: Numbers, joint: str, p: Array, block: in
     film, own = scene.films().get(joint), p[:, block:]
     own[:, at.FILM_SCALE : at.JOINT_ROWS] = 0.0
     own[:, at.FILM_FLOOR] = 0.5
-    own[:, at.FILM_STEEPNESS] = bristles.SMOOTH if scene.bristles else 0.0
+    own[:, at.FILM_STEEPNESS] = SMOOTH if scene.bristles else 0.0
     if film is None:
         return
     key = scene.joint_key(joint)

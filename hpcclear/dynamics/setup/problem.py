@@ -10,8 +10,8 @@ from hpcclear.dynamics.layout.views import Parameters
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.parts import RunUp, TableDrive, TorqueDrive
 from hpcclear.dynamics.planar import problem as planar
-from hpcclear.dynamics.planar import swings
 from hpcclear.dynamics.planar.tables import curves_of
+from hpcclear.dynamics.planar.tolerances import STIFF, absolute_tolerances, swings
 from hpcclear.dynamics.setup.further import parameter_rows
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.stepping.explicit.tableau import TABLEAUS, TSITOURAS, Tableau
@@ -85,7 +85,7 @@ def implicit_method(scene: Scene) -> str:
     method = scene.numerics.method
     if method == "auto" and scene.modes:
         mechanism = planar.linkage_of(scene).mechanism
-        if max(swings.swings(mechanism)) * float(planar.period_of(mechanism)) > swings.STIFF:
+        if max(swings(mechanism)) * mechanism.period.seconds > STIFF:
             return "always"  # there is no segment of the motion in which they are slow
     if method != "auto" or not scene.clearance_joints():
         return IMPLICIT_METHODS.get(method, "never")
@@ -132,7 +132,7 @@ def problem_of(scene: Scene, *, series: bool = False, energies: bool | None = No
         coordinates=coordinate_count(scene),
         tableau=tableau_of(scene),
         rtol=scene.numerics.rtol,
-        atol=planar.absolute_tolerances(scene),
+        atol=absolute_tolerances(scene),
         impact_floor=1e-3 if e.contact is None else e.contact.minimum_impact_speed,
         transient=scene.numerics.transient_revolutions,
         averaged=scene.numerics.averaged_revolutions,

@@ -4,13 +4,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from hpcclear.base.arrays import Array
+from hpcclear.base.arrays import Array, Booleans, Integers
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble_samples
 from hpcclear.dynamics.linkage.loops import Loops
-from hpcclear.dynamics.linkage.mechanism import Mechanism, uncentred
+from hpcclear.dynamics.linkage.mechanism import Mechanism, uncentred, with_numbers
+from hpcclear.dynamics.linkage.numbers import values
+from hpcclear.dynamics.linkage.passage import clear
 from hpcclear.dynamics.linkage.poses import coordinates
 from hpcclear.dynamics.linkage.trees import Forest
 from hpcclear.dynamics.planar.problem import (
@@ -24,7 +26,7 @@ from hpcclear.dynamics.planar.problem import (
     scene_of,
 )
 from hpcclear.dynamics.planar.tables import mechanism_of
-from hpcclear.dynamics.planar.turning import loops_of, statuses
+from hpcclear.dynamics.planar.turning import loops_of, pinned, refused
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 
@@ -61,7 +63,7 @@ def start_states(
         refusal = refused_of(scene) if walk else None
         ended = np.full(len(par), int(Status.OK if refusal is None else refusal[0]))
     else:
-        ended = statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
+        ended = _statuses(_twins(scene), samples, scene.effects.gravity, rounds_of(scene))
     _start_contacts(scene, par, points, start)
     start.fail(ended)
     return start
@@ -115,6 +117,37 @@ class Samples:
         for row, made in self._single.items():
             q[:, row], v[:, row] = coordinates(forest, made, self.mechanism(row))
         return q, v
+
+
+def _statuses(loops: Loops | None, samples: Samples, gravity: float, rounds: int) -> Integers:
+    """Statuses (m,) of samples: whether each can turn; `loops`: of `loops_of`, which take the samples' numbers, `rounds`:
+    revolutions that one without clearance is walked through."""
+    closed = samples.closed
+    found = np.where(closed, int(Status.OK), int(Status.CANNOT_TURN))
+    if loops is None or not closed.any():
+        return found
+    for row in np.flatnonzero(closed & ~_clear(loops, samples)).tolist():
+        try:
+            refusal = refused(samples.mechanism(row), gravity, rounds)
+        except InputError:
+            refusal = None
+        found[row] = int(Status.OK if refusal is None else refusal[0])
+    return found
+
+
+def _clear(loops: Loops, samples: Samples) -> Booleans:
+    """Which samples (m,) are certain to turn."""
+    sample = samples.numbers
+    tables: dict[str, object] = {
+        "bodies": sample.bodies, "joints": pinned(sample), "drives": sample.drives,
+        "ground": sample.ground, "loads": (),
+    }  # fmt: skip
+    numbers = with_numbers(loops.mechanism, **tables)
+    loops.take(values(numbers))
+    main = numbers.period
+    seconds: Array = np.broadcast_to(np.asarray(main.seconds, float), len(samples.closed))
+    start, _ = samples.coordinates(loops.forest)
+    return clear(loops, start, seconds, getattr(main, "turns", 1))
 
 
 @lru_cache(maxsize=16)

@@ -96,8 +96,7 @@ class Problem:
         s.senses = 1.0 if self.implicit != "never" or self.rtol > STRICT else 0.0
         s.cycle, s.parameter_rows = self.cycle, self.parameter_rows
         s.at_rest = THROWN_BACK if self.from_rest else 0.0
-        last = at.waves_of(self.effects)[-1:]
-        s.profiled = last[0].rows().stop if last and self.effects.profile else 0
+        s.profiled = at.wave_rows(self.effects) if self.effects.profile else 0
         s.chosen = 0.0 if self.chosen else 1.0
         s.chosen[list(self.chosen)] = 1.0
         s.atol_coordinates[:n], s.atol_velocities[:n] = self.atol[:n], self.atol[n:]

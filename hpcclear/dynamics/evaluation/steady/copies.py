@@ -10,14 +10,11 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.layout.views import Start
-from hpcclear.dynamics.planar.problem import absolute_tolerances
+from hpcclear.dynamics.planar.tolerances import LENGTH, absolute_tolerances
 from hpcclear.scene import Scene
 
 PERTURBATION = 1e-5
 """Size of the perturbations, relative to `scales`: 10 nm, 10 um/s."""
-
-LENGTH = 1e-3
-"""m; what the relative tolerance of lengths refers to."""
 
 
 def scales(scene: Scene) -> Array:

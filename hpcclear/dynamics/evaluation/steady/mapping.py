@@ -7,10 +7,11 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Regime
 from hpcclear.dynamics.evaluation.steady import judging
-from hpcclear.dynamics.evaluation.steady.copies import LENGTH, perturbed
+from hpcclear.dynamics.evaluation.steady.copies import perturbed
 from hpcclear.dynamics.evaluation.steady.effort import Effort, Mean, Sample, Segment
 from hpcclear.dynamics.evaluation.steady.judging import objective
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
+from hpcclear.dynamics.planar.tolerances import LENGTH
 
 RTOL = 1e-8
 """Tolerance of a map. The exponent of the paper's scene is -0.32 at 1e-11; this finds -0.31."""
