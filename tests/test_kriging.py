@@ -11,10 +11,11 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteK
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.fitting import KrigingMethod, fit_kriging
 from hpcclear.statistics.surrogate.kernels import KERNELS, MATERN, SQUARED_EXPONENTIAL
-from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.likelihood import PART, maximise, negative_likelihood
 from hpcclear.statistics.surrogate.metrics import accuracy
+from hpcclear.statistics.surrogate.piecewise import Piecewise
 from hpcclear.statistics.surrogate.predictor import gaussian, matern
+from hpcclear.statistics.surrogate.stored import arrays_of, models_in
 from hpcclear.statistics.surrogate.subintervals import SubintervalSettings, fit_subintervals
 
 PEERS = {SQUARED_EXPONENTIAL: RBF, MATERN: lambda *own: Matern(*own, nu=2.5)}
@@ -185,39 +186,14 @@ def test_prediction_does_not_depend_on_the_batch(either):
 
 def test_round_trip_is_bitwise(either):
     model = either
-    arrays = {name: np.copy(array) for name, array in model.to_arrays().items()}
-    assert all(array.dtype.kind in "fiU" for array in arrays.values())
-    again = Kriging.from_arrays(arrays)
+    whole = Piecewise((model,), *np.ones((3, 1)))
+    arrays = {name: np.copy(array) for name, array in arrays_of(whole).items()}
+    ((again,),) = (one.leaves for one in models_in(arrays).values())
     places = draw(100, 5)
     assert again.names == ("a", "b", "c")
     assert again.kernel == model.kernel
     assert (again.predict(places) == model.predict(places)).all()
     assert (again.variance(places) == model.variance(places)).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "damage"),
-    [
-        ("alpha", lambda a: a[:-1]),
-        ("alpha", lambda a: a * np.nan),
-        ("inputs", lambda a: a[:, :2]),
-        ("length_scales", lambda a: -a),
-        ("lower", lambda a: a + 1e9),
-        ("scale", lambda a: np.zeros(())),
-        ("names", lambda a: np.arange(3.0)),
-        ("kernel", lambda a: np.array("cubic")),
-        ("kernel", lambda a: np.zeros(())),
-        ("values", lambda a: None),
-    ],
-)
-def test_damaged_arrays_are_refused(model, name, damage):
-    arrays = model.to_arrays()
-    arrays[name] = damage(arrays[name])
-    if arrays[name] is None:
-        del arrays[name]
-    with pytest.raises(InputError) as caught:
-        Kriging.from_arrays(arrays)
-    assert caught.value.key in (name, "values", "alpha")
 
 
 def test_does_not_extrapolate(model):

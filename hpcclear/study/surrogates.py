@@ -1,6 +1,7 @@
 """Surrogates of the objective: fitted, checked on fresh points, written and read back."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,9 +17,9 @@ from hpcclear.scene.variables import StudyVariable
 from hpcclear.statistics.surrogate.fitting import KrigingMethod
 from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.metrics import accuracy
-from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise, beginning
-from hpcclear.statistics.surrogate.regression import RegressionMethod, made
-from hpcclear.statistics.surrogate.stored import rows_of
+from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
+from hpcclear.statistics.surrogate.regression import Regression, RegressionMethod, made
+from hpcclear.statistics.surrogate.stored import arrays_of, models_in, rows_of
 from hpcclear.statistics.surrogate.subintervals import (
     Method,
     SubintervalSettings,
@@ -110,9 +111,20 @@ def models_of(scene: Scene, result: Mapping[str, np.ndarray]) -> list[Piecewise]
     """
     found: list[Piecewise] = []
     method = method_of(scene)
-    while arrays := beginning(result, f"model{len(found)}_"):
-        found.append(Piecewise.from_arrays(arrays, method.restored))
+    while arrays := _named(result, f"model{len(found)}_"):
+        (model,) = models_in(arrays).values()
+        if isinstance(method, RegressionMethod):
+            leaves = (
+                method.restored(leaf) for leaf in model.leaves if isinstance(leaf, Regression)
+            )
+            model = replace(model, leaves=tuple(leaves))
+        found.append(model)
     return found
+
+
+def _named(result: Mapping[str, np.ndarray], start: str) -> Result:
+    """Arrays whose names begin so, by what follows."""
+    return {name[len(start) :]: one for name, one in result.items() if name.startswith(start)}
 
 
 def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
@@ -154,7 +166,7 @@ def of_further(run: StudyRun, model: Piecewise) -> list[Piecewise]:
 
 
 def _packed(k: int, model: Piecewise) -> Result:
-    return {f"model{k}_{name}": array for name, array in model.to_arrays().items()}
+    return {f"model{k}_{name}": array for name, array in arrays_of(model).items()}
 
 
 def _checked(run: StudyRun, k: int, model: Piecewise) -> Result:

@@ -1,6 +1,6 @@
 """Kriging models fitted by maximum likelihood (`likelihood`); sources: `kriging`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -44,10 +44,6 @@ class KrigingMethod:
         return fit_kriging(
             points, values, bounds, rng=rng, names=names, restarts=self.restarts, kernel=self.kernel
         )
-
-    def restored(self, arrays: Mapping[str, np.ndarray]) -> Kriging:
-        """Return the model of stored arrays; shapes as in `Kriging.from_arrays`."""
-        return Kriging.from_arrays(arrays)
 
 
 def fit_kriging(

@@ -15,41 +15,17 @@ Sources: J. Sacks et al., "Design and analysis of computer experiments", Statist
 Machine Learning" (2006), section 2.2 and algorithm 2.1.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from hpcclear.base.arrays import Array
-from hpcclear.base.errors import InputError
-from hpcclear.statistics.surrogate.kernels import (
-    KERNELS,
-    SQUARED_EXPONENTIAL,
-    Kernel,
-    correlation,
-)
-from hpcclear.statistics.surrogate.leaf import Columns, Fields, inside
+from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL, Kernel, correlation
+from hpcclear.statistics.surrogate.leaf import Columns, inside
 from hpcclear.statistics.surrogate.predictor import kernel_sum, matern_sum, pad
 
-FIELDS: Fields = {
-    "names": ("parameter",),
-    "lower": ("parameter",),
-    "upper": ("parameter",),
-    "length_scales": ("parameter",),
-    "signal_variance": (),
-    "noise_variance": (),
-    "mean": (),
-    "scale": (),
-    "dropped": (),
-    "inputs": ("training_point", "parameter"),
-    "values": ("training_point",),
-    "alpha": ("training_point",),
-    "kernel": (),
-}
-"""What a stored model consists of, and the dimensions of each array."""
 COLUMNS: Columns = {
     "weight": ("point", "alpha"),
     "length_scale": ("parameter", "length_scales"),
@@ -58,6 +34,7 @@ COLUMNS: Columns = {
     "output_mean": ("", "mean"),
     "output_scale": ("", "scale"),
     "dropped": ("", "dropped"),
+    "kernel": ("", "kernel"),
 }
 """What the rows of a dataset hold of a model (`hpcclear.statistics.surrogate.leaf.Columns`)."""
 
@@ -104,11 +81,10 @@ class Kriging:
     kernel: Kernel = SQUARED_EXPONENTIAL
 
     def __post_init__(self) -> None:
-        for name, dims in FIELDS.items():
-            if dims and name != "names":
-                array = np.array(getattr(self, name), dtype=np.float64)
-                array.setflags(write=False)
-                object.__setattr__(self, name, array)
+        for name in ("lower", "upper", "length_scales", "inputs", "values", "alpha"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
 
     @property
     def leaves(self) -> tuple["Kriging", ...]:
@@ -128,7 +104,7 @@ class Kriging:
     @property
     def columns(self) -> Columns:
         """What is stored of it; the kernel is left out where it is the squared exponential."""
-        return COLUMNS if self.separable else {**COLUMNS, "kernel": ("", "kernel")}
+        return {k: v for k, v in COLUMNS.items() if k != "kernel" or not self.separable}
 
     def steepest(self) -> int:
         """The input with the shortest length scale."""
@@ -215,56 +191,3 @@ class Kriging:
         steps = (a[:, None, :] - b[None, :, :]) / self.length_scales
         squares = np.einsum("ijk,ijk->ij", steps, steps)
         return self.signal_variance * correlation(squares, self.kernel)
-
-    def to_arrays(self) -> dict[str, np.ndarray]:
-        """The model as plain arrays, without pickle; `FIELDS` names their dimensions."""
-        return {name: np.asarray(getattr(self, name)) for name in FIELDS}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> "Kriging":
-        """The model that `to_arrays` stored; it predicts the same to the last bit.
-
-        Raises
-        ------
-        InputError
-            An array is missing, has the wrong shape, or is not finite.
-        """
-        sizes: dict[str, int] = {}
-        for name, dims in FIELDS.items():
-            _check_array(arrays, name, dims, sizes)
-        lower, upper = np.asarray(arrays["lower"]), np.asarray(arrays["upper"])
-        if not (lower < upper).all():
-            raise InputError("lower", lower.tolist(), "not below upper", "use the file as written")
-        positive = ("length_scales", "signal_variance", "noise_variance", "scale")
-        for name in positive:
-            if not (np.asarray(arrays[name]) > 0).all():
-                raise InputError(name, arrays[name], "not positive", "use the file as written")
-        fields: dict[str, Any] = {name: np.asarray(arrays[name]) for name in FIELDS}
-        for name in (*positive[1:], "mean"):
-            fields[name] = float(fields[name])
-        fields["names"] = tuple(str(name) for name in fields["names"])
-        fields["kernel"] = str(fields["kernel"])
-        if fields["kernel"] not in KERNELS:
-            raise InputError("kernel", fields["kernel"], "not known", f"use {' or '.join(KERNELS)}")
-        fields["dropped"] = int(fields["dropped"])
-        return cls(**fields)
-
-
-def _check_array(
-    arrays: Mapping[str, np.ndarray], name: str, dims: tuple[str, ...], sizes: dict[str, int]
-) -> None:
-    """Refuse a stored array that is missing, of the wrong shape or kind; note its dimensions."""
-    remedy = "use a file written by this package"
-    if name not in arrays:
-        raise InputError(name, None, "missing from the stored model", remedy)
-    array = np.asarray(arrays[name])
-    if array.ndim != len(dims):
-        raise InputError(name, array.shape, "wrong number of dimensions", remedy)
-    for dim, size in zip(dims, array.shape, strict=True):
-        if size == 0 or sizes.setdefault(dim, size) != size:
-            raise InputError(name, array.shape, f"does not fit dimension {dim!r}", remedy)
-    if name in ("names", "kernel"):
-        if array.dtype.kind not in "UOT":
-            raise InputError(name, array.dtype, "not text", remedy)
-    elif array.dtype.kind not in "fiu" or not np.isfinite(array).all():
-        raise InputError(name, array, "not finite numbers", remedy)

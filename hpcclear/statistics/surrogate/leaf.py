@@ -10,8 +10,6 @@ from hpcclear.base.errors import InputError
 Columns = Mapping[str, tuple[str, str]]
 """Variables of a dataset of kind ``kriging``: the dimension of each in a model's row ("point", "parameter" or ""), and the
 attribute of the model that it holds."""
-Fields = Mapping[str, tuple[str, ...]]
-"""Names of arrays, and the dimensions of each: "parameter" and "training_point"."""
 
 
 def checked_samples(

@@ -4,7 +4,6 @@ The domain is cut into prod_i L_i / L'_i boxes (L_i the length of an input's int
 its subintervals). A query uses the model of the box it is in. A single model is the case of one box.
 """
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,8 +16,6 @@ from hpcclear.statistics.surrogate.regression import Regression
 
 Leaf = Kriging | Regression
 """A model fitted to points in a box."""
-
-JUDGED = ("r2", "rmae", "accepted")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,26 +105,3 @@ class Piecewise:
         """Mean and standard deviation of n designs, ``(n, s, d)`` to ``(n, 2)``, where a model in one piece has its own; else
         None."""
         return self.leaves[0].moments(points) if len(self.leaves) == 1 else None
-
-    def to_arrays(self) -> dict[str, np.ndarray]:
-        """The models as plain arrays, without pickle: those of leaf number k begin with "leaf{k}_"."""
-        arrays = {name: np.asarray(getattr(self, name)) for name in JUDGED}
-        for k, leaf in enumerate(self.leaves):
-            arrays |= {f"leaf{k}_{name}": array for name, array in leaf.to_arrays().items()}
-        return arrays
-
-    @classmethod
-    def from_arrays(
-        cls,
-        arrays: Mapping[str, np.ndarray],
-        restored: Callable[[Mapping[str, np.ndarray]], Leaf],
-    ) -> "Piecewise":
-        """The models that `to_arrays` stored; they predict the same to the last bit; raises as `restored`, of the method."""
-        leaves = [restored(beginning(arrays, f"leaf{k}_")) for k in range(len(arrays["accepted"]))]
-        judged = {name: np.asarray(arrays[name]) for name in JUDGED}
-        return cls(tuple(leaves), **judged)
-
-
-def beginning(arrays: Mapping[str, np.ndarray], start: str) -> dict[str, np.ndarray]:
-    """Arrays, of any shapes, whose names begin so, by what follows."""
-    return {name[len(start) :]: one for name, one in arrays.items() if name.startswith(start)}

@@ -8,7 +8,7 @@ come out again bit for bit, because a study that goes on after an interruption f
 import copy
 import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.plugins.sources import raised
-from hpcclear.statistics.surrogate.leaf import Columns, Fields, checked_samples, inside
+from hpcclear.statistics.surrogate.leaf import Columns, checked_samples, inside
 
 KEY = "study.surrogate.model"
 FOLDS = 5
@@ -25,22 +25,15 @@ FOLDS = 5
 LEVELS = 5
 """Values of an input at which it is seen how much predictions vary with it."""
 
-FIELDS: Fields = {
-    "names": ("parameter",),
-    "lower": ("parameter",),
-    "upper": ("parameter",),
-    "inputs": ("training_point", "parameter"),
-    "values": ("training_point",),
-    "fitted": ("training_point",),
-    "left_out": ("training_point",),
-    "seed": (),
-    "dropped": (),
-}
 COLUMNS: Columns = {
     "cross_validated": ("point", "left_out"),
     "dropped": ("", "dropped"),
     "surrogate": ("", "label"),
 }
+RESTORED: Columns = {**COLUMNS, "seed": ("", "seed"), "fitted": ("point", "fitted")}
+"""The same, with what a fit to the same points needs to be the same one."""
+PREDICTED: tuple[str, ...] = ("left_out", "fitted")
+"""Predictions at the training points, which a model that was read knows."""
 
 
 @dataclass(frozen=True)
@@ -83,16 +76,16 @@ class RegressionMethod:
         (lower, upper), kept = bounds.T, (points[valid], values[valid])
         return Regression(labels, lower, upper, *kept, lost, self.label, seed, self.source)
 
-    def restored(self, arrays: Mapping[str, np.ndarray]) -> "Regression":
-        """Fit again to stored training points.
+    def restored(self, model: "Regression") -> "Regression":
+        """Fit a model of a checkpoint again to its training points.
 
         Raises
         ------
         InputError
             The fit does not come out as it did.
         """
-        found = restored({**arrays, "label": np.array(self.label)}, self.source)
-        if not np.array_equal(found.fitted, arrays["fitted"]):
+        found = replace(model, source=self.source)
+        if not np.array_equal(found.fitted, model.stored["fitted"]):
             raise InputError(
                 KEY,
                 self.label,
@@ -116,7 +109,7 @@ class Regression:
     source : object
         Of `RegressionMethod`.
     stored : mapping of str to array
-        What need not be computed again.
+        `PREDICTED`, shape (n,).
     """
 
     names: tuple[str, ...]
@@ -211,31 +204,6 @@ class Regression:
         shape = (len(points), 2)
         found = _ask(self._model, self.label, "moments", self._to_unit(points))
         return scale * _numbers(found, shape, self.label, "moments") + [mean, 0.0]
-
-    def to_arrays(self) -> dict[str, np.ndarray]:
-        """Return training points and predictions; `FIELDS` names the dimensions, which are the shapes."""
-        return {name: np.asarray(getattr(self, name)) for name in FIELDS}
-
-
-def restored(arrays: Mapping[str, np.ndarray], source: object = None) -> Regression:
-    """Return the model of stored arrays, shapes as in `FIELDS`; without a source it does not predict."""
-    found = {
-        name: np.asarray(arrays[name], np.float64)
-        for name in FIELDS
-        if FIELDS[name] and name in arrays and name != "names"
-    }
-    return Regression(
-        tuple(str(name) for name in arrays["names"]),
-        found["lower"],
-        found["upper"],
-        found["inputs"],
-        found["values"],
-        dropped=int(arrays["dropped"]),
-        label=str(arrays["label"]),
-        seed=int(arrays["seed"]) if "seed" in arrays else 0,
-        source=source,
-        stored={"left_out": found["left_out"]},
-    )
 
 
 def made(source: object, label: str, seed: int) -> Any:

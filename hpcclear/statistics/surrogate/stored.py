@@ -1,19 +1,23 @@
 """Surrogates as they stand in a dataset of kind ``kriging``, a row for each subinterval's model."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate import kriging, regression
-from hpcclear.statistics.surrogate.kernels import SQUARED_EXPONENTIAL
 from hpcclear.statistics.surrogate.kriging import Kriging
+from hpcclear.statistics.surrogate.leaf import Columns
 from hpcclear.statistics.surrogate.piecewise import Leaf, Piecewise
+from hpcclear.statistics.surrogate.regression import Regression
 
 
-def rows_of(leaves: Sequence[Leaf], parameters: Sequence[str]) -> dict[str, np.ndarray]:
-    """Variables of a dataset for models of one kind, in inputs of these names.
+def rows_of(
+    leaves: Sequence[Leaf], parameters: Sequence[str], columns: Columns | None = None
+) -> dict[str, np.ndarray]:
+    """Variables of a dataset for models of one kind, in inputs of these names; `columns`: by default what a file holds.
 
     Returns
     -------
@@ -22,7 +26,7 @@ def rows_of(leaves: Sequence[Leaf], parameters: Sequence[str]) -> dict[str, np.n
     """
     points = max(len(leaf.values) for leaf in leaves)
     shapes = {"point": (len(leaves), points), "parameter": (len(leaves), len(parameters))}
-    columns = leaves[0].columns
+    columns = leaves[0].columns if columns is None else columns
 
     def filled(dim: str) -> dict[str, np.ndarray]:
         return {
@@ -52,6 +56,16 @@ def rows_of(leaves: Sequence[Leaf], parameters: Sequence[str]) -> dict[str, np.n
             data[name] = np.array([getattr(leaf, attribute) for leaf in leaves])
     data["points"] = np.array([len(leaf.values) for leaf in leaves])
     return data
+
+
+def arrays_of(model: Piecewise) -> dict[str, np.ndarray]:
+    """All of a model, for `models_in` of a checkpoint: it predicts the same to the last bit."""
+    leaves, names = model.leaves, model.names
+    columns = regression.RESTORED if isinstance(leaves[0], Regression) else None
+    judged = {"r2": model.r2, "rmae": model.rmae, "accepted": model.accepted}
+    family = np.full(len(leaves), " ".join(names))
+    about = {**judged, "family": family, "parameter": np.array(names)}
+    return rows_of(leaves, list(names), columns) | about
 
 
 def models_in(columns: Mapping[str, ArrayLike]) -> dict[str, Piecewise]:
@@ -89,22 +103,25 @@ def _unfit(family: str) -> InputError:
 
 def _leaf(one: Mapping[str, np.ndarray], family: str, known: list[str]) -> Leaf:
     """The model of a row; `known`: names along the dimension of the parameters."""
-    foreign, names = "surrogate" in one, family.split(" ")
-    columns = regression.COLUMNS if foreign else {**kriging.COLUMNS, "kernel": ("", "kernel")}
+    foreign, names = "surrogate" in one, tuple(family.split(" "))
+    columns = regression.RESTORED if foreign else kriging.COLUMNS
     size, places = int(one["points"]), [known.index(name) for name in names]
-    if set(columns) - {"kernel", *one}:
+    if set(regression.COLUMNS if foreign else columns) - {"kernel", *one}:
         raise _unfit(family)
-    arrays = {
-        "names": np.array(names),
-        "lower": np.array([float(one[f"{name}_lower"]) for name in names]),
-        "upper": np.array([float(one[f"{name}_upper"]) for name in names]),
-        "inputs": np.column_stack([one[name][:size] for name in names]),
-        "values": one["training_output"][:size],
-        "kernel": np.array(SQUARED_EXPONENTIAL),  # unless the file has another
+    within: dict[str, slice | list[int]] = {"point": slice(size), "parameter": places}
+    found: dict[str, Any] = {
+        attribute: one[name][within[dim]] if dim else one[name].item()
+        for name, (dim, attribute) in columns.items()
+        if name in one
     }
-    for name, (dim, attribute) in columns.items():
-        if name in one:
-            value = np.asarray(one[name])
-            within: dict[str, slice | list[int]] = {"point": slice(size), "parameter": places}
-            arrays[attribute] = value[within[dim]] if dim else value
-    return regression.restored(arrays) if foreign else Kriging.from_arrays(arrays)
+    shape = (
+        names,
+        np.array([float(one[f"{name}_lower"]) for name in names]),
+        np.array([float(one[f"{name}_upper"]) for name in names]),
+    )
+    inputs = np.column_stack([one[name][:size] for name in names])
+    values = one["training_output"][:size]
+    if not foreign:
+        return Kriging(*shape, inputs=inputs, values=values, **found)
+    stored = {name: found.pop(name) for name in regression.PREDICTED if name in found}
+    return Regression(*shape, inputs, values, **found, stored=stored)
