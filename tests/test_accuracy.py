@@ -73,19 +73,19 @@ def test_the_reference_is_the_published_one_and_two_ways_to_it_agree():
 
 def test_errors_of_the_ladder_fall_and_the_reference_is_a_hundred_times_better():
     found = integration.measure(TWIN, TINY, silent)
-    best = found.error[0, :, :]  # dormand-prince
+    best = found["error"][0, :, :]  # dormand-prince
     assert (best[0] > best[2]).all()
     position = QUANTITIES.index("slider_position")
     # Not by (1e-5 / 1e-3): at the loosest tolerance most steps are at the edge of stability, and held stricter there.
     assert best[1, position] < 0.1 * best[0, position] < 1e-4
     assert best[2, position] < 1e-2 * best[1, position]
     # of order 8: this may be better still
-    pairs = [k for k, name in enumerate(found.methods) if name != "prince-dormand"]
-    floor = integration.MARGIN * found.reference_error[position]
-    assert (found.error[pairs, :, position] >= floor).all()
-    assert (found.error >= found.reference_error).all()
+    pairs = [k for k, name in enumerate(found["integrator"]) if name != "prince-dormand"]
+    floor = integration.MARGIN * found["reference_error"][position]
+    assert (found["error"][pairs, :, position] >= floor).all()
+    assert (found["error"] >= found["reference_error"]).all()
     np.testing.assert_array_equal(
-        found.error[0], found.error[1]
+        found["error"][0], found["error"][1]
     )  # single and in lanes: the same bits
 
 
@@ -109,7 +109,7 @@ def test_two_ways_through_a_revolution_of_a_linkage_agree(drive):
     if drive == "torque":
         return  # the ladder is climbed once
     found = integration.measure(scene, TINY, silent)
-    by_name = dict(zip(found.methods, found.error[..., 0], strict=True))
+    by_name = dict(zip(found["integrator"].tolist(), found["error"][..., 0], strict=True))
     for name in ("tsitouras", "LSODA (scipy)"):
         assert by_name[name][0] < 1e-3
         assert by_name[name][2] < 1e-6  # 9e-9 at most with eight loads from -105 to -145
@@ -126,11 +126,11 @@ def test_a_transient_that_decays_and_copies_that_settle_apart():
     apart = np.array([-3e-3, 0.0, 3e-3])[None, :, None]
     gaps = 2e-4 * (1.0 + 0.1 * 0.5**turn + apart) * np.ones(2)
     found = averaging.analyse(gaps, 0.0)
-    assert found.floor == pytest.approx(3e-3)  # standard deviation of -3, 0, 3
-    late = list(found.transient).index(16)
-    np.testing.assert_allclose(found.error[late], np.sqrt(2.0 / 3.0) * 3e-3, rtol=1e-3)
-    first = found.error[0] ** 2 - (2.0 / 3.0) * 3e-3**2
-    share = [0.1 * (2.0 - 2.0 ** (1 - a)) / a for a in found.averaged.astype(float)]
+    assert found["averaging_floor"] == pytest.approx(3e-3)  # standard deviation of -3, 0, 3
+    late = list(found["transient"]).index(16)
+    np.testing.assert_allclose(found["averaging_error"][late], np.sqrt(2.0 / 3.0) * 3e-3, rtol=1e-3)
+    first = found["averaging_error"][0] ** 2 - (2.0 / 3.0) * 3e-3**2
+    share = [0.1 * (2.0 - 2.0 ** (1 - a)) / a for a in found["averaged"].astype(float)]
     np.testing.assert_allclose(np.sqrt(first), share, rtol=1e-2)
 
 
@@ -239,12 +239,14 @@ def test_a_study_with_another_kernel_is_shown_both():
         region = surrogate.region_of(asked, case)
         designs = surrogate.designs_of(asked, case, TINY, surrogate._generator(asked))
         unit = (np.concatenate(designs) - region.lower) / (region.upper - region.lower)
-        found = surrogate.measure(asked, case, TINY, np.abs(unit[:, 0] - 0.4) + unit[:, 1], 1.0)
-        assert found.names == names
-        assert found.r2.shape == found.fit_seconds.shape == (len(names), 2)
-        assert np.isfinite(found.leave_one_out).all()
-        assert found.model.kernel == "squared-exponential"
-    assert found.rmae[2, 1] < found.rmae[1, 1]  # of a kink
+        found, model = surrogate.measure(
+            asked, case, TINY, np.abs(unit[:, 0] - 0.4) + unit[:, 1], 1.0
+        )
+        assert tuple(found["surrogate"]) == names
+        assert found["r2"].shape == found["fit_seconds"].shape == (len(names), 2)
+        assert np.isfinite(found["leave_one_out"]).all()
+        assert model.kernel == "squared-exponential"
+    assert found["rmae"][2, 1] < found["rmae"][1, 1]  # of a kink
 
 
 def test_limits_of_a_root_mean_square_hold_as_often_as_they_say(shift):

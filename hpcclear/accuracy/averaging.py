@@ -9,12 +9,11 @@ that no average removes: the scatter of the copies' long averages.
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from hpcclear.accuracy.methods import one_turn
-from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 from hpcclear.dynamics.evaluation.steady.judging import objective
@@ -33,34 +32,28 @@ STRICTER = 10.0
 """How many times stricter the tolerances of every other copy are."""
 
 
-@dataclass(frozen=True)
-class Averaging:
-    """The panel."""
-
-    transient: Integers
-    averaged: Integers
-    """transient and averaged: revolutions waited for (t,) and averaged (a,)."""
-    error: Array
-    """Shape (t, a): relative error of the objective, root mean square over copies."""
-    floor: float
-    """Scatter of the copies' averages over the second half of the run, relative: no average goes below."""
-    seconds: float
-    """Time of one revolution of one copy in a full block of lanes."""
-
-
-def measure(scene: Scene, profile: Profile) -> Averaging:
+def measure(scene: Scene, profile: Profile) -> Variables:
     """Run the copies and compare short averages with the long one."""
     return analyse(*revolutions_of(scene, profile.copies, profile.revolutions))
 
 
-def analyse(gaps: Array, seconds: float) -> Averaging:
-    """The panel from mean gaps (revolutions, copies, 2 joints); the second half of the run counts as the truth."""
+def analyse(gaps: Array, seconds: float) -> Variables:
+    """The panel from mean gaps (revolutions, copies, 2 joints); the second half of the run counts as the truth.
+
+    `seconds`: of one revolution of one copy in a full block of lanes.
+    """
     half = len(gaps) // 2
     transient, averaged = doubling(half // 2, start=0), doubling(half // 2, start=1)
     late = objective(gaps[half:].mean(axis=0))  # (copies,)
     truth = late.mean()
     error = np.array([[_error(gaps, t, a, truth) for a in averaged] for t in transient])
-    return Averaging(transient, averaged, error, float(late.std(ddof=1) / truth), seconds)
+    return {
+        "transient": transient,
+        "averaged": averaged,
+        "averaging_error": error,
+        "averaging_floor": np.array(late.std(ddof=1) / truth),
+        "turn_seconds": np.array(seconds),
+    }
 
 
 def doubling(most: int, start: int) -> Integers:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcclear.accuracy.looked_at import QUANTITIES
+from hpcclear.accuracy.looked_at import QUANTITIES, quantities_of
 from hpcclear.accuracy.methods import (
     kernel_method,
     methods_of,
@@ -17,7 +17,7 @@ from hpcclear.accuracy.methods import (
     systems,
     timed,
 )
-from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.base.arrays import Array
 from hpcclear.report.html.costs import MARGIN
 from hpcclear.scene import Scene
@@ -34,19 +34,6 @@ class Reference:
     values: Array
     scale: Array  # (designs, 4)
     error: Array  # (4,)
-
-
-@dataclass(frozen=True)
-class Integration:
-    """The panel; arrays (methods, levels), errors (methods, levels, 4), orders (methods, 4)."""
-
-    methods: tuple[str, ...]
-    setting: Array
-    error: Array
-    seconds: Array
-    evaluations: Array
-    order: Array
-    reference_error: Array
 
 
 def reference_of(scene: Scene, designs: int) -> Reference:
@@ -72,18 +59,8 @@ def rms(errors: Array) -> Array:
     return np.sqrt(np.mean(np.square(errors), axis=0))
 
 
-def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> Integration:
-    """Measure every method that can integrate this scene.
-
-    Parameters
-    ----------
-    notify : callable
-        Gets the name of each method as its turn comes.
-
-    Returns
-    -------
-    Integration
-    """
+def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> Variables:
+    """Measure every method that can integrate this scene; `notify` gets the name of each as its turn comes."""
     notify("integration: reference")
     reference = reference_of(scene, profile.designs)
     methods = methods_of(scene, profile.designs, profile.more_methods)
@@ -106,8 +83,17 @@ def measure(scene: Scene, profile: Profile, notify: Callable[[str], object]) -> 
     floor = MARGIN * reference.error
     order = np.array([[observed_order(n, e[:, k], floor[k]) for k in range(len(QUANTITIES))]
                       for n, e in zip(evaluations, error, strict=True)])  # fmt: skip
-    names = tuple(method.name for method in methods)
-    return Integration(names, setting, error, seconds, evaluations, order, reference.error)
+    return {
+        "integrator": np.array([method.name for method in methods]),
+        "rung": np.arange(len(profile.tolerances)),
+        "quantity": np.array(quantities_of(scene)),
+        "setting": setting,
+        "error": error,
+        "seconds": seconds,
+        "evaluations": evaluations,
+        "order": order,
+        "reference_error": reference.error,
+    }
 
 
 def observed_order(evaluations: Array, errors: Array, floor: float) -> float:

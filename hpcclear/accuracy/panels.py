@@ -1,15 +1,14 @@
 """Panels of the `accuracy` command, one after the other: what was measured is kept, and goes into one dataset."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 from hpcclear.accuracy import averaging, integration, parallel, random_inputs, spending, surrogate
-from hpcclear.accuracy.looked_at import quantities_of
-from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.accuracy.standin import with_case
+from hpcclear.base.arrays import Array
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
@@ -23,12 +22,13 @@ from hpcclear.results.names import KINDS
 from hpcclear.results.provenance import provenance
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.statistics.surrogate.piecewise import Leaf
 
 GLANCE = 1e-2
 """Target error of f at which the kind of motion is judged."""
 
-Values = Mapping[str, Any]
 Notify = Callable[[str], object]
+Simulate = Callable[[Scene, str, Profile, Ranks], tuple[Array, float]]
 
 
 class Panels:
@@ -54,8 +54,8 @@ class Panels:
         self.scene, self.ranks, self.profile = scene, ranks, profile
         self._store, self._show = store, show
         self._listener = notify
-        self.values: dict[str, Any] = {}
-        self.attributes: dict[str, Any] = {
+        self.values: Variables = {}
+        self.attributes: dict[str, object] = {
             **provenance(scene.text or scene.to_toml(), scene.hash, scene.references),
             "profile": profile.name,
             "command": command_line(),
@@ -70,23 +70,23 @@ class Panels:
         self.ranks.raise_if_stopped()
         self._listener(text)
 
-    def kept(self, name: str, work: Callable[[], Values]) -> Values:
+    def kept(self, name: str, work: Callable[[], Variables]) -> Variables:
         """What `work` gives, or gave before."""
         found = self._stored(name)
         if found is None:
             self.notify(name.replace("-", " "))
-            found = dict(work())
+            found = work()
             self._save(name, found)
         return found
 
-    def _stored(self, name: str) -> dict[str, Any] | None:
+    def _stored(self, name: str) -> Variables | None:
         return None if self._store is None else self._store.load_stage(name)
 
-    def _save(self, name: str, data: Values) -> None:
+    def _save(self, name: str, data: Variables) -> None:
         if self._store is not None:
             self._store.save_stage(name, data)
 
-    def panel(self, name: str, work: Callable[[], Values]) -> None:
+    def panel(self, name: str, work: Callable[[], Variables]) -> None:
         """Add the variables of a panel."""
         self.values.update(self.kept(name, work))
         self._show(self.content(whole=False))
@@ -103,20 +103,18 @@ class Panels:
         with self.ranks.stage("integration"):
             self.panel(
                 "integration",
-                lambda: _integration(
-                    integration.measure(self.scene, self.profile, self.notify), self.scene
-                ),
+                lambda: integration.measure(self.scene, self.profile, self.notify),
             )
 
     def add_averaging(self) -> None:
         """Error of f against revolutions."""
         with self.ranks.stage("averaging"):
-            self.panel("averaging", lambda: _averaging(averaging.measure(self.scene, self.profile)))
+            self.panel("averaging", lambda: averaging.measure(self.scene, self.profile))
 
     def add_motion(self) -> None:
         """What kind of motion it is, as an attribute."""
 
-        def work() -> Values:
+        def work() -> Variables:
             scene = self.scene.with_(
                 {"numerics.target_error": GLANCE, "numerics.objective_joints": ()}
                 | {self.scene.objective_key: MEAN_GAP.name}  # which a steady mean is of
@@ -152,33 +150,29 @@ class Panels:
         self.attributes["study"] = where
         profile, ranks = self.profile, self.ranks
 
-        def simulated(part: Any) -> Callable[[], Values]:
-            def work() -> Values:
-                values, each = part.simulate(studied, case, profile, ranks)
-                return {"values": values, "each": each}
+        def simulated(simulate: Simulate) -> Callable[[], Variables]:
+            def work() -> Variables:
+                values, each = simulate(studied, case, profile, ranks)
+                return {"values": values, "each": np.array(each)}
 
             return work
 
-        designs = self.kept("simulations-of-designs", simulated(surrogate))
+        designs = self.kept("simulations-of-designs", simulated(surrogate.simulate))
         seconds = float(designs["each"])
 
         @cache
-        def fitted() -> surrogate.Surrogates:
+        def fitted() -> tuple[Variables, Leaf]:
             return surrogate.measure(studied, case, profile, designs["values"], seconds)
 
-        self.panel("surrogates", lambda: _surrogates(fitted()))
-        draws = self.kept("simulations-of-draws", simulated(random_inputs))
+        self.panel("surrogates", lambda: fitted()[0])
+        draws = self.kept("simulations-of-draws", simulated(random_inputs.simulate))
 
-        def moments() -> Values:
+        def moments() -> Variables:
             values, each = draws["values"], float(draws["each"])
-            return _random(
-                random_inputs.measure(studied, case, fitted().model, profile, values, each)
-            )
+            return random_inputs.measure(studied, case, fitted()[1], profile, values, each)
 
         self.panel("random-inputs", moments)
-        self.panel(
-            "ranks", lambda: _parallel(parallel.measure(studied, case, seconds, profile, ranks))
-        )
+        self.panel("ranks", lambda: parallel.measure(studied, case, seconds, profile, ranks))
         self.attributes["batch"] = (
             f"ranks: {parallel.samples_of(seconds, profile)} samples, or as many a rank"
         )
@@ -187,7 +181,7 @@ class Panels:
 # ---- what is found, as the file has it ---------------------------------------------------------
 
 
-def _spending(found: spending.Spending) -> Values:
+def _spending(found: spending.Spending) -> Variables:
     cheapest = np.array([found.cheapest(aim) for aim in spending.AIMS])
     return {
         "tolerance": found.tolerance,
@@ -200,63 +194,8 @@ def _spending(found: spending.Spending) -> Values:
         "tolerance_bias_error": found.bias_error,
         "turn_variance": found.variance,
         "tolerance_seconds": found.turn_seconds,
-        "spin_up": found.spin_up,
+        "spin_up": np.array(found.spin_up),
         "cheapest_tolerance": cheapest[:, 0],
         "cheapest_revolutions": cheapest[:, 1],
         "cheapest_seconds": cheapest[:, 2],
-    }
-
-
-def _integration(found: integration.Integration, scene: Scene) -> Values:
-    names = ("setting", "error", "seconds", "evaluations", "order", "reference_error")
-    return {
-        "integrator": np.array(found.methods),
-        "rung": np.arange(found.setting.shape[1]),
-        "quantity": np.array(quantities_of(scene)),
-        **{name: getattr(found, name) for name in names},
-    }
-
-
-def _averaging(found: averaging.Averaging) -> Values:
-    return {
-        "transient": found.transient,
-        "averaged": found.averaged,
-        "averaging_error": found.error,
-        "averaging_floor": found.floor,
-        "turn_seconds": found.seconds,
-    }
-
-
-def _surrogates(found: surrogate.Surrogates) -> Values:
-    names = ("r2", "rmae", "leave_one_out", "fit_seconds", "sample_seconds")
-    return {
-        "surrogate": np.array(found.names),
-        "training": found.training,
-        **{name: getattr(found, name) for name in names},
-    }
-
-
-def _random(found: random_inputs.RandomInputs) -> Values:
-    return {
-        "estimate": np.array(random_inputs.ESTIMATES),
-        "moment": np.array(random_inputs.MOMENTS),
-        "draws": found.draws,
-        "moment_error": found.error,
-        "moment_lower": found.lower,
-        "moment_upper": found.upper,
-        "moment_seconds": found.seconds,
-        "moment_bias": found.bias,
-        "bias_error": found.bias_error,
-        "closed_form": found.closed_form,
-        "quadrature_seconds": found.quadrature_seconds,
-    }
-
-
-def _parallel(found: parallel.Parallel) -> Values:
-    return {
-        "ranks": found.ranks,
-        "loss": np.array(parallel.LOSSES),
-        "strong_seconds": found.strong,
-        "weak_seconds": found.weak,
-        "lost_seconds": found.lost,
     }

@@ -2,13 +2,11 @@
 
 import os
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
-from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.accuracy.surrogate import region_of
-from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.host import process_fields
 from hpcclear.ensemble import simulate
 from hpcclear.ranks import leading
@@ -21,21 +19,12 @@ from hpcclear.scene.scene import record_of
 from hpcclear.scene.streams import generator
 
 LOSSES = ("start-up", "compilation", "imbalance", "writing")
-
-
-@dataclass(frozen=True)
-class Parallel:
-    """The panel; arrays over the numbers of ranks, seconds."""
-
-    ranks: Integers
-    strong: Array
-    weak: Array
-    lost: Array  # (4,), as in `LOSSES`, over all ranks, core-seconds
+"""Causes of lost time, core-seconds over all ranks."""
 
 
 def measure(
     scene: Scene, case: str, sample_seconds: float, profile: Profile, ranks: Ranks
-) -> Parallel:
+) -> Variables:
     """Time a fixed batch, and one that grows with the ranks, on 1, 2, 4, ... ranks."""
     numbers = np.unique([*2 ** np.arange(1 + int(np.log2(ranks.size))), ranks.size])
     samples = samples_of(sample_seconds, profile)
@@ -51,7 +40,13 @@ def measure(
         float(last[:, column["idle"]].sum()),
         float(total[:, column["write"]].sum()),  # type: ignore[call-overload,index]
     ]
-    return Parallel(numbers.astype(np.int64), strong, weak, np.array(lost))
+    return {
+        "ranks": numbers.astype(np.int64),
+        "loss": np.array(LOSSES),
+        "strong_seconds": strong,
+        "weak_seconds": weak,
+        "lost_seconds": np.array(lost),
+    }
 
 
 def samples_of(sample_seconds: float, profile: Profile) -> int:

@@ -2,6 +2,11 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+Variables = dict[str, np.ndarray]
+"""What a panel found: variables of a file of kind ``accuracy`` by their names, shapes as there."""
+
 
 @dataclass(frozen=True)
 class Profile:

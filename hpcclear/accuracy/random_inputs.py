@@ -1,14 +1,13 @@
 """Error of mean and standard deviation against Monte Carlo size: on the surrogate, beside quadrature, and by simulation."""
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
 
-from hpcclear.accuracy.profile import Profile
+from hpcclear.accuracy.profile import Profile, Variables
 from hpcclear.accuracy.surrogate import objectives
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
@@ -23,21 +22,6 @@ ESTIMATES = ("surrogate", "simulation")
 MOMENTS = ("mean", "deviation")
 LEAST_BLOCKS = 4
 """Samples of one size below which their scatter says nothing."""
-
-
-@dataclass(frozen=True)
-class RandomInputs:
-    """The panel; arrays (2 estimates, 2 moments, sizes) relative to the moment, NaN where nothing was measured."""
-
-    draws: Integers
-    error: Array
-    lower: Array  # 95 % confidence limits of the error
-    upper: Array
-    seconds: Array  # (2 estimates, sizes), of one Monte Carlo estimate
-    bias: Array  # (2 moments,), surrogate by quadrature against direct simulation
-    bias_error: Array
-    closed_form: Array  # (2 moments,), quadrature against closed form; NaN where there is none
-    quadrature_seconds: float
 
 
 def simulate(scene: Scene, case: str, profile: Profile, ranks: Ranks) -> tuple[Array, float]:
@@ -64,8 +48,8 @@ def middle_of(scene: Scene, case: str) -> tuple[tuple[str, ...], Array]:
 
 def measure(
     scene: Scene, case: str, model: Leaf, profile: Profile, values: Array, each: float
-) -> RandomInputs:
-    """Measure at the middle of the design space.
+) -> Variables:
+    """Measure at the middle of the design space: (2 estimates, 2 moments, sizes), relative to the moment; NaN if not measured.
 
     Parameters
     ----------
@@ -113,17 +97,19 @@ def measure(
                 table / truth - 1.0, 1
             )
     bias_error = np.array([true.mean_error[0], true.deviation_error[0]]) / truth
-    return RandomInputs(
-        sizes,
-        error,
-        lower,
-        upper,
-        seconds,
-        exact / truth - 1.0,
-        bias_error,
-        closed,
-        quadrature_seconds,
-    )
+    return {
+        "estimate": np.array(ESTIMATES),
+        "moment": np.array(MOMENTS),
+        "draws": sizes,
+        "moment_error": error,
+        "moment_lower": lower,
+        "moment_upper": upper,
+        "moment_seconds": seconds,
+        "moment_bias": exact / truth - 1.0,
+        "bias_error": bias_error,
+        "closed_form": closed,
+        "quadrature_seconds": np.array(quadrature_seconds),
+    }
 
 
 def root_mean_square(errors: Array, known: int) -> tuple[Array, Array, Array]:

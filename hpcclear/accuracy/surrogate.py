@@ -1,13 +1,11 @@
 """Accuracy of response surface and Kriging against sample size and simulation time."""
 
 import time
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from hpcclear.accuracy.profile import Profile
-from hpcclear.base.arrays import Array, Integers
+from hpcclear.accuracy.profile import Profile, Variables
+from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import Status
 from hpcclear.ensemble.samples import sample_points
 from hpcclear.ranks.team import Ranks
@@ -23,21 +21,6 @@ from hpcclear.statistics.surrogate.polynomial import n_terms
 from hpcclear.statistics.surrogate.response_surface import fit_response_surface
 from hpcclear.statistics.surrogate.subintervals import Method
 from hpcclear.study.surrogates import coordinate, method_of
-
-
-@dataclass(frozen=True)
-class Surrogates:
-    """The panel; arrays (surrogates, sample sizes), NaN where a surrogate cannot be fitted to so few samples."""
-
-    names: tuple[str, ...]
-    training: Integers
-    r2: Array
-    rmae: Array
-    leave_one_out: Array  # RMS, over the standard deviation of the values
-    fit_seconds: Array
-    sample_seconds: float
-    model: Leaf
-    """The Kriging model of the largest sample, with the squared exponential."""
 
 
 def region_of(scene: Scene, case: str) -> Box:
@@ -65,8 +48,8 @@ def _generator(scene: Scene) -> np.random.Generator:
 
 def measure(
     scene: Scene, case: str, profile: Profile, values: Array, sample_seconds: float
-) -> Surrogates:
-    """Fit the surrogates to samples of each size and compare them with fresh simulations.
+) -> tuple[Variables, Leaf]:
+    """Fit the surrogates to samples of each size and compare them with fresh simulations; and the Kriging model of the largest.
 
     They are two, and what the study requests, where that is another than Kriging with the squared exponential.
     `values`, shape (n,), and `sample_seconds` are those of `simulate`.
@@ -95,13 +78,19 @@ def measure(
             seconds[j, k] = time.perf_counter() - started
             left_out = models[-1].values - models[-1].leave_one_out()
             loo[j, k] = np.sqrt(np.mean(left_out**2)) / deviation
-        predictors: list[Any] = [surface, *models]
-        for j, surrogate in enumerate(predictors):
-            found = accuracy(parts[-1], surrogate.predict(coordinates[-1]))
-            r2[j, k], rmae[j, k] = found.r2, found.rmae
-    training = np.array(profile.training, np.int64)
-    fitted = ("response surface", *methods)
-    return Surrogates(fitted, training, r2, rmae, loo, seconds, sample_seconds, models[0])
+        for j, surrogate in enumerate((surface, *models)):
+            reached = accuracy(parts[-1], surrogate.predict(coordinates[-1]))
+            r2[j, k], rmae[j, k] = reached.r2, reached.rmae
+    found = {
+        "surrogate": np.array(["response surface", *methods]),
+        "training": np.array(profile.training, np.int64),
+        "r2": r2,
+        "rmae": rmae,
+        "leave_one_out": loo,
+        "fit_seconds": seconds,
+        "sample_seconds": np.array(sample_seconds),
+    }
+    return found, models[0]
 
 
 def simulated_middle(scene: Scene, case: str, ranks: Ranks) -> None:
