@@ -69,7 +69,7 @@ FEATURES = {
         "report/figures/accuracy.py study/forecast.py study/tolerance.py "
         "study/launched.py base/host.py",
     "statistics of millions of samples, parts of arrays":
-        "statistics/streams.py ensemble/statistics.py ensemble/raw.py ensemble/split.py "
+        "statistics/streams.py ensemble/statistics.py ensemble/split.py "
         "scene/sampling.py",
     "killed runs, lost ranks, damaged files":
         "ranks/watch.py ranks/mailbox.py base/lock.py results/faults.py results/checkpoint.py base/private.py "

@@ -10,7 +10,7 @@ and that is set against what they took. So are samples written by root. With 2 r
 sleeps between them, and finds its caches cold.
 
 Then samples that root makes at once, so that only what is done with them counts: `sample`, which keeps them all, and
-`sample --statistics --raw`, which writes them as they come, with memory of root, time to write and time to open.
+`sample --statistics --raw`, which writes them as they come, with memory of root and time to write.
 """
 
 import argparse
@@ -18,7 +18,6 @@ import functools
 import json
 import os
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -94,7 +93,7 @@ class Books:
 
     def open(self) -> None:
         """Watch from now on."""
-        from hpcclear.ensemble.raw import RawFiles
+        from hpcclear.ensemble.statistics import _Streaming
         from hpcclear.ranks.leading import Lead
         from hpcclear.ranks.mailbox import Mail
         from hpcclear.ranks.schedule import HandOut
@@ -103,7 +102,7 @@ class Books:
         self._wrap(Mail, "poll", self._polled)
         self._wrap(HandOut, "grant", self._granted)
         self._wrap(Lead, "_answer", self._answered)
-        self._wrap(RawFiles, "write", self._wrote)
+        self._wrap(_Streaming, "_keep", self._wrote)
         self._wrap(Checkpoint, "save_stage", self._wrote)
 
     def _wrap(self, owner: Any, name: str, note: Callable[..., None]) -> None:
@@ -240,43 +239,19 @@ def confirmed(line: Line, ranks: int) -> str:
 
 
 def memory(counts: list[int]) -> str:
-    """Memory of root, seconds to write and to open by records."""
-    lines = [
-        f"{'records':>9} {'':<18}{'root MB':>9}{'run s':>8}{'on disk MB':>12}{'open s':>8}{'mean of f s':>13}"
-    ]
+    """Memory of root and seconds to write by records."""
+    lines = [f"{'records':>9} {'':<18}{'root MB':>9}{'run s':>8}{'on disk MB':>12}"]
     for task, words, most in (("sample", "sample", 10**6), ("raw", "--statistics --raw", 10**7)):
         for samples in counts:
             if samples > most:
                 continue
             with tempfile.TemporaryDirectory() as place:
-                folder = Path(place)
-                found = launch(task, 1, samples, folder, 0.0)
-                name = folder / ("samples.nc" if task == "sample" else "raw/samples.nc")
-                size = sum(file.stat().st_size for file in folder.rglob("*.nc")) / 1e6
-                opened, summed = opening(name)
+                found = launch(task, 1, samples, Path(place), 0.0)
+                size = sum(file.stat().st_size for file in Path(place).rglob("*.nc")) / 1e6
                 lines.append(
                     f"{samples:>9.0e} {words:<18}{found['memory']:>9.0f}{found['seconds']:>8.1f}{size:>12.0f}"
-                    f"{opened:>8.2f}{summed:>13.2f}"
                 )
-                shutil.rmtree(folder / "raw", ignore_errors=True)
     return "\n".join(lines)
-
-
-def opening(name: Path) -> tuple[float, float]:
-    """Seconds to open a file in pieces of 2^18 samples by dask, and to take the mean of f, in a process of their own."""
-    program = (
-        "import sys, time, xarray as xr, dask\n"
-        "xr.open_dataset(sys.argv[2]).close()\n"  # what is imported late is not measured
-        "a = time.perf_counter(); d = xr.open_dataset(sys.argv[1], chunks={'sample': 2**18}); b = time.perf_counter()\n"
-        "float(d['objective'].mean()); print(b - a, time.perf_counter() - b)\n"
-    )
-    small = name.parent.parent / "out.nc" if name.parent.name == "raw" else name
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(name), str(small)],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    first, second = map(float, done.stdout.split())
-    return first, second
 
 
 def main() -> int:

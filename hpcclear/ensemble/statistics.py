@@ -1,7 +1,8 @@
 """Direct Monte Carlo of any size: points made on demand, statistics kept, samples only on request."""
 
+import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,15 +13,14 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective
 from hpcclear.base.outcome import FIELDS, JOINTS, Flag, Status
 from hpcclear.ensemble.identity import statistics_key
-from hpcclear.ensemble.raw import NAMES, RawFiles
-from hpcclear.ensemble.samples import saving
+from hpcclear.ensemble.samples import samples_of, saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
 from hpcclear.ensemble.simulate import make_evaluator, payload_of
 from hpcclear.ranks import leading
 from hpcclear.ranks.progress import LongProgress
 from hpcclear.ranks.schedule import Task
 from hpcclear.ranks.team import Ranks
-from hpcclear.results import collection, dataset, files, netcdf
+from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.sampling import MonteCarloPoints
@@ -30,6 +30,9 @@ STAGE = "statistics"
 
 TOGETHER = 256
 """Blocks of samples that are handed out in one stage."""
+
+RAW = re.compile(r"samples-\d{8}\.nc")
+"""Names of files of samples that are kept, a block each."""
 
 
 class _Left:
@@ -65,8 +68,7 @@ def run_statistics(
     samples : int, optional
         Number of samples, the study's by default.
     raw : Path, optional
-        Directory for the samples themselves, a file of kind ``samples`` for every 4096, and samples.nc, which shows all as one
-        (of up to `collection.LISTED` files).
+        Directory for the samples themselves, a file of kind ``samples`` for every 4096.
 
     Returns
     -------
@@ -116,21 +118,26 @@ def _keeping(raw: Path | None, session: Session) -> Iterator[Path | None]:
     if raw is None:
         yield None
         return
-    place = Place.of_directory(raw, session.options.fresh, needed=NAMES)
-    collection.check_place(place.output)
-    files.refuse_foreign(place.output / collection.NAME, netcdf.SEAL)
+    place = Place.of_directory(raw, session.options.fresh, needed=RAW)
     if place.output != raw:
         session.notify(f"The samples themselves go to {place.output}.")
     with Session(place, session.key, session.ranks, session.options):
         yield place.output
 
 
+def _kept(folder: Path, number: int) -> Path:
+    """The file of the samples of block `number`."""
+    return folder / f"samples-{number:08d}.nc"
+
+
+def _missing(folder: Path, blocks: Iterable[int]) -> list[str]:
+    """Names of the files of some blocks that are not in a directory."""
+    return [path.name for number in blocks if not (path := _kept(folder, number)).is_file()]
+
+
 def _refuse_unkept(folder: Path, samples: int, output: Path) -> None:
     """Raise InputError where statistics are finished and samples of theirs are not in a directory."""
-    blocks = -(-samples // BLOCK)
-    missing = RawFiles.missing(folder, range(blocks))
-    if blocks <= collection.LISTED and not (folder / collection.NAME).is_file():
-        missing.append(collection.NAME)
+    missing = _missing(folder, range(-(-samples // BLOCK)))
     if missing:
         reason = f"the statistics exist, in {output}, but the samples were not kept ({missing[0]} is missing)"
         raise InputError("--raw", str(folder), reason, "Choose another output, or add --fresh")
@@ -156,10 +163,7 @@ class _Streaming:
         self._points = points
         self._session = session
         self._checkpoint = session.opened()
-        self._files: RawFiles | None = None
-        if raw is not None:
-            about = session.attributes, scene.objective, session.joints
-            self._files = RawFiles(raw, points, *about)
+        self._raw = raw
         self._sums = self._new_sums()
         earlier = self._checkpoint.load_stage(STAGE)
         session.notify_problems()
@@ -167,7 +171,7 @@ class _Streaming:
             session.notify("what was summed up without keeping the samples is simulated again")
         elif earlier is not None:
             self._sums.restore(earlier)
-            if raw is not None and (gone := RawFiles.missing(raw, self._sums.summed_blocks())):
+            if raw is not None and (gone := _missing(raw, self._sums.summed_blocks())):
                 session.notify(
                     f"{gone[0]} is missing in {raw}: what was summed up is simulated again"
                 )
@@ -175,22 +179,23 @@ class _Streaming:
         self._saved = time.monotonic()
 
     def _new_sums(self) -> Accumulator:
-        write = self._files.write if self._files else None
-        return Accumulator(len(self._points), self._session.record, on_block=write)
+        keep = None if self._raw is None else self._keep
+        return Accumulator(len(self._points), self._session.record, on_block=keep)
+
+    def _keep(self, number: int, records: np.ndarray) -> None:
+        """Write block `number`, all of its records in order, shape (m,)."""
+        assert self._raw is not None
+        about = self._session.attributes, self._objective, self._session.joints
+        content = samples_of(self._points.page(number), records, *about)
+        dataset.write(content, _kept(self._raw, number))
 
     def run(self) -> Results:
         """Simulate, and write the statistics; at first the block that decides the histograms."""
         sums = self._sums
         style = self._session.options.style
-        with saving(self._save):
-            with LongProgress("samples", style, sums.total, sums.taken) as progress:
-                while (left := sums.remaining(1 if sums.edges is None else TOGETHER)).size:
-                    self._simulate(left, progress)
-            if self._files is not None:
-                with self._session.ranks.stage("files"), self._session.ranks.writing():
-                    message = self._files.finish()
-                if message:
-                    self._session.notify(message)
+        with saving(self._save), LongProgress("samples", style, sums.total, sums.taken) as progress:
+            while (left := sums.remaining(1 if sums.edges is None else TOGETHER)).size:
+                self._simulate(left, progress)
         return self._session.write(self._dataset())
 
     def _dataset(self) -> Results:
@@ -200,7 +205,7 @@ class _Streaming:
 
     def _save(self) -> None:
         with self._session.ranks.writing():
-            kept = {"kept": np.array(self._files is not None)}
+            kept = {"kept": np.array(self._raw is not None)}
             self._checkpoint.save_stage(STAGE, self._sums.state() | kept)
         self._saved = time.monotonic()
 

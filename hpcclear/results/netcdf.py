@@ -13,9 +13,8 @@ import hashlib
 import io
 import os
 import stat
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -37,16 +36,6 @@ _HIDDEN = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid",
 _ATTRIBUTE_LIMIT = (
     30_000  # bytes; HDF5 keeps at most 64 kB in an object header, longer text goes to the heap
 )
-
-
-class Elsewhere(NamedTuple):
-    """Where the values of a variable are."""
-
-    shape: tuple[int, ...]
-    pieces: Sequence[tuple[int, str, tuple[int, ...]]]  # first row, name of the file, shape there
-
-
-NOTHING: Mapping[str, Elsewhere] = {}
 
 
 def read_bytes(path: Path) -> bytes:
@@ -91,12 +80,9 @@ def seal(content: Buffer) -> bytes:
     return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
-def save(content: Results, path: Path, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> None:
-    """Write content as a sealed NetCDF-4 file (see `write_bytes`, `encode`).
-
-    `elsewhere`: variables whose values are in other files; what is missing of them there reads as NaN or -1.
-    """
-    image = _image(content, elsewhere)
+def save(content: Results, path: Path) -> None:
+    """Write content as a sealed NetCDF-4 file (see `write_bytes`, `encode`)."""
+    image = _image(content)
     with image.getbuffer() as written:
         ending = seal(written)
     image.seek(0, io.SEEK_END)
@@ -131,42 +117,24 @@ def encode(content: Results) -> bytes:
     return _image(content).getvalue()
 
 
-def _image(content: Results, elsewhere: Mapping[str, Elsewhere] = NOTHING) -> io.BytesIO:
+def _image(content: Results) -> io.BytesIO:
     """`encode`, in the memory it was built in."""
     buffer = io.BytesIO()
-    data = {name: one for name, one in content.variables.items() if name not in content.sizes}
-    apart = [name for name in data if name in elsewhere]
     with h5py.File(buffer, "w", track_order=True) as file:
         for number, name in enumerate(content.sizes):
-            _encode_dimension(file, name, number, content, elsewhere)
-        for name, variable in data.items():
-            if name not in elsewhere:
-                _encode_data(file, name, variable, elsewhere)
+            _encode_dimension(file, name, number, content)
+        for name, variable in content.variables.items():
+            if name not in content.sizes:
+                target = _encode_variable(file, name, variable, filled=True)
+                for axis, dimension in enumerate(variable.dims):
+                    target.dims[axis].attach_scale(file[dimension])
         _encode_attributes(file, content.attrs)
-    # One at a time: HDF5 keeps what it knows of a variable until the file is closed, 4 kB of each piece.
-    for name in apart:
-        with h5py.File(buffer, "r+", track_order=True) as file:
-            _encode_data(file, name, data[name], elsewhere)
     return buffer
 
 
-def _encode_data(
-    file: h5py.File, name: str, variable: Variable, elsewhere: Mapping[str, Elsewhere]
-) -> None:
-    target = _encode_variable(file, name, variable, elsewhere, filled=True)
-    for axis, dimension in enumerate(variable.dims):
-        target.dims[axis].attach_scale(file[dimension])
-
-
-def _encode_dimension(
-    file: h5py.File,
-    name: str,
-    number: int,
-    content: Results,
-    elsewhere: Mapping[str, Elsewhere],
-) -> None:
+def _encode_dimension(file: h5py.File, name: str, number: int, content: Results) -> None:
     if name in content:
-        scale = _encode_variable(file, name, content[name], elsewhere, filled=False)
+        scale = _encode_variable(file, name, content[name], filled=False)
         scale.make_scale(name)
     else:
         size = content.sizes[name]
@@ -176,12 +144,7 @@ def _encode_dimension(
 
 
 def _encode_variable(
-    file: h5py.File,
-    name: str,
-    variable: Variable,
-    elsewhere: Mapping[str, Elsewhere],
-    *,
-    filled: bool,
+    file: h5py.File, name: str, variable: Variable, *, filled: bool
 ) -> h5py.Dataset:
     values = variable.values
     dtype = values.dtype.newbyteorder("<")
@@ -192,31 +155,11 @@ def _encode_variable(
         raise ValueError(f"{name!r} has type {dtype}, which a dataset cannot hold")
     elif dtype.kind == "f" and filled:
         fill = dtype.type(np.nan)
-    if name in elsewhere:
-        target = _virtual(file, name, dtype, elsewhere[name])
-    else:
-        target = file.create_dataset(
-            name, data=values, dtype=dtype, fillvalue=fill, track_order=True
-        )
+    target = file.create_dataset(name, data=values, dtype=dtype, fillvalue=fill, track_order=True)
     if fill is not None:
         target.attrs["_FillValue"] = np.array([fill], dtype)
     _encode_attributes(target, variable.attrs)
     return target
-
-
-def _virtual(file: h5py.File, name: str, dtype: np.dtype, where: Elsewhere) -> h5py.Dataset:
-    """A variable whose values are in other files. By hand, since h5py's own way writes the time into it."""
-    space = h5py.h5s.create_simple(where.shape)
-    made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    made.set_obj_track_times(False)
-    made.set_attr_creation_order(h5py.h5p.CRT_ORDER_TRACKED | h5py.h5p.CRT_ORDER_INDEXED)
-    made.set_fill_value(np.array(np.nan if dtype.kind == "f" else -1, dtype))
-    for first, source, shape in where.pieces:
-        chosen = space.copy()
-        chosen.select_hyperslab((first, *[0] * (len(shape) - 1)), shape)
-        made.set_virtual(chosen, source.encode(), name.encode(), h5py.h5s.create_simple(shape))
-    kind = h5py.h5t.py_create(dtype)
-    return h5py.Dataset(h5py.h5d.create(file.id, name.encode(), kind, space, made))
 
 
 def _encode_attributes(target: h5py.Dataset | h5py.File, attributes: Mapping[str, object]) -> None:
@@ -277,10 +220,8 @@ def _decode_values(source: h5py.Dataset) -> np.ndarray:
     text = h5py.check_string_dtype(source.dtype) is not None and source.dtype.kind == "O"
     if not text and source.dtype.str not in _DTYPES:
         raise ValueError(f"{source.name!r} has type {source.dtype}")
-    if source.is_virtual:
-        raise ValueError(f"{source.name!r} is in other files, which xarray reads as one")
     # Data stored elsewhere would read other files; not stored in full, fill the memory.
-    if source.external or source.chunks is not None:
+    if source.is_virtual or source.external or source.chunks is not None:
         raise ValueError(f"{source.name!r} is not stored in one piece")
     if source.id.get_storage_size() < source.nbytes:
         raise ValueError(f"{source.name!r} is not stored in full")

@@ -20,7 +20,7 @@ from hpcclear.ranks.stopping import Exit
 @click.option(
     "--raw",
     type=cli.PATH,
-    help="With --statistics: keep the samples too, in this directory. Open its samples.nc to read all of them.",
+    help="With --statistics: keep the samples too, in this directory, a file for every 4096.",
 )
 @click.option(
     "--part",
