@@ -225,7 +225,7 @@ def figure(content: xr.Dataset):  # type: ignore[no-untyped-def]
     ):
         ratio = content[f"{name}_ratio"].values
         ax.barh(
-            place + shift, ratio, 0.36, color=style.PALETTE[colour], hatch=hatch, label=name,
+            place + shift, ratio, 0.36, color=style.colour(colour), hatch=hatch, label=name,
             edgecolor="white",
         )  # fmt: skip
     ax.axvline(1.0, color="black", linewidth=0.6)

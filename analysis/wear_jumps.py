@@ -183,7 +183,7 @@ def figure(ladder, truth, slow):  # type: ignore[no-untyped-def]
     for (words, values), colour, mark in zip(
         errors.items(), ("blue", "orange", "grey"), "osx", strict=True
     ):
-        ax.loglog(values, times, color=style.PALETTE[colour], marker=mark, label=words)
+        ax.loglog(values, times, color=style.colour(colour), marker=mark, label=words)
     for row, error in zip(ladder, errors["error, median"], strict=True):
         ax.annotate(f"{row[0]:g}", (error, row[3]), textcoords="offset points", xytext=(4, 4))
     ax.axhline(slow, color="black", ls="--", label="without jumps")

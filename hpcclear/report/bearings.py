@@ -11,7 +11,6 @@ from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Flag, Status
 from hpcclear.report.figures import labels, motion
-from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene
 from hpcclear.scene.joints import length_path
@@ -101,7 +100,7 @@ def bearings(response: Results) -> list[Bearing]:
 
 def named(joint: str) -> str:
     """Return a joint as tables name it: "crank_rod (O12)"."""
-    short = JOINT_NAMES.get(joint)
+    short = motion.JOINT_NAMES.get(joint)
     return f"{joint} ({short})" if short else joint
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -14,11 +14,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hpcclear.report.html.content import Content
-    from hpcclear.results.content import Results
+
+    Drawings = Mapping[str, Callable[[], Figure]]
+
+One = TypeVar("One")
 
 
 @cli.command("look", "Draw figures and films of results.")
-@click.argument("place", type=cli.PATH)
+@click.argument("places", nargs=-1, required=True, metavar="PLACE...", type=cli.PATH)
 @click.option(
     "--figure",
     "names",
@@ -39,6 +42,34 @@ if TYPE_CHECKING:
     default="png",
     show_default=True,
     help="Format of figures in a directory.",
+)
+@click.option(
+    "--design",
+    "designs",
+    multiple=True,
+    metavar="NAME",
+    help="Design of which responses are drawn. Repeatable. Default: all, beside each other.",
+)
+@click.option(
+    "--size", default="", metavar="LENGTH", help="Width, 85mm, or both sides, '85mm x 60mm'."
+)
+@click.option("--font", default="", metavar="NAME", help="Installed font of words and formulas.")
+@click.option(
+    "--label",
+    "texts",
+    multiple=True,
+    metavar="NAME=TEXT",
+    help="Words for an axis, by its entry of the scene, variable or former words. Repeatable. The unit stays.",
+)
+@click.option(
+    "--style", "sheet", type=cli.PATH, metavar="FILE", help="Style sheet of matplotlib (.mplstyle)."
+)
+@click.option(
+    "--theme",
+    type=click.Choice(["light", "dark"]),
+    default="light",
+    show_default=True,
+    help="Colours of page and curves.",
 )
 @click.option(
     "--animation",
@@ -62,70 +93,96 @@ if TYPE_CHECKING:
 )
 @cli.TRUST
 def run(
-    place: Path,
+    places: tuple[Path, ...],
     names: tuple[str, ...],
     output: Path | None,
     kind: str,
+    designs: tuple[str, ...],
+    size: str,
+    font: str,
+    texts: tuple[str, ...],
+    sheet: Path | None,
+    theme: str,
     animation: Path | None,
     seconds: float,
     revolutions: int,
     trust: bool,
 ) -> int:
-    """Draw figures of a result file or of a directory of results, and films of the motion.
+    """Draw figures of result files or of a directory of results, and films of the motion. Figures of responses show several
+    designs: those of a directory, or of several files.
 
-    Example: hpcclear plot results/response.nc --figure orbit -o orbit.pdf
+    Example: hpcclear plot results/response.nc --figure orbit --size 85mm -o orbit.pdf
     """
     from hpcclear.plugins import trusting
-    from hpcclear.report.figures.animation import animate
     from hpcclear.report.figures.catalogue import drawings
+    from hpcclear.report.figures.printing import printing
     from hpcclear.report.html.content import read
 
-    content = read(place)
+    content = read(*places)
+    for name in designs:
+        _known("--design", name, content.responses)
+    responses = {n: one for n, one in content.responses.items() if n in designs or not designs}
     if animation is not None:
-        cli.show(
-            f"film     {animate(_moving(content, place), cli.place_of(animation), seconds, revolutions)}"
-        )
+        _film(content, animation, seconds, revolutions)
     with trusting(trust):
-        every = drawings(content.files, content.responses)
-        if output is not None:
-            _draw({name: known(name, every) for name in names} or every, output, kind, bool(names))
-        elif animation is None:
-            cli.show(f"figures of {place}: {', '.join(every)}")
+        every = drawings(content.files, responses)
+        chosen = {name: _known("--figure", name, every) for name in names} or every
+        if output is None:
+            if animation is None:
+                cli.show(f"figures of {', '.join(map(str, places))}: {', '.join(every)}")
+            return Exit.DONE
+        with printing(size, font, sheet, theme, dict(map(_label, texts))):
+            drawn = _drawn(chosen, bool(names))
+        _save(drawn, output, kind)
     return Exit.DONE
 
 
-def _moving(content: "Content", place: Path) -> "Results":
-    """The response that a film shows."""
+def _film(content: "Content", place: Path, seconds: float, revolutions: int) -> None:
+    """A film of the first response."""
+    from hpcclear.report.figures.animation import animate
+
     if content.response is None:
         reason = "it holds no response, so there is no motion to show"
-        raise InputError("file", str(place), reason, "Make one with hpcclear simulate")
-    return content.response
+        raise InputError("file", str(content.directory), reason, "Make one with hpcclear simulate")
+    cli.show(f"film     {animate(content.response, cli.place_of(place), seconds, revolutions)}")
 
 
-def known(name: str, every: "Mapping[str, Callable[[], Figure]]") -> "Callable[[], Figure]":
-    """What draws the figure of a name; raises InputError where the results do not allow it."""
+def _known(option: str, name: str, every: Mapping[str, One]) -> One:
+    """What stands under a name; raises InputError of the option where nothing does."""
     if name not in every:
-        raise InputError(
-            "--figure", name, "these results have no such figure", nearest(name, list(every))
-        )
+        reason = f"these results have no such {option.removeprefix('--')}"
+        raise InputError(option, name, reason, nearest(name, list(every)))
     return every[name]
 
 
-def _draw(
-    figures: "Mapping[str, Callable[[], Figure]]", output: Path, kind: str, chosen: bool
-) -> None:
-    """Draw to a file, or each to a file of a directory; of all figures, those that need more are named."""
+def _label(text: str) -> tuple[str, str]:
+    """Name and words of a label."""
+    name, sign, words = text.partition("=")
+    if not (name.strip() and sign and words.strip()):
+        raise InputError("--label", text, "it names no words", 'Write NAME="words"')
+    return name.strip(), words.strip()
+
+
+def _drawn(figures: "Drawings", chosen: bool) -> "dict[str, Figure]":
+    """The figures; of all that there may be, those that need more are named."""
+    drawn = {}
+    for name, draw in figures.items():
+        try:
+            drawn[name] = draw()
+        except InputError as error:
+            if chosen or error.key in ("figure", "matplotlib"):
+                raise
+            cli.say(f"Note: no {name}: {error.reason}. {error.remedy}")
+    return drawn
+
+
+def _save(figures: "Mapping[str, Figure]", output: Path, kind: str) -> None:
+    """Write one figure to a file, or each to a file of a directory."""
     from hpcclear.report import save
 
     single = len(figures) == 1 and output.suffix != ""
     if not single:
         output.mkdir(parents=True, exist_ok=True)
-    for name, draw in figures.items():
-        try:
-            cli.show(
-                f"figure   {save(draw(), cli.place_of(output) if single else output / f'{name}.{kind}')}"
-            )
-        except InputError as error:
-            if chosen or error.key in ("figure", "matplotlib", "output"):
-                raise
-            cli.say(f"Note: no {name}: {error.reason}. {error.remedy}")
+    for name, figure in figures.items():
+        place = cli.place_of(output) if single else output / f"{name}.{kind}"
+        cli.show(f"figure   {save(figure, place)}")

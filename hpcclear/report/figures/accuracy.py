@@ -1,6 +1,5 @@
 """Figures of what accuracy costs (kind ``accuracy``): one for each approximation of a study."""
 
-import textwrap
 from collections.abc import Callable
 
 import numpy as np
@@ -30,8 +29,7 @@ def _foot(figure: "style.Figure", found: Results, *sentences: str) -> None:
     """Where the numbers come from, below a figure."""
     versions = str(found.attrs.get("versions", ""))
     lines = [*sentences, str(found.attrs.get("processor", "")), versions]
-    text = "\n".join(textwrap.fill(line, 58) for line in lines)
-    figure.supxlabel(labels.literal(text), x=0.02, ha="left", fontsize=style.SMALL)
+    figure.supxlabel(labels.literal("\n".join(lines)), x=0.02, ha="left", wrap=True)
 
 
 def _decades(axis: "style.Axis") -> None:
@@ -58,23 +56,23 @@ def _plain(axis: "style.Axes") -> None:
 
 
 @style.drawn
-def integration_figure(found: Results) -> "style.Figure":
+def integration_figure(accuracy: Results) -> "style.Figure":
     """Work and precision: error of each quantity against wall time (left) and force evaluations (right)."""
-    quantities = [str(q) for q in found["quantity"].to_numpy()]
+    quantities = [str(q) for q in accuracy["quantity"].to_numpy()]
     figure, axes = style.grid(len(quantities), 2, 215.0, sharey="row", sharex="col")
     for row, quantity in enumerate(quantities):
-        here = found.sel(quantity=quantity)
+        here = accuracy.sel(quantity=quantity)
         for column, work in enumerate(("seconds", "evaluations")):
             _ladder(axes[row, column], here, work)
-        axes[row, 0].set_ylabel(f"{_WORDS.get(quantity, quantity)}\nrelative error (–)")
+        axes[row, 0].set_ylabel(f"{_WORDS.get(quantity, quantity)} relative error (–)")
     axes[-1, 0].set_xlabel("wall time (ms)")
     axes[-1, 1].set_xlabel("force evaluations (–)")
     style.legend(figure, axes[0, 0], "upper")
     _foot(
         figure,
-        found,
+        accuracy,
         "Errors of the grey region, with hollow marks, are below 100 times the reference's own error.",
-        f"{found.attrs.get('designs', '')}; {found.attrs.get('repeats', '')}.",
+        f"{accuracy.attrs.get('designs', '')}; {accuracy.attrs.get('repeats', '')}.",
     )
     return figure
 
@@ -87,90 +85,90 @@ def _ladder(axes: "style.Axes", here: Results, work: str) -> None:
         x, y = here[work].to_numpy()[k] * factor, here["error"].to_numpy()[k]
         look, unresolved = {**style.look(k), "ms": 2.8, "mew": 0.6}, y < floor
         axes.loglog(x, y, lw=0.8, label=labels.literal(str(method)), **look)
-        axes.plot(x[unresolved], y[unresolved], mfc="white", **{**look, "ls": "none"})
+        axes.plot(x[unresolved], y[unresolved], mfc=style.colour("paper"), **{**look, "ls": "none"})
     if np.isfinite(floor):
-        axes.axhspan(axes.get_ylim()[0], floor, color="#eeeeee", zorder=0)
+        axes.axhspan(axes.get_ylim()[0], floor, color=style.colour("faint"), alpha=0.5, zorder=0)
     for axis in (axes.xaxis, axes.yaxis):
         _decades(axis)
 
 
 @style.drawn
-def averaging_figure(found: Results) -> "style.Figure":
+def averaging_figure(accuracy: Results) -> "style.Figure":
     """Error of the objective against revolutions averaged, for several transients, and its lower bound."""
     figure, axes = style.grid(1, 1, 100.0)
-    panel, error = axes[0, 0], found["averaging_error"]
-    for k, transient in enumerate(found["transient"].to_numpy()):
+    panel, error = axes[0, 0], accuracy["averaging_error"]
+    for k, transient in enumerate(accuracy["transient"].to_numpy()):
         y = error.sel(transient=transient).to_numpy()
-        panel.loglog(found["averaged"], y, label=str(transient), **style.look(k))
-    floor = float(found["averaging_floor"])
+        panel.loglog(accuracy["averaged"], y, label=str(transient), **style.look(k))
+    floor = float(accuracy["averaging_floor"])
     if floor > 0.0:
-        panel.axhline(floor, color="black", lw=0.6, ls=(0, (6, 2)))
+        panel.axhline(floor, color=style.colour("ink"), lw=0.6, ls=(0, (6, 2)))
         panel.annotate(
             f"scatter of replicas {floor:.0e}", (0.99, floor), xycoords=("axes fraction", "data"),
-            ha="right", va="bottom", fontsize=style.SMALL,
+            ha="right", va="bottom",
         )  # fmt: skip
-    style.legend(figure, panel, "upper", title="transient revolutions", ncols=5)
+    style.legend(figure, panel, "upper", title="transient revolutions")
     panel.set(xlabel="averaged revolutions (–)", ylabel="relative error of $f$ (–)")
-    turn = 1e3 * float(found["turn_seconds"])
+    turn = 1e3 * float(accuracy["turn_seconds"])
     above = panel.secondary_xaxis("top", functions=(lambda x: x * turn, lambda t: t / turn))
     above.set_xlabel("core time of the averaged revolutions (ms)")
     _plain(above)
     _foot(
         figure,
-        found,
-        f"{found.attrs.get('copies', '')}, perturbed by 1e-10, half of them at a ten times tighter tolerance.",
+        accuracy,
+        f"{accuracy.attrs.get('copies', '')}, perturbed by 1e-10, half of them at a ten times tighter tolerance.",
     )
     return figure
 
 
 @style.drawn
-def surrogate_figure(found: Results) -> "style.Figure":
+def surrogate_figure(accuracy: Results) -> "style.Figure":
     """Accuracy of response surface and Kriging against sample size, with the simulation time above."""
     figure, axes = style.grid(3, 1, 145.0, sharex=True)
-    size, each = found["training"].to_numpy(), float(found["sample_seconds"])
+    size, each = accuracy["training"].to_numpy(), float(accuracy["sample_seconds"])
     rows = (
-        ("unexplained share\n$1 - R^2$ (–)", 1.0 - found["r2"].to_numpy()),
-        ("RMAE (–)", found["rmae"].to_numpy()),
-        ("leave-one-out error\nover std. dev. (–)", found["leave_one_out"].to_numpy()),
+        ("unexplained share $1 - R^2$ (–)", 1.0 - accuracy["r2"].to_numpy()),
+        ("RMAE (–)", accuracy["rmae"].to_numpy()),
+        ("leave-one-out error over std. dev. (–)", accuracy["leave_one_out"].to_numpy()),
     )
     for panel, (words, values) in zip(axes[:, 0], rows, strict=True):
-        for k, surrogate in enumerate(found["surrogate"].to_numpy()):
+        for k, surrogate in enumerate(accuracy["surrogate"].to_numpy()):
             panel.loglog(size, values[k], label=surrogate, **style.look(k))
         panel.set_ylabel(words)
-    axes[0, 0].legend()
+    style.key(axes[0, 0])
     axes[-1, 0].set_xlabel("training samples (–)")
     axes[-1, 0].set_xticks(size, [str(n) for n in size])
     axes[-1, 0].minorticks_off()
     above = axes[0, 0].secondary_xaxis("top", functions=(lambda x: x * each, lambda t: t / each))
     above.set_xlabel("simulation time (core-seconds)")
     _plain(above)
-    _foot(figure, found, f"{found.attrs.get('study', '')}; fresh test points.")
+    _foot(figure, accuracy, f"{accuracy.attrs.get('study', '')}; fresh test points.")
     return figure
 
 
 @style.drawn
-def random_inputs_figure(found: Results) -> "style.Figure":
+def random_inputs_figure(accuracy: Results) -> "style.Figure":
     """Error of mean and standard deviation against Monte Carlo size and time, with 95 % confidence intervals; the surrogate's
     bias."""
     figure, axes = style.grid(2, 2, 130.0, sharey="row", sharex="col")
-    for row, moment in enumerate(found["moment"].to_numpy()):
-        here = found.sel(moment=moment)
-        for k, estimate in enumerate(found["estimate"].to_numpy()):
+    for row, moment in enumerate(accuracy["moment"].to_numpy()):
+        here = accuracy.sel(moment=moment)
+        for k, estimate in enumerate(accuracy["estimate"].to_numpy()):
             one = here.sel(estimate=estimate)
             y = one["moment_error"].to_numpy()
             bars = [y - one["moment_lower"].to_numpy(), one["moment_upper"].to_numpy() - y]
-            for column, x in enumerate((found["draws"], one["moment_seconds"])):
+            for column, x in enumerate((accuracy["draws"], one["moment_seconds"])):
                 axes[row, column].errorbar(
                     x.to_numpy(), y, bars, elinewidth=0.6, label=str(estimate), **style.look(k)
                 )
         for panel in axes[row]:
             panel.set(xscale="log", yscale="log")
             panel.axhline(
-                abs(float(here["moment_bias"])), color="black", lw=0.6, ls=(0, (6, 2)),
+                abs(float(here["moment_bias"])), color=style.colour("ink"), lw=0.6, ls=(0, (6, 2)),
                 label="surrogate's bias",
             )  # fmt: skip
         axes[row, 1].axvline(
-            float(found["quadrature_seconds"]), color=style.PALETTE["green"], lw=0.8, ls=":",
+            float(accuracy["quadrature_seconds"]), color=style.colour("green"), lw=0.8, ls=":",
             label="quadrature",
         )  # fmt: skip
         axes[row, 0].set_ylabel(f"relative error of the {moment} (–)")
@@ -181,59 +179,61 @@ def random_inputs_figure(found: Results) -> "style.Figure":
     style.legend(figure, axes[0, 1], "upper")
     _foot(
         figure,
-        found,
+        accuracy,
         "Bars: 95 % confidence; the bias is the surrogate's, by quadrature, against all simulations.",
-        f"{found.attrs.get('study', '')}.",
+        f"{accuracy.attrs.get('study', '')}.",
     )
     return figure
 
 
 @style.drawn
-def parallel_figure(found: Results) -> "style.Figure":
+def parallel_figure(accuracy: Results) -> "style.Figure":
     """Speed-up and efficiency on the available ranks, and the core-seconds lost."""
     figure, axes = style.grid(1, 2, 80.0)
-    number = found["ranks"].to_numpy()
-    strong, weak = found["strong_seconds"].to_numpy(), found["weak_seconds"].to_numpy()
+    number = accuracy["ranks"].to_numpy()
+    strong, weak = accuracy["strong_seconds"].to_numpy(), accuracy["weak_seconds"].to_numpy()
     left, right = axes[0]
-    left.plot(number, strong[0] / strong, "o-", color=style.CYCLE[0], label="same batch")
-    left.plot(number, number * weak[0] / weak, "s--", color=style.CYCLE[1], label="batch a rank")
-    left.plot(number, number, color=style.PALETTE["grey"], lw=0.6, label="ideal")
+    left.plot(number, strong[0] / strong, "o-", color=style.colour(0), label="same batch")
+    left.plot(number, number * weak[0] / weak, "s--", color=style.colour(1), label="batch a rank")
+    left.plot(number, number, color=style.colour("grey"), lw=0.6, label="ideal")
     left.set_xticks(number, [str(n) for n in number])
     left.set(xlabel="ranks (–)", ylabel="speed-up (–)")
-    left.legend()
-    lost = found["lost_seconds"].to_numpy()
-    right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.PALETTE["sky"])
-    right.set_yticks(np.arange(len(lost)), [str(x) for x in found["loss"].to_numpy()])
+    style.key(left)
+    lost = accuracy["lost_seconds"].to_numpy()
+    right.barh(np.arange(len(lost)), np.nan_to_num(lost), color=style.colour("sky"))
+    right.set_yticks(np.arange(len(lost)), [str(x) for x in accuracy["loss"].to_numpy()])
     right.set(xlabel="lost (core-seconds)", ylabel="time lost to (what)")
-    _foot(figure, found, f"{found.attrs.get('batch', '')}.")
+    _foot(figure, accuracy, f"{accuracy.attrs.get('batch', '')}.")
     return figure
 
 
 @style.drawn
-def spending_figure(found: Results) -> "style.Figure":
+def spending_figure(accuracy: Results) -> "style.Figure":
     """Error of a steady mean against core time, a line a tolerance; below, what each tolerance is off by."""
     figure, axes = style.grid(2, 1, 150.0, height_ratios=(2.2, 1.0))
     top, bottom = axes[:, 0]
-    tolerance, seconds = found["tolerance"].to_numpy(), found["spent_seconds"].to_numpy()
-    model = found["spent_model"].to_numpy()
+    tolerance, seconds = accuracy["tolerance"].to_numpy(), accuracy["spent_seconds"].to_numpy()
+    model = accuracy["spent_model"].to_numpy()
     model = np.where(model > 0.0, model, np.nan)
-    best = float(found["cheapest_tolerance"][np.abs(found["aim"].to_numpy() - AIM).argmin()])
+    best = float(accuracy["cheapest_tolerance"][np.abs(accuracy["aim"].to_numpy() - AIM).argmin()])
     for k, rtol in enumerate(tolerance):
         if rtol == best:
-            top.loglog(seconds[k], model[k], color="#cccccc", lw=5.0, solid_capstyle="round")
+            top.loglog(
+                seconds[k], model[k], color=style.colour("faint"), lw=5.0, solid_capstyle="round"
+            )
         look = {**style.look(k), "ms": 2.8}
         top.loglog(seconds[k], model[k], lw=0.8, **{**look, "marker": ""})
-        top.plot(seconds[k], found["spent_error"].to_numpy()[k], **{**look, "ls": "none"})
+        top.plot(seconds[k], accuracy["spent_error"].to_numpy()[k], **{**look, "ls": "none"})
         top.plot([], [], label=f"{rtol:.0e}" + (" (cheapest)" if rtol == best else ""), **look)
     top.plot(
-        found["cheapest_seconds"], found["aim"], ls="none", marker="*", ms=6.0, color="black",
-        mfc="white", label="cheapest to an error",
+        accuracy["cheapest_seconds"], accuracy["aim"], ls="none", marker="*", ms=6.0, color=style.colour("ink"),
+        mfc=style.colour("paper"), label="cheapest to an error",
     )  # fmt: skip
     top.set(xlabel="core time, spin-up included (s)", ylabel="relative error of $f$ (–)")
-    bias, doubt = (found[name].to_numpy() for name in ("tolerance_bias", "tolerance_bias_error"))
+    bias, doubt = (accuracy[name].to_numpy() for name in ("tolerance_bias", "tolerance_bias_error"))
     bottom.errorbar(
         tolerance, np.abs(bias), 2.0 * doubt, ls="none", marker="o", ms=2.8, elinewidth=0.6,
-        color=style.CYCLE[0],
+        color=style.colour(0),
     )  # fmt: skip
     bottom.set(
         xscale="log", yscale="log", xlabel="relative tolerance (–)", ylabel="bias of $f$ (–)"
@@ -242,27 +242,27 @@ def spending_figure(found: Results) -> "style.Figure":
     style.legend(figure, top, "upper", title="relative tolerance")
     _foot(
         figure,
-        found,
+        accuracy,
         f"Marks: measured; lines: bias and variance over revolutions; grey: cheapest to {AIM:.0%}.",
-        f"{found.attrs.get('motion', '')}.",
+        f"{accuracy.attrs.get('motion', '')}.",
     )
     return figure
 
 
 @style.drawn
-def total_figure(found: Results) -> "style.Figure":
+def total_figure(accuracy: Results) -> "style.Figure":
     """Total error of f of one design against run time: the cheapest settings, three targets, and the scene's own settings."""
     figure, axes = style.grid(1, 1, 90.0)
-    panel, best = axes[0, 0], targets.front(found)
+    panel, best = axes[0, 0], targets.front(accuracy)
     beyond = sum(way.error > 0.1 * targets.TARGETS[-1] for way in best)
     best = best[: beyond + 1]  # what is far more accurate than all targets is of no interest
     panel.loglog(
-        [1e3 * way.seconds for way in best], [way.error for way in best], color=style.CYCLE[0],
+        [1e3 * way.seconds for way in best], [way.error for way in best], color=style.colour(0),
         drawstyle="steps-post", label="cheapest settings",
     )  # fmt: skip
-    if (own := targets.settings(found)) is not None:
+    if (own := targets.settings(accuracy)) is not None:
         panel.plot(
-            1e3 * own.seconds, own.error, ls="none", marker="s", ms=9.0, color=style.PALETTE["vermilion"],
+            1e3 * own.seconds, own.error, ls="none", marker="s", ms=9.0, color=style.colour("vermilion"),
             mfc="none", label="your settings", zorder=4,
         )  # fmt: skip
     box = (
@@ -271,18 +271,18 @@ def total_figure(found: Results) -> "style.Figure":
     panel.set(xlim=(0.7 * box.x0, 1.8 * box.x1), ylim=(0.3 * box.y0, 3.4 * box.y1))
     best_for: dict[targets.Way, list[str]] = {}
     for aim in targets.TARGETS:
-        if (way := targets.cheapest(found, aim)) is not None:
+        if (way := targets.cheapest(accuracy, aim)) is not None:
             best_for.setdefault(way, []).append(f"{aim * 100:g}")
     for (way, aims), mark in zip(best_for.items(), "*Dp", strict=False):
         panel.plot(
-            1e3 * way.seconds, way.error, ls="none", marker=mark, ms=6.0, color="black", mfc="white",
+            1e3 * way.seconds, way.error, ls="none", marker=mark, ms=6.0, color=style.colour("ink"), mfc=style.colour("paper"),
             label=f"for {', '.join(aims)} %", zorder=5,
         )  # fmt: skip
     panel.set(xlabel="core time of one design (ms)", ylabel="relative error of $f$ (–)")
     _decades(panel.yaxis)
     _plain(panel)
     style.legend(figure, panel, "upper")
-    _foot(figure, found, targets.caption(found))
+    _foot(figure, accuracy, targets.caption(accuracy))
     return figure
 
 

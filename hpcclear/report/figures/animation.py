@@ -116,7 +116,7 @@ class _Mechanism:
         axes.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
         look: style.Look = {"lw": 2.0, "ms": 3.5, "animated": True}
         self._lines = [
-            axes.plot([], [], "o-", color=style.CYCLE[k % 7], **look)[0]
+            axes.plot([], [], "o-", color=style.colour(k), **look)[0]
             for k in range(len(self._bodies))
         ]
 
@@ -133,10 +133,10 @@ def _forces(axes: "style.Axes", shown: Results) -> Any:
     unit, turn = labels.of(shown["contact_force"]), motion.turns(shown)
     for row, (joint, label) in enumerate(motion.joints(shown).items()):
         force = unit(shown["contact_force"].sel(joint=joint))
-        axes.plot(turn, force, color=style.CYCLE[row % 7], lw=0.8, label=labels.literal(label))
-    axes.legend(loc="upper right", ncols=3)
+        axes.plot(turn, force, color=style.colour(row), lw=0.8, label=labels.literal(label))
+    style.key(axes, "above")
     axes.set(xlabel=motion.turns_label(shown), ylabel=unit.label("contact force"))
-    return axes.axvline(turn[0], color=style.PALETTE["black"], lw=1.0, animated=True)
+    return axes.axvline(turn[0], color=style.colour("ink"), lw=1.0, animated=True)
 
 
 def _gif(pictures: Iterator[Array]) -> bytes:

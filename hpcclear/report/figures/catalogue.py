@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from hpcclear.report.figures import designs, response, style
+from hpcclear.report.figures import response, style
 from hpcclear.report.parts import FigureOf, Files, declared
 from hpcclear.results.content import Results
 
@@ -18,15 +18,14 @@ def drawings(
     files : mapping of str to xarray.Dataset
         Files by their kinds, without responses.
     responses : mapping of str to xarray.Dataset
-        By the names of designs; the figures of a single one are those of "original", else of the first.
+        By the names of designs; figures show several beside each other.
     """
     made = {one.name: one.of(files) for one in declared(FigureOf) if one.kind in files}
-    if len(responses) > 1:
-        made["comparison"] = partial(designs.comparison_figure, responses)
     if responses:
-        one = responses.get("original", next(iter(responses.values())))
-        made["response"] = partial(response.response_figure, one)
-        made |= {figure.name: figure.of({"response": one}) for figure in of_response(one)}
+        first = next(iter(responses.values()))
+        shown = first if len(responses) == 1 else dict(responses)
+        made["response"] = partial(response.response_figure, shown)
+        made |= {figure.name: partial(figure.draw, shown) for figure in of_response(first)}
     return made
 
 

@@ -25,12 +25,12 @@ def overlay_figure(comparison: "Comparison") -> "style.Figure":
     begins = steps * np.sign(np.median(steps)) < 0.0  # an angle that starts again from 0
     for panel, one in zip(axes[:, 0], comparison.quantities, strict=True):
         unit = scale(one.shown, one.unit)
-        dots: style.Look = {"ms": 2.0, "mew": 0.0, "color": style.PALETTE["grey"]}
+        dots: style.Look = {"ms": 2.0, "mew": 0.0, "color": style.colour("grey")}
         panel.plot(x, unit(one.measured[order]), ".", label="measured", **dots)
         line = np.where(begins, np.nan, unit(one.series))
-        panel.plot(along, line, color=style.PALETTE["blue"], label="simulated")
-        panel.set_ylabel(unit.label(labels.literal(one.label.replace(" of ", "\nof ", 1))))
-    axes[0, 0].legend(loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.25), borderaxespad=0.0)
+        panel.plot(along, line, color=style.colour("blue"), label="simulated")
+        panel.set_ylabel(unit.label(labels.literal(one.label)))
+    style.legend(figure, axes[0, 0], "upper")
     name = "measured time" if comparison.axis == "time" else "measured crank angle"
     axes[-1, 0].set_xlabel(across.label(name))
     figure.align_ylabels()

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -103,8 +102,7 @@ def _asked(one: Results, name: str, words: str, unit: str) -> _Goal:
     if len(words) > 2 * NARROW:
         words = f"{words[: 2 * NARROW - 6].rstrip()} …"
     label = scale.label(words) if unit else f"{words} (SI)"
-    label = textwrap.fill(labels.literal(label), NARROW)
-    return _Goal(label, name, name.removeprefix("searched_"), scale)
+    return _Goal(labels.literal(label), name, name.removeprefix("searched_"), scale)
 
 
 def _runs(panel: "style.Axes", one: Results, x: _Goal, y: _Goal) -> None:
@@ -130,12 +128,15 @@ def _verified(
         at = _place(one, x, y, "true")
         bars = [_bars(one, goal.verified, goal.scale) for goal in (x, y)]
         panel.errorbar(
-            *at, xerr=bars[0], yerr=bars[1], color="black", ecolor=style.PALETTE["grey"], elinewidth=0.5,
-            label=label, fmt=marker, ms=3.4, mfc="white", mew=0.7, zorder=4,
+            *at, xerr=bars[0], yerr=bars[1], color=style.colour("ink"), ecolor=style.colour("grey"), elinewidth=0.5,
+            label=label, fmt=marker, ms=3.4, mfc=style.colour("paper"), mew=0.7, zorder=4,
         )  # fmt: skip
         if f"{x.verified}_surrogate" in one and f"{y.verified}_surrogate" in one:
             panel.plot(
-                *zip(_place(one, x, y, "surrogate"), at, strict=True), "k-", lw=0.5, zorder=3
+                *zip(_place(one, x, y, "surrogate"), at, strict=True),
+                color=style.colour("ink"),
+                lw=0.5,
+                zorder=3,
             )
 
 
@@ -165,11 +166,11 @@ def _ends(
             at = _place(one, x, y, "true")
             if count > 2 and at[0] > np.mean(panel.get_xlim()):
                 side = -side[0] - 5, side[1]
-            drawn = panel.annotate(
-                letter, at, side, textcoords="offset points", fontsize=style.SMALL
-            )
+            drawn = panel.annotate(letter, at, side, textcoords="offset points")
             if count > 2:
-                drawn.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
+                drawn.set_path_effects(
+                    [withStroke(linewidth=1.5, foreground=style.colour("paper"))]
+                )
 
 
 def _mark(one: Results) -> tuple[str, str]:
@@ -226,15 +227,19 @@ def comparison_figure(responses: Mapping[str, Results]) -> "style.Figure":
                 k = kinds.index(_kind(design))
                 turn = motion.turns(shown[design])
                 text = labels.literal("baseline" if _kind(design) == "original" else _kind(design))
-                look: style.Look = {"color": style.CYCLE[(k - 1) % 7], "lw": 0.7, "label": text}
+                look: style.Look = {
+                    "color": style.colour((k - 1) % len(style.NAMES)),
+                    "lw": 0.7,
+                    "label": text,
+                }
                 panel.plot(turn - turn[0], unit(series[design]), **look)
-        line[0].set_ylabel(unit.label(words.replace(" (", "\n(") if joint else f"{words}\n"))
+        line[0].set_ylabel(unit.label(words))
     for panel, title in zip(axes[0], columns, strict=True):
         panel.set_title(title)
     for panel in axes[-1]:
         label = motion.turns_label(next(iter(shown.values())))
         panel.set_xlabel(label.replace("revolutions", "rev."))
-    style.legend(figure, axes[0], "lower", ncols=3, columnspacing=1.0)
+    style.legend(figure, axes[0], "lower", columnspacing=1.0)
     figure.align_ylabels(axes[:, 0])
     return figure
 

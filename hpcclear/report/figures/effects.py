@@ -177,18 +177,18 @@ def effects_figure(effects: Results, timing: Results | None = None) -> "style.Fi
     ends = np.maximum(np.abs(change) + np.outer((-1, 1), limit), floor)
     length = np.maximum(np.abs(change), floor)
     panel.barh(
-        places, length, color=[style.PALETTE[colours[int(effects["decision"][k])]] for k in rows],
+        places, length, color=[style.colour(colours[int(effects["decision"][k])]) for k in rows],
         height=0.6, xerr=np.abs(ends - length), error_kw={"lw": 0.9},
     )  # fmt: skip
     panel.set(xscale="log", xlim=(floor, None))
     tolerance = 100 * float(effects.attrs["tolerance"])
-    panel.axvline(tolerance, color=style.PALETTE["orange"], ls="--", lw=0.9)
+    panel.axvline(tolerance, color=style.colour("orange"), ls="--", lw=0.9)
     panel.set_yticks(places, [_wrapped(named(effects, k), k == chosen) for k in rows])
     panel.set_xlabel("|change of mean $f$| (%)")
     saved = [saving(effects, k, seconds) for k in rows]
     shares, halves = np.array([(100 * one.share, 100 * one.half) for one in saved]).T
     cost.barh(
-        places, shares, color=style.PALETTE["blue"], height=0.6, xerr=halves, error_kw={"lw": 0.9}
+        places, shares, color=style.colour("blue"), height=0.6, xerr=halves, error_kw={"lw": 0.9}
     )
     cost.set_xlim(-50, 100)  # what takes longer than half as much again is no saving
     cost.set_xlabel("run time saved (%)")

@@ -76,9 +76,9 @@ PARTS = (LinesOf(50, _poor),)
 def mark(axes: "style.Axes", r2: float, height: float = 0.5) -> None:
     """Write across a panel what is wrong with the fit that it shows, at this height of it."""
     if text := verdict(r2):
-        box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5}
+        box = {"facecolor": style.colour("paper"), "alpha": 0.85, "edgecolor": "none", "pad": 1.5}
         words = text.replace(", ", ":\n").replace("R²", "$R^2$")
         axes.text(
             0.5, height, words, transform=axes.transAxes, ha="center", va="center", zorder=6,
-            color=style.PALETTE["vermilion"], fontsize=style.NORMAL, bbox=box,
+            color=style.colour("vermilion"), bbox=box,
         )  # fmt: skip

@@ -59,10 +59,10 @@ def guide_figure(response: Results) -> "style.Figure":
         unit = labels.of(shown[name])
         for row, guide in enumerate(guides):
             values = unit(shown[name].sel(guide=guide))
-            panel.plot(turn, values, color=style.CYCLE[row % 7], lw=0.7, label=guide)
+            panel.plot(turn, values, color=style.colour(row), lw=0.7, label=guide)
         panel.set_ylabel(unit.label(name.replace("guide_", "")))
     if len(guides) > 1:
-        axes[0, 0].legend(loc="upper right", ncols=len(guides))
+        style.key(axes[0, 0], "above")
     _corners(axes[2, 0], shown, turn)
     axes[2, 0].set_xlabel(motion.turns_label(shown))
     figure.align_ylabels()
@@ -74,7 +74,7 @@ def _corners(panel: "style.Axes", shown: Results, turn: Array) -> None:
     rows = [str(label) for label in shown["joint"].to_numpy() if "." in str(label)]
     for row, label in enumerate(rows):
         depth = shown["penetration"].sel(joint=label).to_numpy()
-        colour = style.CYCLE[row % 7]
+        colour = style.colour(row)
         panel.fill_between(
             turn, row - 0.3, row + 0.3, where=depth > 0.0, color=colour, alpha=0.5, lw=0.0
         )

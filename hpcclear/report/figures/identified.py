@@ -11,15 +11,15 @@ BINS = 60
 DAY = 86400.0
 
 
-def _check(content: Results) -> None:
+def _check(identify: Results) -> None:
     """Raise InputError where nothing was measured."""
-    if "interval" not in content:
+    if "interval" not in identify:
         reason = "no signal was measured"
         raise InputError("identify", 0, reason, "Give hpcclear identify a --signal")
 
 
 @style.drawn
-def posterior_figure(content: Results) -> "style.Figure":
+def posterior_figure(identify: Results) -> "style.Figure":
     """Posterior of each unknown, a line for each record, with the calibrated 95 % interval below; of kind ``identify``.
 
     Raises
@@ -27,31 +27,31 @@ def posterior_figure(content: Results) -> "style.Figure":
     InputError
         No signal was measured.
     """
-    _check(content)
-    count = content.sizes["unknown"]
+    _check(identify)
+    count = identify.sizes["unknown"]
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):
-        low, high = (float(content[f"prior_{end}"][u]) for end in ("lower", "upper"))
-        scale = labels.scale(str(content["unit"].to_numpy()[u]), [low, high])
+        low, high = (float(identify[f"prior_{end}"][u]) for end in ("lower", "upper"))
+        scale = labels.scale(str(identify["unit"].to_numpy()[u]), [low, high])
         edges = np.linspace(low, high, BINS + 1)
-        for k, record in enumerate(content["record"].to_numpy()):
-            colour = style.CYCLE[k % len(style.CYCLE)]
-            values = content["posterior"].to_numpy()[k, :, u]
+        for k, record in enumerate(identify["record"].to_numpy()):
+            colour = style.colour(k)
+            values = identify["posterior"].to_numpy()[k, :, u]
             density = np.histogram(values, edges)[0] / (len(values) * np.diff(edges) * scale.factor)
             panel.stairs(density, scale(edges), color=colour, label=labels.literal(str(record)))
-            ends = scale(content["interval"].to_numpy()[k, u])
+            ends = scale(identify["interval"].to_numpy()[k, u])
             level = -0.04 * (k + 1) * max(density.max(), 1e-300)
             panel.plot(ends[[0, 2]], [level, level], color=colour, lw=2.0)
         panel.set(
-            xlabel=scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))),
+            xlabel=scale.label(labels.entry(str(identify["unknown"].to_numpy()[u]))),
             ylabel=f"density (1/{scale.unit})",
         )
-        panel.legend(loc="upper right")
+        style.key(panel, "upper right")
     return figure
 
 
 @style.drawn
-def features_figure(content: Results) -> "style.Figure":
+def features_figure(identify: Results) -> "style.Figure":
     """Measured less predicted features over their predictive standard deviation, of the last record; of kind ``identify``.
 
     Raises
@@ -59,30 +59,30 @@ def features_figure(content: Results) -> "style.Figure":
     InputError
         No signal was measured.
     """
-    _check(content)
-    last = content.isel(record=-1)
+    _check(identify)
+    last = identify.isel(record=-1)
     measured, predicted = last["measured"].to_numpy(), last["predicted"].to_numpy()
     score = (measured - predicted) / last["predicted_deviation"].to_numpy()
     figure, axes = style.grid(1, 1, 60.0)
     panel = axes[0, 0]
     look = {
-        "color": style.PALETTE["sky"],
+        "color": style.colour("sky"),
         "alpha": 0.3,
         "lw": 0,
         "label": "two standard deviations",
     }
     panel.axhspan(-2.0, 2.0, **look)
-    panel.plot(np.arange(len(score)), score, "o", color=style.PALETTE["blue"])
+    panel.plot(np.arange(len(score)), score, "o", color=style.colour("blue"))
     worst = int(last["worst_feature"])
     name = str(last["feature"].to_numpy()[worst])
-    panel.plot(worst, score[worst], "s", color=style.PALETTE["vermilion"], label=name)
+    panel.plot(worst, score[worst], "s", color=style.colour("vermilion"), label=name)
     panel.set(xlabel="number of the feature (–)", ylabel="standard score (–)")
-    panel.legend(loc="best")
+    style.key(panel)
     return figure
 
 
 @style.drawn
-def growth_figure(content: Results) -> "style.Figure":
+def growth_figure(identify: Results) -> "style.Figure":
     """Unknowns over time: median and 95 % interval at each record, the rate of growth, and the limit; of kind ``identify``.
 
     Raises
@@ -90,31 +90,31 @@ def growth_figure(content: Results) -> "style.Figure":
     InputError
         There is one record only.
     """
-    _check(content)
-    if "rate" not in content:
+    _check(identify)
+    if "rate" not in identify:
         raise InputError("identify", 1, "one record has no growth", "Give a --signal for each date")
-    count, days = content.sizes["unknown"], content["elapsed"].to_numpy() / DAY
+    count, days = identify.sizes["unknown"], identify["elapsed"].to_numpy() / DAY
     figure, axes = style.grid(count, 1, 10.0 + 45.0 * count)
     for u, panel in enumerate(axes[:, 0]):
-        unit = str(content["unit"].to_numpy()[u])
-        good = content["explained"].to_numpy() != 0
-        low, middle, high = (content["interval"].to_numpy()[:, u, k] for k in range(3))
+        unit = str(identify["unit"].to_numpy()[u])
+        good = identify["explained"].to_numpy() != 0
+        low, middle, high = (identify["interval"].to_numpy()[:, u, k] for k in range(3))
         scale = labels.scale(unit, high)
         panel.errorbar(
             days, scale(middle), scale([middle - low, high - middle]), fmt="o",
-            color=style.PALETTE["blue"], capsize=2.0, label="median, 95 % interval",
+            color=style.colour("blue"), capsize=2.0, label="median, 95 % interval",
         )  # fmt: skip
-        rate = float(content["rate"][1, u]) * DAY
+        rate = float(identify["rate"][1, u]) * DAY
         line = np.mean(middle[good]) + rate * (days - np.mean(days[good]))
-        panel.plot(days, scale(line), color=style.PALETTE["grey"], label="median rate")
-        if "limit" in content.attrs:
-            limit = scale.factor * float(content.attrs["limit"])
-            panel.axhline(limit, color=style.PALETTE["orange"], ls="--", label="limit")
+        panel.plot(days, scale(line), color=style.colour("grey"), label="median rate")
+        if "limit" in identify.attrs:
+            limit = scale.factor * float(identify.attrs["limit"])
+            panel.axhline(limit, color=style.colour("orange"), ls="--", label="limit")
         panel.set(
             xlabel="time since the first record (days)",
-            ylabel=scale.label(labels.entry(str(content["unknown"].to_numpy()[u]))),
+            ylabel=scale.label(labels.entry(str(identify["unknown"].to_numpy()[u]))),
         )
-        panel.legend(loc="best")
+        style.key(panel)
     return figure
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import NamedTuple
 
 import numpy as np
@@ -102,10 +104,15 @@ def quantity(value: float, units: str, digits: int = 4) -> str:
 
 def value(one: Variable) -> str:
     """A design variable of a design as it is printed: with its unit, or the name of the row of a table."""
-    number, options = float(one), str(one.attrs.get("options", ""))
-    if options and np.isfinite(number):
-        return options.split("; ")[int(number)]
+    number, names = float(one), options(one)
+    if names and np.isfinite(number):
+        return names[int(number)]
     return quantity(number, str(one.attrs["units"]))
+
+
+def options(variable: Variable) -> list[str]:
+    """Names of the rows of a table that a design variable chooses from; none of one that is a number."""
+    return [one for one in str(variable.attrs.get("options", "")).split("; ") if one]
 
 
 NOT_CHECKED = "not checked"
@@ -157,8 +164,18 @@ def words(variable: Variable) -> str:
     return str(variable.attrs.get("scene_path", variable.attrs.get("long_name", variable.name)))
 
 
-WIDE = 32
-"""Letters of a line of an axis label: half a column."""
+_paths: ContextVar[dict[str, str] | None] = ContextVar("entries on axes", default=None)
+
+
+@contextmanager
+def called() -> Iterator[dict[str, str]]:
+    """Collect within it what entries of the scene stand on axes: their paths, by their words there."""
+    found: dict[str, str] = {}
+    token = _paths.set(found)
+    try:
+        yield found
+    finally:
+        _paths.reset(token)
 
 
 def axis(variable: Variable) -> str:
@@ -166,22 +183,21 @@ def axis(variable: Variable) -> str:
     words = str(variable.attrs.get("long_name", ""))
     if path := str(variable.attrs.get("scene_path", "")):
         return entry(path, words)
-    return wrapped(words or variable.name.replace("_", " "))
+    return literal(words or variable.name.replace("_", " "))
 
 
 def entry(path: str, words: str = "") -> str:
     """What an entry of a scene is called on an axis, by its path or short name and its words, where a file has some."""
     _, short, label = DESIGN_VARIABLES.get(path, ("", "", ""))
     if short and words in ("", short):
-        return label or wrapped(short)
-    if words in ("", f"design variable {path}"):
-        words = described([path]) if "." in path else path.replace("_", " ")
-    return wrapped(words)
-
-
-def wrapped(words: str) -> str:
-    """Words in lines of `WIDE` letters, printed as they are."""
-    return literal("\n".join(textwrap.wrap(words, WIDE)))
+        made = label or short
+    else:
+        if words in ("", f"design variable {path}"):
+            words = described([path]) if "." in path else path.replace("_", " ")
+        made = literal(words)
+    if (found := _paths.get()) is not None:
+        found[made] = path
+    return made
 
 
 def objective(content: Results) -> str:

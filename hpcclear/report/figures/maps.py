@@ -1,7 +1,6 @@
 """Maps of periodic and chaotic motion (kind ``samples``), and bifurcation figures."""
 
 import itertools
-import textwrap
 
 import numpy as np
 
@@ -16,12 +15,12 @@ from hpcclear.results.grids import cells_of
 _RPM = labels.Scale(30.0 / np.pi, "rpm")
 _PERIODS = (0.5, 1.5, 2.5, 4.5, 8.5, 20.5)
 _REGIMES = [regime for regime in Regime if regime is not Regime.UNJUDGED]
-_PERIOD = "period (revolutions)\nwhite: none found"
-_EXPONENT = "largest Lyapunov exponent\nper revolution"
+_PERIOD = "period, blank where none was found (revolutions)"
+_EXPONENT = "largest Lyapunov exponent (1/revolution)"
 
 
 @style.drawn
-def map_figure(content: Results) -> "style.Figure":
+def map_figure(samples: Results) -> "style.Figure":
     """Exponent, period and regime of each cell of a map; along a line also f with its confidence interval.
 
     Raises
@@ -29,7 +28,7 @@ def map_figure(content: Results) -> "style.Figure":
     InputError
         The dataset is no map.
     """
-    cells = cells_of(content)
+    cells = cells_of(samples)
     names = [str(name) for name in cells["objective"].dims]
     return _plane(cells, names) if len(names) == 2 else _line(cells, names[0])
 
@@ -43,37 +42,46 @@ def entry(variable: Variable) -> tuple[Array, str]:
 
 
 def _plane(cells: Results, names: list[str]) -> "style.Figure":
-    figure, axes = style.grid(3, 1, 175.0, sharex=True)
+    attractors = cells["attractors"].to_numpy().T if "attractors" in cells else np.zeros(1)
+    most = int(np.nanmax(np.nan_to_num(attractors)))
+    count = 3 + (most > 1)
+    figure, axes = style.grid(count, 1, 10.0 + 55.0 * count, sharex=True)
     (x, across), (y, up) = (entry(cells[name]) for name in names)
     exponent = cells["lyapunov_exponent"].to_numpy().T
     finite = np.abs(exponent[np.isfinite(exponent)])
-    most = float(np.quantile(finite, 0.98)) if finite.size else 1.0
-    colours, boundaries = style.matplotlib().colormaps, style.matplotlib().colors.BoundaryNorm
-    count = len(_REGIMES)
-    by_regime = {
-        "cmap": colours["viridis"].resampled(count),
-        "norm": boundaries(np.arange(count + 1) + 0.5, count),
-    }
-    regime = np.where(cells["status"].to_numpy() == Status.OK, cells["regime"].to_numpy(), np.nan)
-    panels: tuple[tuple[str, Array, style.Look], ...] = (
-        (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -most, "vmax": most}),
-        (_PERIOD, cells["period"].to_numpy().T, {"cmap": "viridis", "norm": boundaries(_PERIODS, 256)}),
-        ("regime", regime.T, by_regime),
-    )  # fmt: skip
-    for panel, (words, values, options) in zip(axes[:, 0], panels, strict=True):
+    reach = float(np.quantile(finite, 0.98)) if finite.size else 1.0
+    regime = np.where(cells["status"].to_numpy() == Status.OK, cells["regime"].to_numpy(), np.nan).T
+    spans = [(int(low + 0.5), int(high - 0.5)) for low, high in itertools.pairwise(_PERIODS)]
+    orders = [f"{a}" if a == b else f"{a} to {b}" for a, b in spans]
+    steps = style.matplotlib().colors.BoundaryNorm(_PERIODS, 256)
+    middles = [0.5 * sum(pair) for pair in itertools.pairwise(_PERIODS)]
+    kinds = [one.name.lower() for one in _REGIMES]
+    numbers = [str(k + 1) for k in range(most)]
+    panels: list[tuple[str, Array, style.Look, list[float], list[str]]] = [
+        (_EXPONENT, exponent, {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}, [], []),
+        (_PERIOD, cells["period"].to_numpy().T, {"norm": steps}, middles, orders),
+        ("regime", regime - 1.0, _categorical(kinds), [*map(float, range(len(kinds)))], kinds),
+        ("motions reached", attractors - 1.0, _categorical(numbers), [*map(float, range(most))], numbers),
+    ]  # fmt: skip
+    for panel, (words, values, options, ticks, texts) in zip(axes[:, 0], panels, strict=False):
         drawn = panel.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
         bar = figure.colorbar(drawn, ax=panel, label=words)
-        if words == _PERIOD:
-            pairs = list(itertools.pairwise(_PERIODS))
-            spans = [(int(low + 0.5), int(high - 0.5)) for low, high in pairs]
-            middles = [0.5 * sum(pair) for pair in pairs]
-            bar.set_ticks(middles, labels=[f"{a}" if a == b else f"{a} to {b}" for a, b in spans])
-        elif words == "regime":
-            bar.set_ticks([*map(float, _REGIMES)], labels=[one.name.lower() for one in _REGIMES])
+        if ticks:
+            bar.set_ticks(ticks, labels=texts)
+            bar.ax.minorticks_off()
         panel.set_ylabel(up)
         panel.grid(False)
+        for axis, name in zip((panel.xaxis, panel.yaxis), names, strict=True):
+            if rows := labels.options(cells[name]):
+                axis.set_ticks(range(len(rows)), labels=rows)
     axes[-1, 0].set_xlabel(across)
     return figure
+
+
+def _categorical(names: list[str]) -> style.Look:
+    """Colours of values 0, 1, ... that have no order."""
+    colours, norm = style.categories(max(len(names), 1))
+    return {"cmap": colours, "norm": norm}
 
 
 def _line(cells: Results, name: str) -> "style.Figure":
@@ -85,14 +93,14 @@ def _line(cells: Results, name: str) -> "style.Figure":
         (axes[3, 0], "objective", "objective_limit", unit.factor, unit.label("$f$, 95 % CI")),
     ):
         values, width = (cells[one].to_numpy() * factor for one in (key, reach))
-        panel.errorbar(x, values, width, fmt="o", ms=2.0, lw=0.7, color=style.PALETTE["blue"])
+        panel.errorbar(x, values, width, fmt="o", ms=2.0, lw=0.7, color=style.colour("blue"))
         panel.set_ylabel(words)
-    axes[0, 0].axhline(0.0, color=style.PALETTE["grey"], lw=0.6)
-    axes[1, 0].plot(x, cells["period"].to_numpy(), "s", ms=2.0, color=style.PALETTE["vermilion"])
-    axes[1, 0].set_ylabel("period\n(revolutions)")
+    axes[0, 0].axhline(0.0, color=style.colour("grey"), lw=0.6)
+    axes[1, 0].plot(x, cells["period"].to_numpy(), "s", ms=2.0, color=style.colour("vermilion"))
+    axes[1, 0].set_ylabel("period (revolutions)")
     regime = cells["regime"].to_numpy().astype(float)
     regime[(cells["status"].to_numpy() != Status.OK) | (regime == Regime.UNJUDGED)] = np.nan
-    axes[2, 0].plot(x, regime, "D", ms=2.0, color=style.PALETTE["green"])
+    axes[2, 0].plot(x, regime, "D", ms=2.0, color=style.colour("green"))
     axes[2, 0].set_yticks([int(one) for one in _REGIMES], [one.name.lower() for one in _REGIMES])
     axes[2, 0].set_ylim(0.5, len(_REGIMES) + 0.5)
     axes[-1, 0].set_xlabel(across)
@@ -100,7 +108,7 @@ def _line(cells: Results, name: str) -> "style.Figure":
 
 
 @style.drawn
-def bifurcation_figure(content: Results) -> "style.Figure":
+def bifurcation_figure(bifurcation: Results) -> "style.Figure":
     """Values once a revolution against the entry of the scene that is varied (kind ``bifurcation``).
 
     A motion that repeats every revolution is one dot over its value, one that repeats every n is n dots.
@@ -110,20 +118,20 @@ def bifurcation_figure(content: Results) -> "style.Figure":
     InputError
         The dataset is no bifurcation.
     """
-    variables = labels.design_variables(content)
-    if not variables or content.attrs.get("hpcclear_kind") != "bifurcation":
+    variables = labels.design_variables(bifurcation)
+    if not variables or bifurcation.attrs.get("hpcclear_kind") != "bifurcation":
         reason = "the dataset is no bifurcation"
         remedy = "Make one with hpcclear map --bifurcation"
-        raise InputError("kind", content.attrs.get("hpcclear_kind"), reason, remedy)
+        raise InputError("kind", bifurcation.attrs.get("hpcclear_kind"), reason, remedy)
     figure, axes = style.grid(1, 1, 70.0)
     varied, across = entry(variables[0])
-    x = np.repeat(varied, content.sizes["crossing"])
-    unit, panel = labels.of(content["observed"]), axes[0, 0]
+    x = np.repeat(varied, bifurcation.sizes["crossing"])
+    unit, panel = labels.of(bifurcation["observed"]), axes[0, 0]
     size = float(np.clip(3000.0 / max(len(x), 1), 1.2, 3.0))
-    look: style.Look = {"ms": size, "mew": 0.0, "color": style.PALETTE["blue"]}
-    panel.plot(x, unit(content["observed"]).ravel(), ".", rasterized=len(x) > 5000, **look)
-    words = unit.label(str(content["observed"].attrs["long_name"]))
-    panel.set(xlabel=across, ylabel="\n".join(textwrap.wrap(words, 30)))
+    look: style.Look = {"ms": size, "mew": 0.0, "color": style.colour("blue")}
+    panel.plot(x, unit(bifurcation["observed"]).ravel(), ".", rasterized=len(x) > 5000, **look)
+    words = unit.label(str(bifurcation["observed"].attrs["long_name"]))
+    panel.set(xlabel=across, ylabel=words)
     return figure
 
 

@@ -6,8 +6,10 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.report.figures.style import JOINT_NAMES
 from hpcclear.results.content import Results, Variable
+
+JOINT_NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
+"""Of the slider-crank's joints; those of a linkage have the names their users gave them."""
 
 TURN = 2.0 * np.pi
 

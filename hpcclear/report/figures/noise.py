@@ -31,7 +31,7 @@ def noise_figure(response: Results) -> "style.Figure":
     forces = _forces(response)
     highest = max(float(np.nanmax(level)) for level, *_ in forces.values())
     for row, (name, (level, lower, upper, orders)) in enumerate(forces.items()):
-        colour = style.CYCLE[row % 7]
+        colour = style.colour(row)
         _levels(axes[0, 0], (level, lower, upper), name, colour)
         unit = labels.scale("N", [float(np.max(one)) for *_, one in forces.values()])
         axes[1, 0].loglog(orders.labels["order"], unit(orders), color=colour, lw=0.7, label=name)
@@ -40,7 +40,7 @@ def noise_figure(response: Results) -> "style.Figure":
     bands = response["band"].to_numpy()[::3]
     axes[0, 0].set_xticks(bands, [band_name(one) for one in bands], rotation=45.0)
     axes[0, 0].minorticks_off()
-    axes[0, 0].legend(loc="lower right")
+    style.key(axes[0, 0], "lower right")
     axes[1, 0].set(title="orders", xlabel="order (multiples of the crank frequency)")
     axes[1, 0].set_ylabel(unit.label("RMS of the order"))
     return figure

@@ -10,8 +10,6 @@ from hpcclear.report.figures import labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
-_FLIGHT, _CONTACT = style.PALETTE["sky"], style.PALETTE["vermilion"]
-
 
 @style.drawn
 def orbit_figure(response: Results) -> "style.Figure":
@@ -19,19 +17,24 @@ def orbit_figure(response: Results) -> "style.Figure":
     revolutions of a response (kind ``response``)."""
     shown = motion.of_pins(motion.steady(response))
     joints = motion.joints(shown)
-    figure, axes = style.grid(len(joints), 1, 85.0 * len(joints))
+    figure, axes = style.grid(len(joints), 1, style.across() * len(joints))
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = unit(motion.clearances(shown))
     for row, (joint, panel) in enumerate(zip(joints, axes[:, 0], strict=True)):
         x, y = (unit(shown[f"eccentricity_{c}"].sel(joint=joint)) for c in "xy")
         contact = shown["penetration"].sel(joint=joint).to_numpy() > 0.0
         radius, angle = np.hypot(x, y), np.arctan2(y, x)
-        look: style.Look = {"color": _FLIGHT, "lw": 0.7, "label": "free flight"}
+        look: style.Look = {"color": style.colour("sky"), "lw": 0.7, "label": "free flight"}
         panel.plot(*_flight(x, y, _rolls(angle, contact)), **look)
-        panel.plot(*_along(radius, angle, contact), color=_CONTACT, lw=0.7, label="contact")
+        panel.plot(
+            *_along(radius, angle, contact),
+            color=style.colour("vermilion"),
+            lw=0.7,
+            label="contact",
+        )
         _circle(panel, clearances[row])
         arc = _along(np.full_like(angle, clearances[row]), angle, contact)
-        panel.plot(*arc, color=style.PALETTE["black"], lw=2.4, label="contact arc")
+        panel.plot(*arc, color=style.colour("ink"), lw=2.4, label="contact arc")
         panel.set_title(f"{joints[joint]}: {motion.contact(shown, joint)}")
         _equal(panel, unit)
     style.legend(figure, axes[0, 0], "lower")
@@ -44,7 +47,7 @@ def force_polar_figure(response: Results) -> "style.Figure":
     shown = motion.steady(response)
     joints = motion.joints(shown)
     polar = {"projection": "polar"}
-    figure, axes = style.grid(len(joints), 1, 82.5 * len(joints), subplot_kw=polar)
+    figure, axes = style.grid(len(joints), 1, 0.97 * style.across() * len(joints), subplot_kw=polar)
     force = labels.of(shown["contact_force"])
     angle, sense = motion.crank_angle(shown)
     turn = sense * angle / motion.TURN
@@ -82,7 +85,7 @@ def phase_figure(response: Results) -> "style.Figure":
         x, y = (labels.of(one) for one in both)
         points = np.column_stack([x(both[0]), y(both[1])])
         parts = np.stack([points[:-1], points[1:]], axis=1)
-        line = LineCollection(list(parts), array=turn[1:], cmap=style.COLOURS, linewidths=0.6)
+        line = LineCollection(list(parts), array=turn[1:], linewidths=0.6)
         panel.add_collection(line)
         panel.autoscale_view()
         panel.set(xlabel=x.label(labels.axis(both[0])), ylabel=y.label(labels.axis(both[1])))
@@ -106,22 +109,21 @@ def poincare_figure(response: Results, revolutions: int | None = None) -> "style
     the response has, the more it says.
     """
     shown = motion.steady(response, revolutions)
-    figure = style.page(118.0)
     joints = list(motion.joints(shown).values())
-    cells = figure.add_gridspec(2, max(len(joints), 1), height_ratios=[1.1, 1.0])
-    top = figure.add_subplot(cells[0, :])
+    cells = [["motion"] * max(len(joints), 1), joints or ["."]]
+    figure, axes = style.mosaic(cells, 118.0, height_ratios=[1.1, 1.0])
+    top, panels = axes["motion"], [axes[joint] for joint in joints]
     output = motion.followed(shown)
     x, y = (labels.of(one) for one in output)
     position, velocity = (labels.of(one)(motion.section(shown, one)) for one in output)
     order = np.arange(1, len(position) + 1)
-    options: style.Look = {"c": order, "cmap": style.COLOURS, "s": 10.0, "lw": 0, "zorder": 3}
+    options: style.Look = {"c": order, "s": 10.0, "lw": 0, "zorder": 3}
     drawn = top.scatter(position, velocity, **options)
     top.set(xlabel=x.label(labels.axis(output[0])), ylabel=y.label(labels.axis(output[1])))
     top.set_title(f"{len(order)} crossings of crank angle 0°")
     unit = labels.scale("m", motion.eccentricity(shown))
     clearances = unit(motion.clearances(shown))
     across, up = (unit(motion.section(shown, f"eccentricity_{c}")) for c in "xy")
-    panels = [figure.add_subplot(cells[1, joint]) for joint in range(len(joints))]
     reach = 1.08 * np.nanmax([*clearances, *np.abs(np.ravel([across, up]))])
     for joint, panel in enumerate(panels):
         panel.scatter(across[:, joint], up[:, joint], **options)
@@ -180,7 +182,9 @@ def _circle(axes: "style.Axes", radius: float) -> None:
     if np.isfinite(radius):
         angle = np.linspace(0.0, 2.0 * np.pi, 361)
         look: style.Look = {"lw": 0.7, "label": "clearance circle"}
-        axes.plot(radius * np.cos(angle), radius * np.sin(angle), "k--", **look)
+        axes.plot(
+            radius * np.cos(angle), radius * np.sin(angle), "--", color=style.colour("ink"), **look
+        )
 
 
 def _cyclic() -> Any:
@@ -203,14 +207,15 @@ CROSSINGS = 200
 """Fewest points of a Poincaré section: with fewer, a cloud and a long period look alike."""
 
 
-def section_figure(found: Results) -> "style.Figure":
+@style.drawn
+def section_figure(response: Results) -> "style.Figure":
     """Return the Poincaré section of a response over its averaged revolutions; raises InputError of fewer than `CROSSINGS`."""
-    count = motion.whole_turns(found) - int(found.attrs.get("transient_turns", 0))
+    count = motion.whole_turns(response) - int(response.attrs.get("transient_turns", 0))
     if count < CROSSINGS:
         reason = f"a Poincaré section takes at least {CROSSINGS} revolutions"
         remedy = f"Simulate with --set numerics.averaged_revolutions={CROSSINGS}"
         raise InputError("revolutions", count, reason, remedy)
-    return poincare_figure(found, revolutions=count)
+    return poincare_figure(response, revolutions=count)
 
 
 PARTS = (

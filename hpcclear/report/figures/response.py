@@ -1,39 +1,34 @@
 """Figures of responses (kind ``response``) over the crank angle, frequency and clearance, and of their energies."""
 
-from hpcclear.report.figures import labels, motion, style
+from collections.abc import Mapping
+from typing import cast
+
+from hpcclear.report.figures import designs, given, labels, motion, style
 from hpcclear.report.parts import FigureOf
 from hpcclear.results.content import Results
 
 
-def _joints(axes: "style.Axes", response: Results, name: str, unit: labels.Scale) -> None:
-    """One curve for each joint against the revolution of the crank."""
-    for row, (joint, label) in enumerate(motion.joints(response).items()):
-        values = unit(response[name].sel(joint=joint))
-        axes.plot(motion.turns(response), values, label=label, **_curve(row))
-
-
-def _curve(row: int) -> style.Look:
-    """Style of a joint's curve; later ones are thinner, since they lie on top."""
-    return {"color": style.CYCLE[row % 7], "lw": max(0.8 - 0.2 * row, 0.4)}
-
-
 @style.drawn
-def response_figure(response: Results) -> "style.Figure":
+def response_figure(responses: Results | Mapping[str, Results]) -> "style.Figure":
     """Slider motion, where there is a slider, contact forces and torque of the drive over the last two revolutions of a
-    response (kind ``response``)."""
-    shown = motion.latest(response)
+    response (kind ``response``); of several by the names of their designs what `comparison_figure` shows."""
+    if every := given.several(responses):
+        return designs.comparison_figure(every)
+    shown = motion.latest(cast(Results, responses))
     moved = (f"slider_{word}" for word in ("position", "velocity", "acceleration"))
     names = [name for name in (*moved, "contact_force", "crank_moment") if name in shown]
     figure, axes = style.grid(len(names), 1, 28.0 * len(names), sharex=True)
     for panel, name in zip(axes[:, 0], names, strict=True):
-        word = "torque of\nthe drive" if name == "crank_moment" else name.replace("_", "\n")
+        word = "torque of the drive" if name == "crank_moment" else name.replace("_", " ")
         unit = labels.of(shown[name])
         if "joint" in shown[name].dims:
-            _joints(panel, shown, name, unit)
-            panel.set_ylim(top=1.35 * panel.get_ylim()[1])
-            panel.legend(loc="upper right", ncols=2, borderaxespad=0.1)
+            for row, (joint, label) in enumerate(motion.joints(shown).items()):
+                force, width = unit(shown[name].sel(joint=joint)), max(0.8 - 0.2 * row, 0.4)
+                look: style.Look = {"color": style.colour(row), "lw": width}  # later ones on top
+                panel.plot(motion.turns(shown), force, label=label, **look)
+            style.key(panel, "above", borderaxespad=0.1)
         else:
-            panel.plot(motion.turns(shown), unit(shown[name]), color=style.PALETTE["blue"])
+            panel.plot(motion.turns(shown), unit(shown[name]), color=style.colour("blue"))
         panel.set_ylabel(unit.label(word))
     axes[-1, 0].set_xlabel(motion.turns_label(shown))
     figure.align_ylabels()
@@ -48,7 +43,7 @@ def penetration_figure(response: Results) -> "style.Figure":
     figure, axes = style.grid(len(joints), 1, 40.0 * len(joints), sharex=True, sharey=True)
     unit = labels.of(shown["penetration"])
     for row, (panel, joint) in enumerate(zip(axes[:, 0], joints, strict=True)):
-        colour = style.CYCLE[row % 7]
+        colour = style.colour(row)
         depth = unit(shown["penetration"].sel(joint=joint))
         panel.fill_between(motion.turns(shown), depth, color=colour, alpha=0.35, lw=0.0)
         panel.plot(motion.turns(shown), depth, color=colour, lw=0.7)
@@ -80,10 +75,10 @@ def energy_figure(response: Results) -> "style.Figure":
             panel.plot(turn, unit(response[name]), lw=0.8, label=label, **look)
         panel.set_ylabel(unit.label(f"energy {kind}"))
         if present:  # a response that failed at once has none
-            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0, ncols=3)
+            style.key(panel, "above", borderaxespad=0.1)
     residual = abs(response["energy_residual"].to_numpy())
     unit = labels.scale("J", residual)
-    axes[2, 0].plot(turn, residual * unit.factor, color=style.PALETTE["black"], lw=0.7)
+    axes[2, 0].plot(turn, residual * unit.factor, color=style.colour("ink"), lw=0.7)
     if (residual > 0.0).any():
         axes[2, 0].set_yscale("log")
         axes[2, 0].set_ylim(bottom=1e-5 * unit.factor * residual.max())

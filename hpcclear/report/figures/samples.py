@@ -30,49 +30,38 @@ def samples_figure(samples: Results) -> "style.Figure":
     main = variables[0] if main is None else main
     others = [v for v in variables if v.name != main.name]
     rows = (len(others) + 1) // 2
-    figure = style.page(70.0 + (34.0 * rows + 12.0 if others else 0.0))
-    figure.suptitle(_title(samples), x=0.02, ha="left")
-    heights = [2.2] + [1.0] * rows + [0.07] * bool(others)
-    cells = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    unit = labels.of(samples["objective"])
-    top = cells[0].subgridspec(2, 2, width_ratios=[3, 1], height_ratios=[2, 1])
-    first = _first_rows(figure, top, samples, main)
-    for i, variable in enumerate(others):
-        if i % 2 == 0:
-            row = cells[1 + i // 2].subgridspec(1, 2)
-        panel = figure.add_subplot(row[i % 2], sharey=first)
-        drawn = _cloud(panel, variable, samples["objective"], _values(main))
-        panel.tick_params(labelleft=i % 2 == 0)
-        panel.set(
-            xlabel=labels.of(variable).label(labels.axis(variable)),
-            ylabel=unit.label("$f$") if i % 2 == 0 else "",
-        )
+    height = 82.0 + (34.0 * rows + 6.0 if others else 0.0)
+    places = [*(v.name for v in others), *["."] * (len(others) % 2)]
+    pairs = [[a, a, b, b] for a, b in zip(places[::2], places[1::2], strict=True)]
+    cells = [["f", "f", "f", "histogram"], ["spread", "spread", "spread", "."], *pairs]
+    figure, axes = style.mosaic(cells, height, height_ratios=[1.5, 0.7, *[1.0] * rows])
+    if figure.get_layout_engine() is not None:
+        figure.suptitle(_title(samples), x=0.02, ha="left", wrap=True)
+    first, unit = axes["f"], labels.of(samples["objective"])
+    drawn = _cloud(first, main, samples["objective"], main)
+    first.set_ylabel(unit.label("objective $f$"))
+    first.set_xlabel(labels.of(main).label(labels.axis(main)))
+    f = unit(samples["objective"])
+    look: style.Look = {"color": style.colour("blue"), "alpha": 0.75}
+    axes["histogram"].hist(f[np.isfinite(f)], bins=24, orientation="horizontal", **look)
+    axes["histogram"].set_xlabel("samples (–)")
+    _spread(axes["spread"], samples, main)
+    for number, variable in enumerate(others):
+        panel = axes[variable.name]
+        _cloud(panel, variable, samples["objective"], main)
+        panel.set_xlabel(labels.of(variable).label(labels.axis(variable)))
+        panel.set_ylabel(unit.label("$f$") if number % 2 == 0 else "")
+    for number, name in enumerate(("histogram", *(v.name for v in others))):
+        axes[name].sharey(first)
+        axes[name].tick_params(labelleft=number % 2 == 1)
+    style.legend(figure, first, "lower")
     if others:
-        bar = figure.colorbar(drawn, cax=figure.add_subplot(cells[-1]), orientation="horizontal")
-        bar.set_label("colour of the points: " + labels.of(main).label(labels.axis(main)))
+        words = "colour of the points: " + labels.of(main).label(labels.axis(main))
+        bar = figure.colorbar(drawn, ax=list(axes.values()), location="bottom", aspect=50, pad=0.02)
+        bar.set_label(words)
+        if names := labels.options(main):
+            bar.set_ticks(range(len(names)), labels=names)
     return figure
-
-
-def _first_rows(
-    figure: "style.Figure", cells: Any, samples: Results, main: Variable
-) -> "style.Axes":
-    """Objective against clearance and its histogram, the spread below, and what the marks mean; the first axes."""
-    first = figure.add_subplot(cells[0, 0])
-    _cloud(first, main, samples["objective"], _values(main))
-    first.set_ylabel(labels.of(samples["objective"]).label("objective $f$"))
-    first.tick_params(labelbottom=False)
-    side = figure.add_subplot(cells[0, 1], sharey=first)
-    f = _values(samples["objective"])
-    look: style.Look = {"color": style.PALETTE["blue"], "alpha": 0.75}
-    side.hist(f[np.isfinite(f)], bins=24, orientation="horizontal", **look)
-    side.set_xlabel("samples (–)")
-    side.tick_params(labelleft=False)
-    below = figure.add_subplot(cells[1, 0], sharex=first)
-    _spread(below, samples, main)
-    corner = figure.add_subplot(cells[1, 1])
-    corner.set_axis_off()
-    corner.legend(handles=_marks(samples), loc="lower center", handletextpad=0.4, borderpad=0.0)
-    return first
 
 
 def _spread(below: "style.Axes", samples: Results, main: Variable) -> None:
@@ -84,33 +73,36 @@ def _spread(below: "style.Axes", samples: Results, main: Variable) -> None:
         below.set_yticks([])
         words = "cycle-to-cycle variation\nnot available for this objective"
         middle: style.Look = {"ha": "center", "va": "center", "xycoords": "axes fraction"}
-        below.annotate(words, (0.5, 0.5), fontsize=style.SMALL, **middle)
+        below.annotate(words, (0.5, 0.5), **middle)
         return
-    _cloud(below, main, spread, _values(main))
+    _cloud(below, main, spread, main)
     below.set_ylabel(labels.of(spread).label("std. dev. in time"))
     positive = values[values > 0.0]
     if positive.size and positive.max() > 30.0 * positive.min():
         below.set_yscale("log")
 
 
-def _values(variable: Variable) -> Array:
-    return labels.of(variable)(variable)
-
-
-def _cloud(axes: "style.Axes", variable: Variable, result: Variable, colour: Array) -> Any:
-    """Points, their median in bins, and crosses at the foot where the simulation failed."""
-    x, y = _values(variable), _values(result)
+def _cloud(axes: "style.Axes", variable: Variable, result: Variable, shade: Variable) -> Any:
+    """Points in the colours of a variable, their median in bins, and crosses at the foot where the simulation failed."""
+    x, y, colour = (labels.of(one)(one) for one in (variable, result, shade))
     good = np.isfinite(y)
     size = float(np.clip(2000.0 / max(len(x), 1), 0.5, 6.0))
-    look: style.Look = {"s": size, "cmap": style.COLOURS, "linewidths": 0, "zorder": 2}
+    look: style.Look = {"s": size, "linewidths": 0, "zorder": 2, "label": "sample"}
+    if names := labels.options(shade):
+        look["cmap"], look["norm"] = style.categories(len(names))
     drawn = axes.scatter(x[good], y[good], c=colour[good], rasterized=len(x) > 2000, **look)
-    if np.isfinite(colour).any():
+    if np.isfinite(colour).any() and not names:
         drawn.set_clim(np.nanmin(colour), np.nanmax(colour))
     centre, middle = binned(x[good], y[good])
-    axes.plot(centre, middle, color="white", lw=2.4, zorder=3)
-    axes.plot(centre, middle, color=style.PALETTE["vermilion"], lw=1.2, zorder=4)
-    foot = np.full(int((~good).sum()), 0.04)
-    axes.plot(x[~good], foot, "kx", ms=4, transform=axes.get_xaxis_transform(), zorder=5)
+    axes.plot(centre, middle, color=style.colour("paper"), lw=2.4, zorder=3)
+    if len(centre):
+        axes.plot(centre, middle, color=style.colour("vermilion"), lw=1.2, zorder=4, label="median")
+    foot, ink = np.full(int((~good).sum()), 0.04), style.colour("ink")
+    if len(foot):
+        mark: style.Look = {"ls": "none", "marker": "x", "color": ink, "ms": 4, "label": "failed"}
+        axes.plot(x[~good], foot, transform=axes.get_xaxis_transform(), zorder=5, **mark)
+    if names := labels.options(variable):
+        axes.set_xticks(range(len(names)), names)
     return drawn
 
 
@@ -133,19 +125,6 @@ def _title(samples: Results) -> str:
     failed = int(np.count_nonzero(samples["status"]))
     latched = int(samples["latched"].to_numpy().any(axis=1).sum()) if "latched" in samples else 0
     return f"{count} simulations: {failed} failed, {latched} with a joint always in contact"
-
-
-def _marks(samples: Results) -> list[Any]:
-    """Legend entries of what `_cloud` draws."""
-    from matplotlib.lines import Line2D
-
-    marks = [
-        Line2D([], [], color=style.PALETTE["green"], marker="o", ms=2.5, ls="none", label="sample"),
-        Line2D([], [], color=style.PALETTE["vermilion"], lw=1.2, label="median"),
-    ]
-    if samples["status"].to_numpy().any():
-        marks.append(Line2D([], [], color="black", marker="x", ms=4, ls="none", label="failed"))
-    return marks
 
 
 PARTS = (

@@ -1,92 +1,47 @@
-"""The look of every figure: one column of a journal wide, colours that survive colour blindness and grey print.
+"""What every figure is drawn with: its page and panels, one for each of several responses, legends, and files.
 
 Matplotlib is an extra and is imported when a figure is drawn, never with the package; figures are made without
-pyplot, so nothing is registered globally and nothing needs closing.
+pyplot, so nothing is registered globally and nothing needs closing. Colours and sizes are those of
+`hpcclear.report.figures.theme`, or what a user wants (`hpcclear.report.figures.printing`).
 """
 
-import contextlib
 import functools
 import inspect
 import io
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.extras import installing
+from hpcclear.report.figures import labels
+from hpcclear.report.figures.given import several, taken
+from hpcclear.report.figures.printing import Printing, renamed, wanted
+from hpcclear.report.figures.theme import CYCLE as CYCLE
+from hpcclear.report.figures.theme import MM, RC, WIDTH, matplotlib
+from hpcclear.report.figures.theme import NAMES as NAMES
+from hpcclear.report.figures.theme import NORMAL as NORMAL
+from hpcclear.report.figures.theme import PALETTE as PALETTE
+from hpcclear.report.figures.theme import SMALL as SMALL
+from hpcclear.report.figures.theme import Look as Look
+from hpcclear.report.figures.theme import categories as categories
+from hpcclear.report.figures.theme import colour as colour
+from hpcclear.report.figures.theme import look as look
 from hpcclear.results import files
 from hpcclear.results.content import Results
-
-Look = dict[str, Any]
-"""Options of a curve, as matplotlib calls them."""
 
 if TYPE_CHECKING:  # for all figures: no other module of this package names matplotlib's classes
     from matplotlib.axes import Axes as Axes
     from matplotlib.axis import Axis as Axis
     from matplotlib.figure import Figure as Figure
+    from matplotlib.legend import Legend
 
-WIDTH = 85.0
-"""Width of a figure, mm: one column, so that 7 pt in the file are 7 pt on the page."""
-
-SMALL, NORMAL = 7.0, 7.5  # pt; ticks and legends, axis labels and titles
-
-PALETTE = {
-    "blue": "#0072b2",
-    "vermilion": "#d55e00",
-    "green": "#009e73",
-    "purple": "#cc79a7",
-    "sky": "#56b4e9",
-    "orange": "#e69f00",
-    "black": "#000000",
-    "grey": "#767676",
-}
-"""Okabe and Ito's colours (without yellow, which is lost on white), distinguished by every eye."""
-
-CYCLE = tuple(PALETTE.values())[:7]
-DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
-"""Line styles in the order of `CYCLE`: a curve is never identified by its colour alone."""
-
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-COLOURS = "viridis"  # perceptually even, the same order in grey
-JOINT_NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
-"""Of the slider-crank's joints; those of a linkage have the names their users gave them."""
-
-RC: dict[str, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],  # comes with matplotlib: equal figures everywhere
-    "font.size": SMALL,
-    "axes.labelsize": NORMAL,
-    "axes.titlesize": NORMAL,
-    "axes.titlelocation": "left",
-    "figure.titlesize": NORMAL,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "legend.fontsize": SMALL,
-    "legend.title_fontsize": SMALL,
-    "legend.frameon": False,
-    "legend.handlelength": 1.8,
-    "axes.linewidth": 0.6,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.linewidth": 0.4,
-    "grid.color": "#dddddd",
-    "lines.linewidth": 0.9,
-    "lines.markersize": 3.0,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "svg.hashsalt": "hpcclear",  # equal figures, equal bytes
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-    "mathtext.fontset": "dejavusans",
-}
+    Panels = dict[tuple[int, str], Axes]
+    """Axes by the number of the column of results, and the name of the panel."""
 
 _STAMPS: dict[str, tuple[bytes, dict[str, str | None]]] = {
     "png": (b"Software\x00hpcclear", {"Software": "hpcclear"}),
@@ -96,78 +51,140 @@ _STAMPS: dict[str, tuple[bytes, dict[str, str | None]]] = {
 """By kind what distinguishes our figures from a user's, and the metadata that it stands in."""
 
 
-def matplotlib() -> Any:
-    """The matplotlib module.
-
-    Raises
-    ------
-    InputError
-        It is not installed; the message names the extra that brings it.
-    """
-    try:
-        import matplotlib as module
-    except ModuleNotFoundError:
-        reason = "figures are drawn with matplotlib, which is not installed"
-        raise InputError("matplotlib", None, reason, installing("analysis")) from None
-    return module
-
-
 _given: "ContextVar[list[Axes] | None]" = ContextVar("axes of a caller", default=None)
+_users: "WeakKeyDictionary[Figure, Printing]" = WeakKeyDictionary()
+"""What a figure was drawn with: some settings count when it is written."""
+
+
+@dataclass
+class _Columns:
+    """A page on which several results stand beside each other, each in the same panels."""
+
+    names: list[str]
+    here: int = 0
+    """Which of them is drawn."""
+    figure: "Figure | None" = None
+    panels: "Panels" = field(default_factory=dict)
+
+
+_columns: ContextVar[_Columns | None] = ContextVar("results beside each other", default=None)
 
 
 def drawn(function: "Callable[..., Figure]") -> "Callable[..., Figure]":
     """Draw a figure in this style, whatever the user's settings, and leave those alone.
 
-    Datasets of xarray, which a user gives, become results here. The function takes ``ax`` besides: axes of the caller, as many
-    as the figure has panels, from above to below and from left to right. It draws into them, and returns their figure.
+    Results are given as a dataset of xarray or as plain arrays by their names; an argument is called as the kind of its file.
+    Of several responses (a mapping by their names) a figure of one ``response`` has a column for each. The function takes
+    ``ax`` besides: axes of the caller, as many as the figure has panels, from above to below and from left to right. It draws
+    into them, and returns their figure.
     """
+    signature = inspect.signature(function)
 
     @functools.wraps(function)
     def styled(*args: object, ax: object = None, **kwargs: object) -> "Figure":
+        bound = signature.bind(*args, **kwargs).arguments
+        values = {name: taken(name, one) for name, one in bound.items()}
+        user = wanted.get()
         token = _given.set(None if ax is None else list(np.ravel(np.asarray(ax, dtype=object))))
+        default = matplotlib().rcParamsDefault
+        rc = {**default, **RC, **user.rc, "text.usetex": False, "backend": "agg"}
         try:
-            with matplotlib().rc_context({**matplotlib().rcParamsDefault, **RC, "backend": "agg"}):
-                named = {name: _results(one) for name, one in kwargs.items()}
-                figure = function(*map(_results, args), **named)
-                settle(_given.get() or figure.axes)
+            with matplotlib().rc_context(rc), labels.called() as paths:
+                every = several(values.get("response"))
+                figure = _beside(function, every, values) if every else function(**values)
+                panels = _given.get() or figure.axes
+                renamed(figure, panels, paths, user)
+                settle(panels)
+                if ax is None:
+                    _users[figure] = user
                 return figure
         finally:
             _given.reset(token)
 
-    signature = inspect.signature(function)
     given = inspect.Parameter("ax", inspect.Parameter.KEYWORD_ONLY, default=None)
     parameters = [*signature.parameters.values(), given]
     styled.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return styled
 
 
-def _results(given: Any) -> Any:
-    """What a figure is given, with results in place of datasets of xarray, also of those in a mapping or list."""
-    xarray = sys.modules.get("xarray")
-    if xarray is None:
-        return given
-    if isinstance(given, xarray.Dataset):
-        return Results.of(given)
-    if isinstance(given, Mapping):
-        return {name: _results(one) for name, one in given.items()}
-    return [_results(one) for one in given] if isinstance(given, list) else given
+def _beside(
+    function: "Callable[..., Figure]", every: Mapping[str, Results], values: Mapping[str, Any]
+) -> "Figure":
+    """A column for each of several responses, under its name."""
+    state = _Columns(list(every))
+    token = _columns.set(state)
+    try:
+        for state.here, (name, one) in enumerate(every.items()):
+            figure = function(**{**values, "response": one})
+            mine = [axes for (column, _), axes in state.panels.items() if column == state.here]
+            above = mine[0].get_title(), mine[0].get_title(loc="left")
+            mine[0].set_title("\n".join([labels.literal(name), *filter(None, above)]))
+            if state.here:
+                for panel in mine:
+                    panel.set_ylabel("")
+    finally:
+        _columns.reset(token)
+    return figure
 
 
-def page(height: float) -> "Figure":
-    """An empty figure of one column's width and `height` in mm; raises InputError where the caller gave axes."""
+def across() -> float:
+    """Width of a figure, or of a column of one, mm: of several columns twice as much, if nobody wants another."""
+    width: float = matplotlib().rcParams["figure.figsize"][0] / MM
+    count = len(beside.names) if (beside := _columns.get()) else 1
+    user = wanted.get()
+    if count > 1 and "figure.figsize" not in user.rc:
+        width *= 2.0
+    return width / count
+
+
+def page(height: float, width: float | None = None) -> "Figure":
+    """An empty figure of a height and a width in mm, by default a column's, or as a user wants it.
+
+    Raises
+    ------
+    InputError
+        The caller gave axes.
+    """
     matplotlib()
     if (given := _given.get()) is not None:
         reason = "this figure has a layout of its own"
         raise InputError("ax", len(given), reason, "Leave ax out")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    pads = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.02, hspace=0.02)
-    figure = Figure(figsize=(WIDTH / 25.4, height / 25.4), dpi=300, layout=pads)
+    from hpcclear.report.figures.layout import Fitting
+
+    if width is None or "figure.figsize" in wanted.get().rc:
+        width = across() * (len(beside.names) if (beside := _columns.get()) else 1)
+    size = (width * MM, (wanted.get().height or height) * MM)
+    figure = Figure(figsize=size, layout=Fitting())
+    FigureCanvasAgg(figure)
     return figure
 
 
-def grid(rows: int, columns: int, height: float, **options: object) -> "tuple[Figure, np.ndarray]":
+def mosaic(
+    cells: Sequence[Sequence[str]], height: float, **options: Any
+) -> "tuple[Figure, dict[str, Axes]]":
+    """A page of panels by their names (``"."`` is an empty place), or the caller's axes in the order of the names.
+
+    Raises
+    ------
+    InputError
+        If the caller gave another number of axes.
+    """
+
+    def make(figure: "Figure", count: int) -> "Panels":
+        empty = {f"{k} .": "." for k in range(count)}
+        keys = [[f"{k} {name}" for k in range(count) for name in row] for row in cells]
+        places: Any = [[empty.get(key, key) for key in row] for row in keys]
+        made: dict[str, Axes] = figure.subplot_mosaic(places, **options)
+        return {(k, name): made[f"{k} {name}"] for k in range(count) for name in names}
+
+    names = dict.fromkeys(name for row in cells for name in row if name != ".")
+    return _panels(list(names), height, make)
+
+
+def grid(rows: int, columns: int, height: float, **options: Any) -> "tuple[Figure, np.ndarray]":
     """A page of equal panels, or the caller's axes; axes of shape (rows, columns), options as for `Figure.subplots`.
 
     Raises
@@ -175,77 +192,124 @@ def grid(rows: int, columns: int, height: float, **options: object) -> "tuple[Fi
     InputError
         If the caller gave another number of axes.
     """
-    if (given := _given.get()) is not None:
-        if len(given) != rows * columns:
-            reason = f"this figure has {rows * columns} panels"
+
+    def make(figure: "Figure", count: int) -> "Panels":
+        shared = {"sharey": "row"} if count > 1 else {}
+        axes = figure.subplots(rows, columns * count, squeeze=False, **{**shared, **options})
+        return {
+            (at // columns, f"{row * columns + at % columns}"): one
+            for (row, at), one in np.ndenumerate(axes)
+        }
+
+    figure, panels = _panels([str(k) for k in range(rows * columns)], height, make)
+    axes = np.empty(rows * columns, dtype=object)
+    axes[:] = list(panels.values())
+    return figure, axes.reshape(rows, columns)
+
+
+def _panels(
+    names: list[str], height: float, make: "Callable[[Figure, int], Panels]"
+) -> "tuple[Figure, dict[str, Axes]]":
+    """The panels of the results that are drawn now: those of a page of all columns, or of the caller."""
+    beside = _columns.get() or _Columns([""])
+    if beside.figure is None:
+        keys = [(k, name) for name in names for k in range(len(beside.names))]
+        given = _given.get()
+        if given is None:
+            beside.figure = page(height)
+            beside.panels = make(beside.figure, len(beside.names))
+        elif len(given) == len(keys):
+            beside.figure = cast("Figure", given[0].figure)
+            beside.panels = dict(zip(keys, given, strict=True))
+        else:
+            reason = f"this figure has {len(keys)} panels"
             raise InputError("ax", len(given), reason, "Give as many axes, in an array or list")
-        figure: Any = given[0].figure
-        return figure, np.array(given, dtype=object).reshape(rows, columns)
-    figure = page(height)
-    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+    return beside.figure, {name: beside.panels[beside.here, name] for name in names}
 
 
 def settle(axes: "Sequence[Axes] | np.ndarray") -> None:
     """Fix tick sizes now (matplotlib makes ticks late, by then the style is gone) and thin them, by the size of each panel."""
+    settings = matplotlib().rcParams
     for axis in np.ravel(np.asarray(axes, dtype=object)):
         for one in (axis, *axis.child_axes):
-            one.tick_params(labelsize=SMALL, length=2.0, pad=2.0)
-            one.tick_params(which="minor", labelsize=SMALL)
+            for scale in "xy":
+                size = settings[f"{scale}tick.labelsize"]
+                one.tick_params(axis=scale, which="both", labelsize=size)
+                getattr(one, f"{scale}axis").get_offset_text().set_fontsize(size)
+            one.tick_params(length=2.0, pad=2.0)
         box = axis.get_position()
-        room = {"x": 7.0 * box.width, "y": box.height * axis.figure.get_figheight() * 25.4 / 6.0}
+        width, height = axis.figure.get_size_inches() / MM
+        room = {"x": 7.0 * box.width * width / WIDTH, "y": box.height * height / 6.0}
         for scale, ticks in room.items():
-            lines = getattr(axis, f"{scale}axis")
-            lines.get_offset_text().set_fontsize(SMALL)
-            if type(lines.get_major_locator()).__name__ == "AutoLocator":
-                axis.locator_params(axis=scale, nbins=int(np.clip(round(ticks), 3, 5)))
-
-
-def look(k: int) -> Look:
-    """Colour, line style and marker of curve k of several: no two of the first 49 have all three in common."""
-    at = k % len(CYCLE)
-    return {
-        "color": CYCLE[at],
-        "ls": DASHES[(at + k // len(CYCLE)) % len(DASHES)],
-        "marker": MARKERS[at],
-    }
+            if type(getattr(axis, f"{scale}axis").get_major_locator()).__name__ == "AutoLocator":
+                axis.locator_params(axis=scale, nbins=int(np.clip(round(ticks), 2, 5)))
 
 
 def legend(
-    figure: "Figure", panels: "Axes | Sequence[Axes]", place: str, ncols: int = 2, **options: Any
+    figure: "Figure", panels: "Axes | Sequence[Axes] | np.ndarray", place: str, **options: Any
 ) -> None:
-    """One legend for all panels, ``"upper"`` or ``"lower"``: what those given have, each word once."""
+    """One legend for all panels, ``"upper"`` or ``"lower"``, of as many columns as fit: each word once."""
     entries: dict[str, Any] = {}
+    if _columns.get() is not None:  # of the column before
+        for old in figure.legends:
+            entries |= {
+                one.get_text(): drawn
+                for one, drawn in zip(old.get_texts(), old.legend_handles, strict=True)
+            }
+            old.remove()
     for panel in np.ravel(np.asarray(panels, dtype=object)):
         entries |= {word: one for one, word in zip(*panel.get_legend_handles_labels(), strict=True)}
     where: Any = f"outside {place} center"
-    figure.legend([*entries.values()], [*entries], loc=where, ncols=ncols, **options)
+    make = functools.partial(figure.legend, [*entries.values()], [*entries], loc=where, **options)
+    _in_columns(make, len(entries), 0.98 * figure.bbox.width)
 
 
-@contextlib.contextmanager
-def _laid_out(figure: "Figure", dpi: int) -> Iterator[None]:
-    """The figure with its parts in place for so many dots, for which matplotlib would draw all of it once more."""
-    engine, dots = figure.get_layout_engine(), figure.get_dpi()
-    if engine is None:
-        yield
-        return
-    figure.set_dpi(dpi)
-    engine.execute(figure)
-    figure.set_layout_engine("none")
-    try:
-        yield
-    finally:
-        figure.set_layout_engine(engine)
-        figure.set_dpi(dots)
+def key(panel: "Axes", place: str = "best", **options: Any) -> None:
+    """The legend of one panel, of as many columns as fit its width; ``"above"`` is over its data, on the right."""
+    make = functools.partial(
+        panel.legend, loc={"above": "upper right"}.get(place, place), **options
+    )
+    made = _in_columns(make, len(panel.get_legend_handles_labels()[1]), panel.bbox.width)
+    if made is not None and place == "above":
+        share = min(1.2 * made.get_window_extent().height / panel.bbox.height, 0.7)
+        (low, high), top = panel.get_ylim(), panel.dataLim.y1
+        panel.set_ylim(top=max(high, low + (top - low) / (1.0 - share)))
+
+
+def _in_columns(make: "Callable[..., Legend]", most: int, room: float) -> "Legend | None":
+    """A legend of as many columns as fit into so many dots; None of nothing."""
+    for columns in range(most, 0, -1):
+        made = make(ncols=columns)
+        if columns == 1 or made.get_window_extent().width <= room:
+            return made
+        made.remove()
+    return None
 
 
 def render(figure: "Figure", kind: str = "png", dpi: int = 300) -> bytes:
-    """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes."""
-    buffer = io.BytesIO()
-    with (
-        matplotlib().rc_context(RC),
-        _laid_out(figure, dpi) if kind == "png" else contextlib.nullcontext(),
-    ):
-        figure.savefig(buffer, format=kind, dpi=dpi, metadata=_STAMPS[kind][1])
+    """The bytes of a figure as ``png``, ``svg`` or ``pdf``; equal figures give equal bytes.
+
+    Raises
+    ------
+    InputError
+        Its labels do not fit the size that a user wants.
+    """
+    buffer, user = io.BytesIO(), _users.get(figure, Printing())
+    engine, dots = figure.get_layout_engine(), figure.get_dpi()
+    with matplotlib().rc_context({**RC, **user.rc, "backend": "agg"}):
+        try:
+            figure.set_dpi(dpi)
+            if engine is not None:  # here, as matplotlib would draw all of it once more for it
+                if user.is_particular and hasattr(engine, "check"):
+                    engine.check(figure)
+                else:
+                    engine.execute(figure)
+                figure.set_layout_engine("none")
+            figure.savefig(buffer, format=kind, dpi=dpi, metadata=_STAMPS[kind][1])
+        finally:
+            if engine is not None:
+                figure.set_layout_engine(engine)
+            figure.set_dpi(dots)
     return buffer.getvalue()
 
 

@@ -1,6 +1,5 @@
 """Figures of sensitivities and surrogates (kinds ``sensitivity`` and ``kriging``)."""
 
-import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,12 +59,9 @@ def _sensitivity_panel(
             marks = {**look, "ls": "none", "ms": 2.6, "elinewidth": 0.7}
             axes.errorbar(clearance[where], y, yerr=2.0 * bar, **marks)
         row += 1
-    axes.axhline(0.0, color="black", lw=0.5)
+    axes.axhline(0.0, color=style.colour("ink"), lw=0.5)
     axes.margins(y=0.25)
-    columns = 3 if row > 4 else row
-    axes.legend(
-        loc="upper left", ncols=columns, handlelength=1.2, columnspacing=0.6, borderaxespad=0.0
-    )
+    style.key(axes, "upper left", handlelength=1.2, columnspacing=0.6, borderaxespad=0.0)
 
 
 @style.drawn
@@ -76,7 +72,9 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
     across = labels.of(sensitivity["clearance"])
     clearance = across(sensitivity["clearance"])
     intervals = sensitivity["interval"].to_numpy()
-    colours = style.matplotlib().colormaps[style.COLOURS](np.linspace(0.0, 0.9, len(intervals)))
+    colours = style.matplotlib().colormaps[style.matplotlib().rcParams["image.cmap"]](
+        np.linspace(0.0, 0.9, len(intervals))
+    )
     for line, surface in zip(axes, surfaces, strict=True):
         for panel, name, label in zip(line, ("r2", "rmae"), ("$R^2$ (–)", "RMAE (–)"), strict=True):
             for k, interval in enumerate(intervals):
@@ -89,13 +87,13 @@ def fit_figure(sensitivity: Results) -> "style.Figure":
         bottom = max(-0.25, min(lowest, 0.75)) - 0.02
         line[0].set_ylim(bottom, 1.03)
         if lowest < 0.0:
-            line[0].axhspan(bottom, 0.0, color=style.PALETTE["vermilion"], alpha=0.15, lw=0.0)
+            line[0].axhspan(bottom, 0.0, color=style.colour("vermilion"), alpha=0.15, lw=0.0)
             fits.mark(line[0], lowest, 0.3)
         line[1].set_ylim(0.0, min(2.0, line[1].get_ylim()[1]))
     for panel in axes[-1]:
         panel.set_xlabel(across.label(_held(sensitivity)))
     title = "length of the interval, share of the whole"
-    style.legend(figure, axes[0, 0], "lower", ncols=3, title=title, columnspacing=1.0)
+    style.legend(figure, axes[0, 0], "lower", title=title, columnspacing=1.0)
     return figure
 
 
@@ -121,11 +119,11 @@ def sobol_figure(sensitivity: Results) -> "style.Figure":
     for kind, label, colour, shift in kinds:
         index, name = sensitivity[f"sobol_{kind}"].to_numpy()[order], f"sobol_{kind}_error"
         error = 2.0 * sensitivity[name].to_numpy()[order] if name in sensitivity else None
-        look: style.Look = {"color": style.PALETTE[colour], "label": label, "error_kw": {"lw": 0.7}}
+        look: style.Look = {"color": style.colour(colour), "label": label, "error_kw": {"lw": 0.7}}
         panel.barh(rows + shift, index, 0.36, xerr=error, **look)
     panel.set_yticks(rows, [symbol(names[k]) for k in order])
     panel.set(xlabel="share of the variance of $f$ (–)", ylabel="design variable (name)")
-    panel.legend(loc="lower right")
+    style.key(panel, "lower right")
     panel.grid(axis="y", visible=False)
     return figure
 
@@ -168,9 +166,9 @@ def surfaces_figure(kriging: Results) -> "style.Figure":
         scales = [labels.scale(str(v.attrs["units"]), e) for v, e in ((first, x), (second, y))]
         for k, panel in enumerate(line):
             grid = (scales[0](x), scales[1](y), unit(z[k].T))
-            drawn = panel.contourf(*grid, levels=edges, cmap=style.COLOURS)
+            drawn = panel.contourf(*grid, levels=edges)
             lines = panel.contour(*grid, levels=4, colors="white", linewidths=0.5)
-            panel.clabel(lines, fontsize=style.SMALL, fmt="%.3g")
+            panel.clabel(lines, fmt="%.3g")
             panel.set_xlabel(scales[0].label(labels.axis(first)))
             panel.tick_params(labelleft=k == 0)
             panel.set_title(f"$C$ = {clearances[k] * across.factor:.3g} {across.unit}")
@@ -220,7 +218,7 @@ def parity_figure(kriging: Results) -> "style.Figure":
     ranges = [axes[0, 0].get_xlim(), axes[0, 0].get_ylim()]  # the same for all
     ends = (min(ranges)[0], max(high for _, high in ranges))
     for panel in axes.flat:
-        panel.plot(ends, ends, "k-", lw=0.5, zorder=0)
+        panel.plot(ends, ends, color=style.colour("ink"), lw=0.5, zorder=0)
         panel.set(xlim=ends, ylim=ends, aspect="equal")
     for panel in axes[:, 0]:
         panel.set_ylabel(unit.label("$f$ by the surrogate"))
@@ -231,9 +229,7 @@ def parity_figure(kriging: Results) -> "style.Figure":
 def _held(sensitivity: Results) -> str:
     """What is held fixed for each surface: the clearance, unless a study says otherwise."""
     words = labels.words(sensitivity["clearance"])
-    if words == "radial clearance":
-        return "clearance $C$"
-    return "\n".join(textwrap.wrap(labels.literal(words), 20))  # half a column holds no more
+    return "clearance $C$" if words == "radial clearance" else labels.literal(words)
 
 
 def _surface(name: str) -> str:

@@ -20,7 +20,7 @@ def timing_figure(timing: Results) -> "style.Figure":
         left = np.zeros(len(names))
         for name, label, colour in parts:
             spent = timing[name].to_numpy().sum(over)
-            look: style.Look = {"left": left, "color": style.PALETTE[colour], "label": label}
+            look: style.Look = {"left": left, "color": style.colour(colour), "label": label}
             panel.barh(np.arange(len(names)), spent, 0.7, **look)
             left += spent
         if len(names) <= 64:
@@ -29,7 +29,7 @@ def timing_figure(timing: Results) -> "style.Figure":
         panel.grid(axis="y", visible=False)
         across = "time (s)" if along == "rank" else "time of all ranks (s)"
         panel.set(xlabel=across, ylabel=f"{along} (–)")
-    style.legend(figure, axes[0, 0], "lower", ncols=4, columnspacing=1.0)
+    style.legend(figure, axes[0, 0], "lower", columnspacing=1.0)
     return figure
 
 

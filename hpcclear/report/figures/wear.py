@@ -17,21 +17,21 @@ def fan_figure(wear: Results) -> "style.Figure":
     cycles = wear["cycle"].to_numpy()
     rows = [(wear, "objective", "objective $f$")]
     rows[:0] = [(wear.sel(joint=name), "clearance", f"clearance, {name}") for name in joints]
-    blue = style.PALETTE["blue"]
+    blue = style.colour("blue")
     for panel, (own, name, words) in zip(axes[:, 0], rows, strict=True):
         each, levels = own[name], own[f"{name}_quantile"]
         scale = labels.of(each)
-        panel.plot(cycles, scale(each)[:40].T, color=style.PALETTE["grey"], lw=0.4, alpha=0.5)
+        panel.plot(cycles, scale(each)[:40].T, color=style.colour("grey"), lw=0.4, alpha=0.5)
         value = scale(np.where(np.isfinite(levels), levels, np.nan))
         for low, high, alpha in ((0, 4, 0.2), (1, 3, 0.35)):
             panel.fill_between(cycles, value[low], value[high], color=blue, alpha=alpha, lw=0)
         panel.plot(cycles, value[2], color=blue, label="median, 50 and 90 % of service lives")
         limit = wear.attrs.get(f"limit_{name}")
         if limit is not None:
-            look: style.Look = {"color": style.PALETTE["orange"], "ls": "--", "label": "limit"}
+            look: style.Look = {"color": style.colour("orange"), "ls": "--", "label": "limit"}
             panel.axhline(scale.factor * float(limit), **look)
         panel.set_ylabel(scale.label(words))
-        panel.legend(loc="upper left")
+        style.key(panel, "upper left")
     axes[-1, 0].set_xlabel(_revolutions(wear))
     return figure
 
@@ -51,11 +51,11 @@ def survival_figure(wear: Results) -> "style.Figure":
     figure, axes = style.grid(1, 1, 70.0)
     panel, cycles = axes[0, 0], wear["cycle"].to_numpy()
     lower, upper = wear["survival_lower"].to_numpy(), wear["survival_upper"].to_numpy()
-    blue = style.PALETTE["blue"]
+    blue = style.colour("blue")
     panel.fill_between(cycles, lower, upper, color=blue, alpha=0.25, lw=0, label="95 % CI")
     panel.plot(cycles, wear["survival"].to_numpy(), color=blue, label="survival")
     panel.set(xlabel=_revolutions(wear), ylabel="survival (–)", ylim=(-0.02, 1.02))
-    panel.legend(loc="lower left")
+    style.key(panel, "lower left")
     return figure
 
 
@@ -102,7 +102,7 @@ def profile_figure(wear: Results) -> "style.Figure":
         for shade, age in zip(np.linspace(0.3, 1.0, len(ages)), ages, strict=True):
             value = scale(depths.isel(cycle=age))
             look = {
-                "color": style.PALETTE["blue"],
+                "color": style.colour("blue"),
                 "alpha": shade,
                 "label": f"{float(wear['cycle'][age]):.3g}",
             }
@@ -111,7 +111,7 @@ def profile_figure(wear: Results) -> "style.Figure":
         panel.set_rmin(0.0)
         panel.set_rlabel_position(60.0)
     if panels:
-        style.legend(figure, axes[0, 0], "lower", title="revolutions", ncols=AGES)
+        style.legend(figure, axes[0, 0], "lower", title="revolutions")
     return figure
 
 

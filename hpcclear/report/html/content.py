@@ -80,7 +80,8 @@ def read(*places: str | Path) -> Content:
             own = several.setdefault(str(path.with_suffix("")).removesuffix(".timing"), {})
             own[kind] = one
         if kind == "response":
-            responses[str(one.attrs.get("design", path.stem))] = one
+            name = str(one.attrs.get("design", path.stem))
+            responses[str(path.with_suffix("")) if name in responses else name] = one
         elif kind == "timing" and kind in files:
             continue  # of another result beside the first
         elif kind in files and (not whole or path.stem != kind):

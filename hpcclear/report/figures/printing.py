@@ -1,0 +1,202 @@
+"""Figures for print: size, fonts, colours and labels that a user wants."""
+
+import logging
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hpcclear.base.errors import InputError, nearest
+from hpcclear.base.units import UnitError, to_si
+from hpcclear.report.figures import theme as colours
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+SMALLEST, LARGEST = 20.0, 1000.0  # mm
+
+_UNIT = re.compile(r"(.*?)(?:\s(\([^()]*\)))?", re.DOTALL)
+"""Words of a label, and its unit."""
+
+
+@dataclass(frozen=True)
+class Printing:
+    """What a user wants of figures; nothing of what is empty."""
+
+    rc: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of matplotlib."""
+    height: float | None = None
+    """mm."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """What to write for a label, by what it is called (see `renamed`)."""
+    names: set[str] = field(default_factory=set)
+    """What labels of the figures that were drawn are called."""
+    used: set[str] = field(default_factory=set)
+    """Those that a text of the user stands for."""
+
+    @property
+    def is_particular(self) -> bool:
+        """Whether anything is not as usual, so that labels may not fit."""
+        return bool(self.rc or self.height or self.texts)
+
+
+_USUAL = Printing()
+wanted: ContextVar[Printing] = ContextVar("what a user wants of figures", default=_USUAL)
+
+
+@contextmanager
+def printing(
+    size: str = "",
+    font: str = "",
+    sheet: str | Path | None = None,
+    theme: str = "light",
+    texts: Mapping[str, str] | None = None,
+) -> Iterator[None]:
+    """Draw figures within it as a journal or a talk wants them; they can be saved within it or later.
+
+    Parameters
+    ----------
+    size : str
+        Width, ``"85mm"``, or width and height, ``"85mm x 60mm"``.
+    font : str
+        Name of an installed font.
+    sheet : path, optional
+        Style sheet of matplotlib; `size`, `font` and `theme` go before it.
+    theme : str
+        ``"light"`` or ``"dark"``.
+    texts : mapping of str to str, optional
+        What to write for a label, by the entry of the scene that it shows, the variable, or its words without the unit.
+
+    Raises
+    ------
+    InputError
+        No such size, font or style sheet; or no figure that was drawn has a label of that name.
+    """
+    rc: dict[str, Any] = {} if sheet is None else _sheet(Path(sheet))
+    if theme != "light":
+        if theme not in colours.THEMES:
+            raise InputError(
+                "--theme", theme, "there is no such theme", nearest(theme, list(colours.THEMES))
+            )
+        rc |= colours.THEMES[theme]
+    width, height = _size(size) if size else (None, None)
+    if width is not None:
+        rc["figure.figsize"] = (width * colours.MM, 60.0 * colours.MM)
+    if font:
+        rc |= _font(font)
+    user = Printing(rc, height, dict(texts or {}))
+    token = wanted.set(user)
+    try:
+        yield
+    finally:
+        wanted.reset(token)
+    for name in user.texts:
+        if name not in user.used:
+            reason = "no axis of these figures is called so"
+            raise InputError("--label", name, reason, nearest(name, sorted(user.names)))
+
+
+def _size(text: str) -> tuple[float, float | None]:
+    """Width and height of a figure, mm."""
+    remedy = 'Give a width, "85mm", or width and height, "85mm x 60mm"'
+    try:
+        sides = [1e3 * to_si(side.strip(), "m") for side in re.split(r"\s*[x×]\s*", text)]
+    except UnitError as error:
+        raise InputError("--size", text, f"it is no length: {error.reason}", remedy) from None
+    if len(sides) > 2 or not all(SMALLEST <= side <= LARGEST for side in sides):
+        reason = f"width and height of a figure are {SMALLEST:g} to {LARGEST:g} mm"
+        raise InputError("--size", text, reason, remedy)
+    return sides[0], sides[1] if len(sides) > 1 else None
+
+
+def _sheet(place: Path) -> dict[str, Any]:
+    """The settings of a style sheet; raises InputError where there is none, or it has lines that matplotlib does not know."""
+    if not place.is_file():
+        raise InputError(
+            "--style", str(place), "there is no such file", "Give a style sheet of matplotlib"
+        )
+    lines: list[str] = []
+    log, listener = logging.getLogger("matplotlib"), logging.Handler(logging.WARNING)
+    listener.emit = lambda record: lines.append(" ".join(record.getMessage().split()))  # type: ignore[method-assign]
+    log.addHandler(listener)
+    log.propagate = False
+    try:
+        found = dict(
+            colours.matplotlib().rc_params_from_file(str(place), use_default_template=False)
+        )
+    except (OSError, UnicodeError) as error:
+        lines.append(str(error))
+    finally:
+        log.removeHandler(listener)
+        log.propagate = True
+    if lines:
+        reason = f"matplotlib cannot read it: {lines[0]}"
+        raise InputError("--style", str(place), reason, "Mend that line, or remove it")
+    return found
+
+
+def _font(name: str) -> dict[str, Any]:
+    """Settings of a font, for words and formulas; raises InputError where it is not installed."""
+    from matplotlib.font_manager import FontProperties, fontManager
+
+    try:
+        fontManager.findfont(FontProperties(family=[name]), fallback_to_default=False)
+    except ValueError:
+        remedy = nearest(name, fontManager.get_font_names())
+        raise InputError("--font", name, "this font is not installed", remedy) from None
+    own = {"mathtext.rm": name, "mathtext.it": f"{name}:italic", "mathtext.bf": f"{name}:bold"}
+    return {"font.family": [name, "DejaVu Sans"], "mathtext.fontset": "custom", **own}
+
+
+def _plain(words: str) -> str:
+    """What a label is found by: its words, without differences of case, line or underscore."""
+    return " ".join(words.replace("\\$", "$").replace("_", " ").lower().split())
+
+
+def renamed(
+    figure: "Figure", panels: "Sequence[Axes]", paths: Mapping[str, str], user: Printing
+) -> None:
+    """Write a user's texts in place of labels, with the same units: of axes, their categories, legends and titles.
+
+    Each is found by its words, or by the entry of the scene that it names (`paths`, by the words).
+    """
+    by_name = {_plain(name): (name, text) for name, text in user.texts.items()}
+    known = {_plain(words): path for words, path in paths.items()}
+
+    def changed(before: str) -> str:
+        words, unit = _UNIT.fullmatch(before.strip()).groups()  # type: ignore[union-attr]
+        names = {words, known.get(_plain(words), words)}
+        user.names.update(names - {""})
+        for name in names & {""} ^ names:
+            if found := by_name.get(_plain(name)):
+                user.used.add(found[0])
+                return found[1] + (f" {unit}" if unit and not found[1].endswith(")") else "")
+        return before
+
+    for text in _texts(figure, panels) if by_name else ():
+        text.set_text(changed(text.get_text()))
+    for axis in (
+        [axis for panel in panels for axis in (panel.xaxis, panel.yaxis)] if by_name else ()
+    ):
+        if type(axis.get_major_locator()).__name__ == "FixedLocator":
+            axis.set_ticklabels([changed(one.get_text()) for one in axis.get_ticklabels()])
+
+
+def _texts(figure: "Figure", panels: "Sequence[Axes]") -> "Iterator[Text]":
+    """Labels, titles and legends."""
+    for panel in panels:
+        yield from (panel.xaxis.label, panel.yaxis.label, *titles(panel).values())
+        yield from (child.xaxis.label for child in panel.child_axes)
+    for legend in (*figure.legends, *(one for panel in panels if (one := panel.get_legend()))):
+        yield from legend.get_texts()
+
+
+def titles(axes: "Axes") -> "dict[str, Text]":
+    """The titles of a panel by their places."""
+    private: Any = axes
+    return {"left": private._left_title, "center": axes.title}
