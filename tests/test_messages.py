@@ -71,3 +71,61 @@ main(["show", "schema"])
     assert done.returncode == 0
     assert "NaN" in done.stdout
     assert done.stderr == ""
+
+
+SLIPS = {
+    "{key} = {number}": ("comma", "{key} = {point}"),
+    "{key} = {number} mm": ("comma", '{key} = "{point} mm"'),
+    '{key} = "{point} mm': ("quotation", '{key} = "{point} mm"'),
+    '{key} = {point} mm"': ("quotation", '{key} = "{point} mm"'),
+    "{key} = '{point} mm": ("quotation", '{key} = "{point} mm"'),
+    "{key} = {point} mm": ("quotation", '{key} = "{point} mm"'),
+    "{key} = {point} mm  # radial": ("quotation", '{key} = "{point} mm"  # radial'),
+    "{key} = \u201c{point} mm\u201d": ("typographic", '{key} = "{point} mm"'),
+    "{key} = \u00ab{point} mm\u00bb": ("typographic", '{key} = "{point} mm"'),
+    "{key} =\u00a0{point}": ("spaces", "{key} = {point}"),
+    "{key}\t{point}": ("no = after", "{key} = {point}"),
+    '{key} "{point} mm"': ("no = after", '{key} = "{point} mm"'),
+    "{key}: {point} mm": ("no = after", '{key} = "{point} mm"'),
+    "{key}\t{number}\tmm": ("comma", '{key} = "{point}\tmm"'),
+    "{key} = [{point}, {point}": ("bracket", "{key} = [{point}, {point}]"),
+    '{key} = ["{point} mm", {point} mm]': ("quotation", '{key} = ["{point} mm", "{point} mm"]'),
+    "{key} = [{number} mm, {number} mm]": ("quotation", '{key} = ["{point} mm", "{point} mm"]'),
+    "{key} = {{ a = {number}, b = 1 }}": ("comma", "{key} = {{ a = {point}, b = 1 }}"),
+    "{key} = {point};": ("after the value", "{key} = {point}"),
+    "{key} =": ("no value", "{key} = value"),
+    "{key} = 1\n{key} = 2": ("twice, first in line", "Keep one"),
+    "[other": ("bracket", "[other]"),
+    "other]": ("bracket", "[other]"),
+    "[drive]": ("drive twice, first in line 2", "Keep one"),
+    "{key} = [\n  1,\n": ("bracket", "Close it"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key", ["clearance", "rod.mass_center"])
+@pytest.mark.parametrize(("point", "number"), [("0.3", "0,3"), ("-12.25", "-12,25")])
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_slip_of_writing_is_answered_by_the_line_that_is_meant(
+    tmp_path, slip, key, point, number
+):
+    """Line, what was read, what is wrong with it, and what to write, wherever the line stands."""
+    wrong, meant = SLIPS[slip]
+    words = {"key": key, "point": point, "number": number}
+    written = slip.format(**words)
+    for before, after in (
+        ("", ""),
+        ('[drive]\nkind = "torque"\n', '\n[effects]\ngravity = "1 g"\n'),
+    ):
+        file = tmp_path / "scene.toml"
+        file.write_text(f"# a machine\n{before}{written}{after}", encoding="utf-8")
+        if slip == "[drive]" and not before:
+            continue
+        with pytest.raises(InputError) as caught:
+            load_scene(file)
+        error = caught.value
+        assert error.key == "scene file"
+        line = 2 + before.count("\n") + ("\n{key}" in slip)
+        read = written.splitlines()["\n{key}" in slip].strip()
+        assert error.reason.startswith(f"line {line}, {read!r}, "), error.reason
+        assert wrong in error.reason
+        assert meant.format(**words) in error.remedy

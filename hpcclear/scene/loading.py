@@ -16,6 +16,7 @@ from hpcclear.scene.fitted import entry_replaced
 from hpcclear.scene.paths import flatten
 from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene
+from hpcclear.scene.syntax import fault
 from hpcclear.scene.tables import plain
 from hpcclear.scene.validation import DEEPEST, dotted, scene_of
 
@@ -174,7 +175,7 @@ def parse(text: str, name: str) -> dict[str, object]:
     InputError
         If it is none, is longer than a scene may be, or nested so deeply that nothing could read it.
     """
-    remedy, where = "Correct the TOML syntax there", ("scene file", name)
+    where = "scene file", name
     if len(text) > LARGEST_FILE:
         raise InputError(*where, f"is larger than {LARGEST_FILE} bytes", _SHORTER)
     if _DOTTED.search(text):
@@ -184,7 +185,7 @@ def parse(text: str, name: str) -> dict[str, object]:
     except RecursionError:
         raise InputError(*where, "is nested too deeply", f"Nest at most {DEEPEST} levels") from None
     except ValueError as error:
-        raise InputError(*where, f"is not valid TOML: {error}", remedy) from None
+        raise InputError(*where, *fault(text.replace("\r\n", "\n"), error)) from None
 
 
 def _override(text: str) -> tuple[str, object]:
