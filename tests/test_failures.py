@@ -12,7 +12,7 @@ from hpcclear.base.outcome import OUTCOME, Status
 from hpcclear.cli import cli
 from hpcclear.cli.corners import lines
 from hpcclear.cli.plan import preview
-from hpcclear.ensemble import corners as trying
+from hpcclear.dynamics import evaluation
 from hpcclear.ensemble.corners import MOST, corners, tried
 from hpcclear.ranks.boundary import alone
 from hpcclear.report.answer import answer
@@ -168,7 +168,7 @@ def test_corners_that_fail_say_by_which_status_and_where(monkeypatch):
         records["status"] = np.where(points.values[:, 0] > 0.05, int(Status.STALLED), 0)
         return records
 
-    monkeypatch.setattr(trying, "evaluate_records", outcomes)
+    monkeypatch.setattr(evaluation, "evaluate_records", outcomes)
     found = tried(crank_and_rod(), simulate=True)
     assert seen[0].transient_revolutions + seen[0].averaged_revolutions == 2
     told = dict(lines(found, simulate=True))

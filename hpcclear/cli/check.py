@@ -10,8 +10,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed, place_of, show
-from hpcclear.cli.terminal import WIDTH, console, quantity, remark, table
-from hpcclear.dynamics.evaluation.steady.wording import in_a_line
+from hpcclear.cli.terminal import WIDTH, print_remark, quantity
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.scene import Scene
@@ -28,26 +27,27 @@ MOST_WARNINGS = 3
 def show_rows(title: str, rows: list[tuple[str, str]]) -> None:
     """Print what and its value in two columns, with ``--details`` under a title."""
     if detailed():
+        from hpcclear.cli.tables import console, table
+
         console().print(table(title, rows))
         return
     for label, text in rows:
         for k, line in enumerate(textwrap.wrap(text, WIDTH - 17) or [""]):
-            console().print(f"{'' if k else label:15}  {line}", soft_wrap=True)
+            show(f"{'' if k else label:15}  {line}")
 
 
 def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bool:
     """Print effects, states, warnings, the study, the MPI library, and the measured cost of a sample; return whether the
     scene's own design can turn."""
-    out = console()
     from hpcclear.dynamics import sizing
     from hpcclear.dynamics.setup.problem import coordinate_count, integrator_of, problem_of
 
     problem_of(scene)  # refuses what cannot be simulated
     locked = _locked(scene)
-    if scene.study is not None:
-        from hpcclear.study import lives  # loads the statistics: not for every command
+    if scene.study is not None and scene.study.worn:
+        from hpcclear.ensemble.wear import check_worn  # loads the kernel
 
-        lives.check(scene)
+        check_worn(scene)
     states = 2 * (coordinate_count(scene) - scene.bristles)
     bristles = f" + {scene.bristles} bristle deflections" if scene.bristles else ""
     open_joints = len(scene.contact_labels())
@@ -80,13 +80,13 @@ def describe_scene(scene: Scene, cost: bool, ranks: "Ranks | None" = None) -> bo
         ]
     show_rows("Model", rows)
     for text in (*files_run(scene.plugins), *scene.readings):
-        out.print(remark("Note", text))
+        print_remark("Note", text)
     warned = [*locked, *_cautions(scene), *scene.warnings]
     most = len(warned) if detailed() else MOST_WARNINGS
     for warning in warned[:most]:
-        out.print(remark("Warning", warning))
+        print_remark("Warning", warning)
     if len(warned) > most:
-        out.print(remark("Warning", f"{len(warned) - most} more (--details)"))
+        print_remark("Warning", f"{len(warned) - most} more (--details)")
     if scene.study is not None:
         show_rows("Study", _study_rows(scene))
     if cost and not locked:
@@ -249,6 +249,7 @@ def _cost_rows(scene: Scene) -> list[tuple[str, str]]:
     """Simulate the scene once in all lanes of an ensemble, after a run that compiles."""
     from hpcclear.dynamics.evaluation import evaluate_records
     from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
+    from hpcclear.dynamics.evaluation.steady.wording import in_a_line
     from hpcclear.scene.points import Points
 
     path = next(path for path in scene.numeric_paths() if path.endswith(".mass"))

@@ -7,7 +7,8 @@ from rich import box
 from rich.table import Table
 
 from hpcclear.accuracy.plan import Plan, Row
-from hpcclear.cli.terminal import console, counted, table
+from hpcclear.cli.tables import console, table
+from hpcclear.cli.terminal import counted
 from hpcclear.ranks.progress import duration
 
 RESERVE = 1.5

@@ -12,7 +12,8 @@ from rich.text import Text
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed
-from hpcclear.cli.terminal import WIDTH, console, fitting
+from hpcclear.cli.tables import console
+from hpcclear.cli.terminal import WIDTH, fitting
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Level, Screen
 from hpcclear.report.screens import screen_of

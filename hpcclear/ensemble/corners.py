@@ -6,8 +6,7 @@ import numpy as np
 
 from hpcclear.base.arrays import Array, Booleans
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.evaluation import evaluate_records
-from hpcclear.dynamics.planar.problem import poses_at_start, refused_of, scene_of
+from hpcclear.dynamics.planar.problem import moves_geometry, poses_at_start, refused_of, scene_of
 from hpcclear.scene import Scene
 from hpcclear.scene.domain import box, to_physical
 from hpcclear.scene.points import Points, check_points, expanded, snapped
@@ -64,14 +63,23 @@ def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
     """
     points = corners(scene)
     plain = scene.with_({"study": None})
-    refused = {
-        row: why
-        for row in range(len(points))
-        if (why := _refusal(plain, points.take(slice(row, row + 1))))
-    }
+    moving = [
+        any(moves_geometry(scene.path_in_linkage(path)) for path in paths) for paths in points.paths
+    ]
+    locked = dict[bytes, str]()  # by what decides whether a design can turn: most corners share it
+    refused = dict[int, str]()
+    for row, values in enumerate(points.values):
+        corner, geometry = points.take(slice(row, row + 1)), values[moving].tobytes()
+        why = _refusal(plain, corner)
+        if not why and geometry not in locked:
+            locked[geometry] = _obstacle(plain, corner)
+        if why := why or locked[geometry]:
+            refused[row] = why
     status = np.full(len(points), -1)
     good = np.array([row for row in range(len(points)) if row not in refused], int)
     if simulate and good.size:
+        from hpcclear.dynamics.evaluation import evaluate_records  # with all that compiles
+
         brief = {
             "transient_revolutions": 1, "averaged_revolutions": 1, "target_error": None,
             "max_steps": min(STEPS, scene.numerics.max_steps),
@@ -82,9 +90,17 @@ def tried(scene: Scene, simulate: bool) -> CornerOutcomes:
 
 
 def _refusal(scene: Scene, corner: Points) -> str:
-    """Why one corner (1 row) makes no mechanism, or one that cannot turn; "" if it does."""
+    """Why the numbers of one corner (1 row) make no mechanism; "" if they do."""
     try:
         check_points(scene, corner)
+    except InputError as error:
+        return f"{error.reason}. {error.remedy}"
+    return ""
+
+
+def _obstacle(scene: Scene, corner: Points) -> str:
+    """Why the mechanism of one corner does not close or cannot turn; "" if it can."""
+    try:
         one = scene_of(scene, corner, 0)
         poses_at_start(one)  # refuses one that does not close
         locked = refused_of(one)

@@ -40,7 +40,7 @@ def run(file: Path, measured: Path, output: Path | None, align: Any, names: tupl
 
     Example: hpcclear compare results/response.nc measured.csv -o results/overlay.pdf
     """
-    from hpcclear.cli.terminal import console, table
+    from hpcclear.cli.tables import console, table
     from hpcclear.report.compare import NOT_ALIGNED, compare
     from hpcclear.results import dataset
 

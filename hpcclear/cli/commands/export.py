@@ -74,7 +74,7 @@ def _print_rows(headings: list[str], rows: list[list[str]]) -> None:
     from rich import box
     from rich.table import Table
 
-    from hpcclear.cli.terminal import console
+    from hpcclear.cli.tables import console
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in headings:

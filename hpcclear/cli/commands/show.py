@@ -68,7 +68,7 @@ _OTHERS = {
 
 def _laws() -> None:
     from hpcclear import plugins
-    from hpcclear.cli.terminal import console, table
+    from hpcclear.cli.tables import console, table
     from hpcclear.scene.laws import known_laws
 
     registries = {"contact": plugins.CONTACT_LAWS, "friction": plugins.FRICTION_LAWS}
@@ -84,7 +84,7 @@ def _laws() -> None:
 
 def _list(place: str, registry: Any) -> None:
     """Print the names of a registry; of objectives and of what packages offer, what they are."""
-    from hpcclear.cli.terminal import console, table
+    from hpcclear.cli.tables import console, table
 
     names, ours = registry.names(), registry.ours()
     cli.show(f"{place} ({registry.kind}): {', '.join(names)}")
