@@ -19,7 +19,8 @@ from hpcclear.base import code_folder, private, remarks
 from hpcclear.base.errors import InputError, StorageError
 from hpcclear.base.private import private_folder
 from hpcclear.cli import cli
-from hpcclear.cli.terminal import console, remark, table
+from hpcclear.cli.tables import console, table
+from hpcclear.cli.terminal import print_remark
 from hpcclear.results import dataset, netcdf
 from hpcclear.results.content import Results
 from hpcclear.results.crate import NAME
@@ -122,7 +123,7 @@ def test_no_message_and_no_table_holds_control_characters(capsys):
     out = console()
     out.print(table(EVIL, [(EVIL, EVIL)]))
     out.print(EVIL)
-    out.print(remark("Mind", EVIL))
+    print_remark("Mind", EVIL)
     out.print("[study] and [/] and :smile: are no markup")
     shown = capsys.readouterr().out
     assert not controls(shown)

@@ -135,6 +135,9 @@ def _remedy(unit: str, target: str) -> str:
     return f"Write it in {target}, or as a plain number in {target}"
 
 
+TEXTS: ContextVar[dict[tuple[float, str], str] | None] = ContextVar("texts", default=None)
+"""What was written for numbers, by their values and units in SI: of the scene that is read or shown (`base.written`)."""
+
 _NOTED: ContextVar[Callable[[str, str], None] | None] = ContextVar("noted", default=None)
 
 
@@ -190,6 +193,7 @@ def to_si(text: str, target: str, decided: bool = False) -> float:
     """
     number, unit = quantity(text, target, decided)
     value = _product(Fraction(number), factor(unit, target), target)
+    keep(value, target, text)
     note_turns(text.strip(), number, unit, target)
     return value
 
@@ -214,6 +218,24 @@ def quantity(text: str, target: str, decided: bool = False) -> tuple[str, str]:
             "a number in quotes has no unit", f"Drop the quotes for a number in {shown}"
         )
     return number, unit
+
+
+def spelled(target: str) -> str:
+    """A unit of SI in one spelling: kg*m**2 as kg m^2."""
+    return target.replace("**", "^").replace("*", " ")
+
+
+def keep(value: float, target: str, text: str) -> None:
+    """Keep what was written for a number (SI) of an entry with a unit: the first text that has one."""
+    texts, key = TEXTS.get(), (value, spelled(target))
+    if texts is not None and target and (key not in texts or not is_written_in(texts[key])):
+        texts[key] = text.strip()
+
+
+def is_written_in(text: str) -> str:
+    """The unit of a text that is a quantity, as it stands there; "" for none."""
+    found = _QUANTITY.fullmatch(text.replace("\u2212", "-"))
+    return (found and found[2]) or ""
 
 
 def _product(number: Fraction | Decimal, size: Fraction, target: str = "") -> float:

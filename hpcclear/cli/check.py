@@ -10,7 +10,7 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed, place_of, show
-from hpcclear.cli.terminal import WIDTH, print_remark, quantity
+from hpcclear.cli.terminal import WIDTH, print_remark
 from hpcclear.ranks.progress import duration
 from hpcclear.report import spread
 from hpcclear.scene import Scene
@@ -109,21 +109,21 @@ def draw(scene: Scene, sketch: Path) -> None:
     show(f"sketch   {save(sketch_figure(scene, poses), place_of(sketch))}")
 
 
-def turning(value: float, unit: str) -> str:
-    """A number with its unit; an angular speed in rpm too."""
-    if unit == "rad/s":
-        return f"{30.0 * value / np.pi:.6g} rpm ({value:.6g} rad/s)"
-    return quantity(value, unit)
-
-
 def _speeds(scene: Scene) -> list[tuple[str, str]]:
     """Every angular speed and frequency of the mechanism, a row each."""
     words = {"rad/s": "speed", "Hz": "frequency"}
     return [
-        (words[unit], f"{path}: {turning(scene.number(path), unit)}")
+        (words[unit], f"{path}: {scene.shown(path)}{_in_turns(scene, path)}")
         for path in scene.numeric_paths()
         if (unit := scene.unit(path)) in words
     ]
+
+
+def _in_turns(scene: Scene, path: str) -> str:
+    """An angular speed that was written in radians, in rpm too."""
+    turns = f"{30.0 * scene.number(path) / np.pi:.6g} rpm"
+    radians = scene.unit(path) == "rad/s" and "rad" in scene.shown(path)
+    return f" ({turns})" if radians else ""
 
 
 def _tables(scene: Scene) -> list[tuple[str, str]]:
@@ -204,11 +204,14 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
             named = ", ".join(row.name for row in variable.rows)
             rows.append((variable.name, f"{named}: {variable.words}{loads}"))
         elif variable.values is not None:
-            listed = ", ".join(turning(one, variable.unit) for one in variable.values)
+            listed = ", ".join(scene.in_unit(one, variable.unit) for one in variable.values)
             rows.append((variable.name, f"{listed}: {variable.words}{loads}"))
         elif variable.range is not None:
-            lower, upper = (turning(end, variable.unit) for end in variable.range)
-            step = "" if variable.step is None else f" by {turning(variable.step, variable.unit)}"
+            lower, upper, step = (
+                "" if one is None else scene.in_unit(one, variable.unit)
+                for one in (*variable.range, variable.step)
+            )
+            step = step and f" by {step}"
             rows.append((variable.name, f"{lower} to {upper}{step}: {variable.words}"))
         elif variable.ratio is not None:
             rows.append(
@@ -219,9 +222,9 @@ def _study_rows(scene: Scene) -> list[tuple[str, str]]:
             )
     for row in study.random:
         if row.parameters is not None:
-            unit = "" if scene.unit(row.paths[0]) == "" else f" {scene.unit(row.paths[0])}"
-            least, most = row.span
-            text = f"{row.shape_words}, {least:g} to {most:g}{unit}"
+            unit = scene.unit(row.paths[0])
+            least, most = (scene.in_unit(end, unit) for end in row.span)
+            text = f"{row.shape_words}, {least} to {most}"
             rows.append(
                 (f"{row.name} random", text + ("" if row.absolute else " about the design"))
             )

@@ -14,6 +14,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli.options import detailed
 from hpcclear.cli.tables import console
 from hpcclear.cli.terminal import WIDTH, fitting
+from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html.content import Content
 from hpcclear.report.screen import Level, Screen
 from hpcclear.report.screens import screen_of
@@ -38,6 +39,13 @@ def describe(
     `asked`: further lines that were requested. `details`: whether all sections of the page follow; by default as the option
     ``--details`` says.
     """
+    with in_units_of(content.attribute("scene")):
+        _describe(content, written, asked, details)
+
+
+def _describe(
+    content: Content, written: Sequence[Path], asked: Sequence[Line], details: bool | None
+) -> None:
     out = console()
     details = detailed() if details is None else details
     files = [f"written  {path}" for path in written if path.exists()]

@@ -87,15 +87,17 @@ def _check_bounds(scene: Scene) -> None:
         radii.append(radius)
         if clearance >= DEEPEST * radius:
             raise InputError(
-                f"{key}.clearance", clearance,
-                f"a bearing counts as worn through from {DEEPEST:g} of its radius on, {DEEPEST * radius:g} m",
+                f"{key}.clearance", scene.shown(f"{key}.clearance"),
+                f"a bearing counts as worn through from {DEEPEST:g} of its radius on, "
+                f"{scene.shown(f'{key}.clearance', DEEPEST * radius)}",
                 "Lower it",
             )  # fmt: skip
     limit = scene.wear.limit.clearance
     if limit is not None and limit > DEEPEST * max(radii):
         raise InputError(
-            "wear.limit.clearance", limit,
-            f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, {DEEPEST * max(radii):g} m",
+            "wear.limit.clearance", scene.shown(f"{key}.clearance", limit),
+            f"wear is simulated up to a clearance of {DEEPEST:g} of the bearing radius, "
+            f"{scene.shown(f'{key}.clearance', DEEPEST * max(radii))}",
             "Lower it",
         )  # fmt: skip
 

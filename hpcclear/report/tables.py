@@ -18,7 +18,7 @@ from hpcclear.base.units import factor, fits, is_unit
 from hpcclear.report.figures import labels
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.names import KINDS
-from hpcclear.scene.loading import AS_WRITTEN, QUANTITY, parse, quantities
+from hpcclear.scene.loading import QUANTITY, parse, quantities
 from hpcclear.scene.paths import flatten
 
 if TYPE_CHECKING:
@@ -205,9 +205,9 @@ def _strings(text: str) -> dict[str, str]:
         content = dict(flatten(parse(text, "scene")))
     except InputError:
         return {}
-    notes = [line for line in text.splitlines() if line.startswith(("# set: ", AS_WRITTEN))]
+    notes = [line for line in text.splitlines() if line.startswith("# set: ")]
     for line in notes:
-        path, _, value = line.removeprefix("# set: ").removeprefix(AS_WRITTEN).partition("=")
+        path, _, value = line.removeprefix("# set: ").partition("=")
         content[path.strip()] = value
     matches = {path: QUANTITY.fullmatch(one) for path, one in quantities(content.items()).items()}
     return {path: match[1] for path, match in matches.items() if match is not None}

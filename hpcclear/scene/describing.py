@@ -41,7 +41,8 @@ def implausible(scene: SceneTables) -> Iterator[str]:
         yield "numerics.beta = 0 lets loops without clearance drift; use 100 to 1000 1/s"
     effects = scene.effects
     if effects.gravity > 100.0:
-        yield f"effects.gravity = {effects.gravity:g} m/s2 is ten times the Earth's; write 9.81"
+        gravity = scene.shown("effects.gravity")
+        yield f"effects.gravity = {gravity} is ten times the Earth's; write 9.81"
     for name in ("coefficient", "static_coefficient"):
         if (effects.friction.value(name) or 0.0) > 1.0:
             yield (
@@ -58,7 +59,8 @@ def _drive(scene: SceneTables) -> Iterator[str]:
     mean = 4.0 * scene.slider_crank.crank.length * turns
     if mean > FASTEST or 60.0 * turns > MOST_TURNS:
         yield (
-            f"drive.{key} = {speed:.6g} rad/s is {60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s; engines "
+            f"drive.{key} = {scene.shown(f'drive.{key}')} is {60.0 * turns:.0f} rpm, a mean slider speed of {mean:.3g} m/s; "
+            "engines "
             f'stay below {FASTEST:g} m/s. If rpm are meant, write "{speed:.6g} rpm"'
         )
 
@@ -70,10 +72,11 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
     bars = [(key, bar, bar.length) for key, bar in bodies if bar.length is not None]
     for key, bar, length in bars:
         if length > LONGEST:
-            yield f'{key}.length = {length:g} m; if mm are meant, write "{length:g} mm"'
+            yield f'{key}.length = {scene.shown(f"{key}.length")}; if mm are meant, write "{length:g} mm"'
         if (own := bar.own_inertia) > 100.0 * bar.mass * length**2:
             yield (
-                f"{key}.inertia = {own:g} kg m2 is {own / (bar.mass * length**2):.2g} times mass times length squared; "
+                f"{key}.inertia = {scene.in_unit(own, 'kg*m**2')} is {own / (bar.mass * length**2):.2g} times mass times "
+                "length squared; "
                 "check the unit, or give a flywheel as flywheel_inertia of a drive"
             )
     points = [scene.linkage.ground.points, *(body.points for _, body in bodies)]
@@ -83,7 +86,7 @@ def _bodies(scene: SceneTables) -> Iterator[str]:
     for key, body in bodies:
         if body.mass > heaviest:
             yield (
-                f"{key}.mass = {body.mass:g} kg is more than five steel cubes as long as the mechanism "
+                f"{key}.mass = {scene.shown(f'{key}.mass')} is more than five steel cubes as long as the mechanism "
                 f'({heaviest:.3g} kg); if grams are meant, write "{body.mass:g} g"'
             )
 
@@ -99,8 +102,9 @@ def _rod(scene: SceneTables) -> Iterator[str]:
     buckling = rod.bending.stiffness * (math.pi / rod.length) ** 2
     if inertia > 0.5 * buckling:
         yield (
-            f"mechanism.rod.bending.stiffness = {rod.bending.stiffness:g} N m2 buckles under {buckling:.3g} N, and the inertia "
-            f"of rod and slider comes to {inertia:.3g} N; deflections are no longer small there"
+            f"mechanism.rod.bending.stiffness = {scene.shown('mechanism.rod.bending.stiffness')} "
+            f"buckles under {buckling:.3g} N, "
+            f"and the inertia of rod and slider comes to {inertia:.3g} N; deflections are no longer small there"
         )
 
 
@@ -112,14 +116,14 @@ def _joints(scene: SceneTables) -> Iterator[str]:
             if not SOFTEST <= modulus <= STIFFEST:
                 what = "softer than rubber" if modulus < SOFTEST else "stiffer than diamond"
                 yield (
-                    f"{key}.{part}.youngs_modulus = {modulus:g} Pa is {what}; "
+                    f"{key}.{part}.youngs_modulus = {scene.shown(f'{key}.{part}.youngs_modulus')} is {what}; "
                     'steel has "206 GPa", bronze "110 GPa", a polymer "2 GPa"'
                 )
     for name in scene.pins():
         pin, key = scene.pin(name), scene.joint_key(name)
         if pin.clearance > WIDEST * pin.bearing_radius:
             yield (
-                f"{key}.clearance = {pin.clearance:g} m is {pin.clearance / pin.bearing_radius:.0%} of the "
+                f"{key}.clearance = {scene.shown(f'{key}.clearance')} is {pin.clearance / pin.bearing_radius:.0%} of the "
                 "bearing's radius; write the radial clearance, half of the difference of the diameters"
             )
 
@@ -130,7 +134,8 @@ def _films(scene: SceneTables) -> Iterator[str]:
         if film.viscosity and not THINNEST <= film.viscosity <= THICKEST:
             what = "thinner than air" if film.viscosity < THINNEST else "thicker than any oil"
             yield (
-                f"{key}.viscosity = {film.viscosity:g} Pa s is {what}; engine oil has 0.01 Pa s when hot and 0.3 when cold, "
+                f"{key}.viscosity = {scene.shown(f'{key}.viscosity')} is {what}; "
+                "engine oil has 0.01 Pa s when hot and 0.3 when cold, "
                 f'and if mPa s are meant, write "{film.viscosity:g} mPa*s"'
             )
         ratio = 0.5 * film.length / scene.pin(name).bearing_radius
@@ -190,8 +195,7 @@ NAMES = {"crank_rod": "O12", "rod_slider": "O23"}
 def effects_on(scene: SceneTables) -> Iterator[str]:
     """What is on, in words."""
     for name in scene.clearance_joints():
-        clearance = scene.number(f"{scene.joint_key(name)}.clearance")
-        size = f"{clearance * 1e6:g} um" if clearance < 1e-4 else f"{clearance * 1e3:g} mm"
+        size = scene.shown(f"{scene.joint_key(name)}.clearance")
         joint: Any = scene.clearance_joint(name)
         kind = {"slide": "guide", "slot": "slot"}.get(joint.kind, "joint")
         where = "the guide" if kind == name == "guide" else f"{kind} {name}"
@@ -201,10 +205,12 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
     for name in scene.worn_joints():
         yield f"wear of joint {name}"
     for name, film in scene.films().items():
-        yield f"{film.model} oil film of {film.viscosity:g} Pa s in joint {name}"
+        viscosity = scene.shown(f"{scene.joint_key(name)}.film.viscosity")
+        yield f"{film.model} oil film of {viscosity} in joint {name}"
     for key, bar in scene.bending().items():
         number = f"{bar.modes} modes" if bar.modes > 1 else "one mode"
-        yield f"bending of {key.rpartition('.')[2]} in {number}, {bar.stiffness:g} N m2"
+        stiffness = scene.shown(f"{key}.bending.stiffness")
+        yield f"bending of {key.rpartition('.')[2]} in {number}, {stiffness}"
     effects = scene.effects
     if scene.clearance_joints() and effects.contact is not None:
         yield f"contact law {effects.contact.law}"
@@ -220,7 +226,7 @@ def effects_on(scene: SceneTables) -> Iterator[str]:
         for row in (*scene.mechanism.drives, *scene.mechanism.loads):
             yield f"{row.kind} {row.name}"
     if effects.gravity != 0:
-        yield f"gravity {effects.gravity:g} m/s2"
+        yield f"gravity {scene.shown('effects.gravity')}"
     if effects.slider_load is not None:
         shape = "constant" if isinstance(effects.slider_load, float) else "against crank angle"
         yield f"slider load, {shape}"
@@ -246,13 +252,13 @@ def warnings(scene: SceneTables) -> Iterator[str]:
         )
         if 0.0 < bar.own_inertia < least * (1 - 1e-12):
             yield (
-                f"{key}.inertia = {bar.own_inertia:g} kg m2 is less than a thin uniform "
-                f"rod of that mass and length has ({least:g} kg m2)"
+                f"{key}.inertia = {scene.in_unit(bar.own_inertia, 'kg*m**2')} is less than a thin uniform "
+                f"rod of that mass and length has ({scene.in_unit(least, 'kg*m**2')})"
             )
         if not 0 <= (0.0 if bar.mass_center is None else bar.mass_center) <= bar.length:
             yield (
-                f"{key}.mass_center = {bar.mass_center:g} m lies beyond the pins, "
-                f"which are at 0 and {bar.length:g} m"
+                f"{key}.mass_center = {scene.shown(f'{key}.mass_center')} lies beyond the pins, "
+                f"which are at 0 and {scene.shown(f'{key}.length')}"
             )
     for name in scene.pins():
         joint: Any = scene.clearance_joint(name)
@@ -264,13 +270,13 @@ def warnings(scene: SceneTables) -> Iterator[str]:
             )
     for variable in scene.study.variables if scene.study is not None else ():
         own = [scene.number(path) for path in variable.paths]
+        ends = [scene.shown(variable.paths[0], end) for end in variable.range or () if own]
         if variable.range is not None and not all(
             variable.range[0] <= value <= variable.range[1] for value in own
         ):
             yield (
-                f"study.variables.{variable.name} runs from {variable.range[0]:g} to "
-                f"{variable.range[1]:g} {variable.unit}, and the scene's own value {own[0]:g} "
-                "lies outside"
+                f"study.variables.{variable.name} runs from {' to '.join(ends)}, and the scene's own value "
+                f"{scene.shown(variable.paths[0])} lies outside"
             )
     yield from unused(scene)
 
@@ -289,6 +295,13 @@ def unused(scene: SceneTables) -> Iterator[str]:
         )
 
 
+def _entry(scene: SceneTables, key: str, entries: Mapping[str, object]) -> str:
+    """An entry of a scene in words."""
+    if key not in entries:
+        return "(not set)"
+    return scene.shown(key) if key in scene.numeric_paths() else repr(entries[key])
+
+
 def differences(first: SceneTables, second: SceneTables) -> list[str]:
     """Dotted keys in which two scenes differ, each with both values; empty when their hashes are
     equal."""
@@ -297,7 +310,7 @@ def differences(first: SceneTables, second: SceneTables) -> list[str]:
         for entries in (flatten(first.resolved()), flatten(second.resolved()))
     )
     lines = [
-        f"{key}: {ours.get(key, '(not set)')!r} -> {theirs.get(key, '(not set)')!r}"
+        f"{key}: {_entry(first, key, ours)} -> {_entry(second, key, theirs)}"
         for key in {**ours, **theirs}
         if ours.get(key) != theirs.get(key)
     ]

@@ -18,7 +18,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from hpcclear.base.errors import InputError, at
 from hpcclear.base.errors import nearest as nearest
-from hpcclear.base.units import shows_point, to_si
+from hpcclear.base.units import factor, is_written_in, keep, shows_point, to_si
 
 HERE = {
     ("torsionspring", "torsionalspring", "rotaryspring", "rotationalspring"):
@@ -162,7 +162,9 @@ class Quantity(Converted):
         number = self.number(value, key, decided)
         if not self.holds(number):
             why = f": {self.why}" if self.why else ""
-            raise invalid(f"must be {self.bounds()}{why}", self._remedy(), key)
+            unit = is_written_in(value) if isinstance(value, str) else self.unit
+            limits = self.bounds(unit)
+            raise invalid(f"must be {limits}{why}", f"Write a number {limits}", key)
         return number
 
     def range(self, value: object, key: str) -> tuple[float, float]:
@@ -202,6 +204,7 @@ class Quantity(Converted):
             number = float(value)
         except OverflowError:
             number = math.inf
+        keep(number, self.unit, str(value))
         if not math.isfinite(number):
             raise invalid("the number must be finite", self._remedy(), key)
         if abs(number) > LARGEST or 0 < abs(number) < SMALLEST:
@@ -217,10 +220,12 @@ class Quantity(Converted):
         within = (value > lower) & (value < upper) & (value >= least) & (value <= most)
         return within & (value != 0.0) if self.nonzero else within
 
-    def bounds(self) -> str:
-        """The bounds in words."""
+    def bounds(self, unit: str | None = None) -> str:
+        """The bounds in words, in a unit; by default that of the entry."""
+        unit = self.unit if unit is None else unit
+        times = float(factor(unit, self.unit)) if unit != self.unit else 1.0
         parts = [
-            f"{word} {bound:g}"
+            f"{word} {bound / times:.6g}"
             for word, bound in (
                 ("above", self.above),
                 ("at least", self.least),
@@ -230,7 +235,7 @@ class Quantity(Converted):
             if bound is not None
         ]
         parts += ["other than 0"] * self.nonzero
-        return " and ".join(parts) + (f" {self.unit}" if self.unit else "")
+        return " and ".join(parts) + (f" {unit}" if unit else "")
 
     def _remedy(self) -> str:
         limits = self.bounds() if self.bounds().strip() != self.unit else ""

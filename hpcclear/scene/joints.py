@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import model_validator
 
 from hpcclear.base.outcome import CORNERS, WALLS
+from hpcclear.base.written import shown
 from hpcclear.scene.fields import (
     NOWHERE,
     Angle,
@@ -94,7 +95,8 @@ class PinInBearing(Table):
         """A journal is left, and film and waves fit into the clearance."""
         if self.clearance >= self.bearing_radius:
             raise invalid(
-                f"the clearance must be smaller than the bearing radius ({self.bearing_radius:g} m), or no journal is left",
+                f"the clearance must be smaller than the bearing radius ({shown(self.bearing_radius, 'm')}), "
+                "or no journal is left",
                 "Write the radial clearance R_B - R_J",
                 key="clearance",
                 value=self.clearance,
@@ -203,7 +205,7 @@ class Guide(OfContacts):
             size, radius = getattr(self, entry), self.corner_radius
             if radius is not None and 2.0 * radius >= size:
                 raise invalid(
-                    f"both corners of a side must fit into the slider's {entry} ({size:g} m)",
+                    f"both corners of a side must fit into the slider's {entry} ({shown(size, 'm')})",
                     f"Write less than half of the {entry}, such as 1 mm",
                     key="corner_radius", value=radius,
                 )  # fmt: skip

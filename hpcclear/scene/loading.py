@@ -13,7 +13,6 @@ import tomli_w
 from hpcclear.base.errors import InputError, content_of
 from hpcclear.scene.file_curves import files_named, with_values
 from hpcclear.scene.fitted import entry_replaced
-from hpcclear.scene.paths import flatten
 from hpcclear.scene.plugged import check_trust, with_texts
 from hpcclear.scene.scene import Scene
 from hpcclear.scene.syntax import fault
@@ -30,8 +29,6 @@ _DOTTED = re.compile(
 
 
 _NOTE = "# set: "  # before each override, at the head of a scene's text
-AS_WRITTEN = "# as written: "
-"""Before each quantity with its unit, at the head of a text that is no longer that of the scene file."""
 QUANTITY = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([^\d\s.].*)")
 """A number with its unit."""
 _CHANGE = "# changed: "  # before each entry that `Scene.with_` replaced, the latest first
@@ -67,7 +64,7 @@ def load_scene(
     for override in overrides:
         content = entry_replaced(content, *_override(override))
     folder = Path() if isinstance(source, Mapping) else Path(source).parent
-    named, written = files_named(content), quantities(flatten(content)).items()
+    named = files_named(content)
     filled, read_as = with_values(content, folder)
     content = dict(filled)
     own_plugins = "plugins" in content
@@ -77,12 +74,11 @@ def load_scene(
         content = with_texts(content, lambda module: _beside(folder, module))
     scene = scene_of(Scene, content)
     notes = "".join(f"{_NOTE}{override}\n" for override in overrides)
-    if (
-        text is None or named or own_plugins
-    ):  # results carry the values: whoever has one need not have the file
-        head = [f"# {line}\n" for line in read_as]
-        head += () if text is None else [f"{AS_WRITTEN}{path} = {q}\n" for path, q in written]
-        scene._text = "".join(head) + scene.to_toml()
+    if text is None or named or own_plugins:
+        # results carry the values: whoever has one need not have the file
+        head = "".join(f"# {line}\n" for line in read_as)
+        own = scene.to_toml() if text is None else tomli_w.dumps(content, multiline_strings=True)
+        scene._text = head + own
         scene._readings = (*scene.readings, *read_as)
     else:
         # an empty line ends the notes, whatever a file's own first comment says

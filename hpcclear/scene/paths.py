@@ -107,20 +107,27 @@ def curves() -> Mapping[str, Pairs]:
     }
 
 
+def curve_at(path: str) -> Pairs | None:
+    """The table of pairs at a path of a scene; None where there is none."""
+    return curves().get(_general(path))
+
+
+def _general(path: object) -> str:
+    """A path with a star for the name of each row of a linkage."""
+    parts: list[str] = []
+    for part in str(path).split("."):
+        parts.append("*" if parts and parts[-1] in _NAMED else part)
+    return ".".join(parts)
+
+
 class Quantities(dict[str, Quantity]):
     """By path; the rows of a linkage have names of their own, so theirs are kept by "mechanism.bodies.*.mass"."""
 
     of_kind: dict[str, dict[str, Quantity]]
     """Those that differ from kind to kind of a row, by path and kind."""
 
-    def _general(self, path: object) -> str:
-        parts: list[str] = []
-        for part in str(path).split("."):
-            parts.append("*" if parts and parts[-1] in _NAMED else part)
-        return ".".join(parts)
-
     def __contains__(self, path: object) -> bool:
-        general = self._general(path)
+        general = _general(path)
         return any(path in known for known in (dict.keys(self), ENTRIES)) or general in dict.keys(
             self
         )
@@ -140,7 +147,7 @@ class Quantities(dict[str, Quantity]):
         return next(iter(found.values()))
 
     def __missing__(self, path: str) -> Quantity:
-        general = self._general(path)
+        general = _general(path)
         if general == path:
             raise KeyError(path)
         if general in self.of_kind:

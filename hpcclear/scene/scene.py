@@ -1,5 +1,6 @@
 """The scene: one validated, frozen description of what is simulated."""
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,11 +9,14 @@ import tomli_w
 from pydantic import PrivateAttr
 
 from hpcclear.base import markup
-from hpcclear.base.errors import unboxed
+from hpcclear.base.errors import InputError, unboxed
 from hpcclear.base.outcome import record_type
+from hpcclear.base.units import is_written_in, to_si
+from hpcclear.base.written import Texts, reading, shown, text_of, unit_for
 from hpcclear.scene import describing
 from hpcclear.scene.consistency import ConsistentTables
 from hpcclear.scene.fitted import entry_replaced
+from hpcclear.scene.paths import curve_at, flatten, replace
 from hpcclear.scene.validation import check_path, scene_of
 
 
@@ -25,7 +29,7 @@ class Scene(ConsistentTables):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As its content: laws are functions, which are found again where they are needed."""
-        return _unpickled, (self.resolved(), self._text, self._readings)
+        return _unpickled, (self.resolved(), self._text, self._readings, self._texts)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -46,6 +50,17 @@ class Scene(ConsistentTables):
         """What is on, in words, one entry an effect."""
         return tuple(describing.effects_on(self))
 
+    def __repr__(self) -> str:
+        """What is simulated, in a line: "Scene(slider-crank, 2 joints with clearance, study of 8 variables, 3f2a...)"."""
+        parts: list[str] = [self.mechanism.kind]
+        if count := len(self.clearance_joints()):
+            parts.append(f"{count} joint{'s' * (count > 1)} with clearance")
+        if self.study is not None:
+            parts.append(f"study of {', '.join(self.study.names[:8]) or 'random inputs'}")
+        return f"Scene({'; '.join(parts)}; hash {self.hash[:16]})"
+
+    __str__ = __repr__
+
     def _repr_html_(self) -> str:
         """What a notebook shows: mechanism, effects, study and hash."""
         rows: list[tuple[str, str]] = [("mechanism", self.mechanism.kind)]
@@ -61,8 +76,41 @@ class Scene(ConsistentTables):
         return self._text
 
     def to_toml(self) -> str:
-        """TOML text of the resolved content; loading it gives an equal scene."""
+        """TOML text of the resolved content, quantities as they were written; loading it gives an equal scene."""
+        content = self.resolved()
+        for path, value in flatten(content):
+            pairs = curve_at(path)
+            units = self._unit_of(path) if pairs is None else (pairs.x, pairs.unit)
+            if units:
+                content = replace(content, path, self._as_written(value, units))
+        with contextlib.suppress(InputError):
+            if scene_of(Scene, content) == self:
+                return tomli_w.dumps(content, multiline_strings=True)
         return tomli_w.dumps(self.resolved(), multiline_strings=True)
+
+    def _unit_of(self, path: str) -> str:
+        """The SI unit of an entry of the resolved content, "" for one without or of which it is not known."""
+        if path in self._numbers():
+            return self.unit(path)
+        top, table, name, *_ = (*path.split("."), "", "")
+        rows = () if self.study is None or top != "study" else getattr(self.study, table, ())
+        if table not in ("variables", "random"):
+            return ""
+        return next((self.unit(one.paths[0]) for one in rows if one.name == name and one.paths), "")
+
+    def _as_written(self, value: object, unit: str | tuple[str, str]) -> object:
+        """A number (SI) as a text of the unit that was written, where that reads the same; lists and pairs likewise."""
+        if isinstance(value, list):
+            pair = isinstance(unit, tuple) and value and isinstance(value[0], float)
+            units = unit if pair else [unit] * len(value)
+            return [self._as_written(one, its) for one, its in zip(value, units, strict=True)]
+        unit = unit if isinstance(unit, str) else unit[1]
+        if not isinstance(value, float):
+            return value
+        with reading(self._texts):
+            text = text_of(value, unit) or (unit_for(unit) != unit and shown(value, unit))
+        same = text and is_written_in(text) and to_si(text, unit, decided=True) == value
+        return text if same else value
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **more: object) -> "Scene":
         """A new, validated scene with some entries replaced.
@@ -83,7 +131,7 @@ class Scene(ConsistentTables):
         for path, value in altered.items():
             check_path(path)
             content = entry_replaced(content, path, value)
-        result = scene_of(Scene, content)
+        result = scene_of(Scene, content, self)
         notes = "".join(f"# changed: {path} = {value!r}\n" for path, value in altered.items())
         result._text = notes + self.text
         return result
@@ -95,10 +143,12 @@ class Scene(ConsistentTables):
         return hash(self.hash)
 
 
-def _unpickled(content: Mapping[str, object], text: str, readings: tuple[str, ...]) -> Scene:
+def _unpickled(
+    content: Mapping[str, object], text: str, readings: tuple[str, ...], texts: Texts
+) -> Scene:
     """A scene from what `Scene.__reduce__` gives."""
     scene = scene_of(Scene, content)
-    scene._text, scene._readings = text, readings
+    scene._text, scene._readings, scene._texts = text, readings, texts
     return scene
 
 

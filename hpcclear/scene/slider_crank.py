@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from hpcclear.base.written import shown
 from hpcclear.scene.driving import (
     CrankSpeed,
     CrankTorque,
@@ -76,9 +77,9 @@ class SliderCrank(Table):
     def _check(self) -> None:
         offset = abs(self.offset or 0.0)
         if self.rod.length <= self.crank.length + offset:
-            beside = f" and the offset ({offset:g} m)" if offset else ""
+            beside = f" and the offset ({shown(offset, 'm')})" if offset else ""
             raise invalid(
-                f"the rod must be longer than the crank ({self.crank.length:g} m){beside}, "
+                f"the rod must be longer than the crank ({shown(self.crank.length, 'm')}){beside}, "
                 "or the crank cannot rotate",
                 "Lengthen the rod or shorten the crank" + " or the offset" * bool(offset),
                 key="rod.length",

@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
+from hpcclear.base.written import shown
 from hpcclear.laws import laws
 from hpcclear.scene.fields import (
     Count,
@@ -51,7 +52,7 @@ def check_film(film: Film | None, clearance: float, radius: float) -> None:
         )
     if 4.0 * film.roughness > clearance:
         raise invalid(
-            f"must be at most a quarter of the clearance ({clearance:g} m), or no film is left",
+            f"must be at most a quarter of the clearance ({shown(clearance, 'm')}), or no film is left",
             "Write the roughness of both surfaces together",
             key="film.roughness",
             value=film.roughness,
@@ -119,7 +120,8 @@ def check_waves(waves: OutOfRound | None, clearance: float, film: Film | None) -
         own = getattr(waves, name)
         if own is not None and own.deepest() >= clearance:
             raise invalid(
-                f"waves are up to {own.deepest():g} m high, but the clearance is {clearance:g} m: the journal may not fit",
+                f"waves are up to {shown(own.deepest(), 'm')} high, "
+                f"but the clearance is {shown(clearance, 'm')}: the journal may not fit",
                 "Make them smaller than the clearance",
                 key=f"out_of_round.{name}",
                 value=own.deepest(),

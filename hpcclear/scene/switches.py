@@ -241,7 +241,7 @@ class Off:
                 content = replace(content, path, value)
         if scene.study is not None:
             content["study"] = self._study(scene, content["study"])
-        made = scene_of(Scene, content)
+        made = scene_of(Scene, content, scene)
         made._text = scene.text
         return made
 

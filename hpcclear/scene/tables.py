@@ -9,6 +9,7 @@ from pydantic import Field, PrivateAttr
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP, Objective, band_of, bound
+from hpcclear.base.written import Texts, reading, shown
 from hpcclear.plugins import OBJECTIVES
 from hpcclear.scene import slider_crank
 from hpcclear.scene.choices import input_entry
@@ -58,6 +59,7 @@ class SceneTables(Table):
     }
 
     _readings: tuple[str, ...] = PrivateAttr(())
+    _texts: Texts = PrivateAttr(default_factory=dict)
     _known_numbers: dict[str, float] | None = PrivateAttr(None)
     _known_hash: str | None = PrivateAttr(None)
     _linkage: Planar | None = PrivateAttr(None)
@@ -362,6 +364,20 @@ class SceneTables(Table):
         loads = {one.name: {"kind": one.kind} for one in getattr(self.mechanism, "loads", ())}
         with of_kinds({"mechanism": {"loads": loads}}):
             return quantities()[path].unit
+
+    def shown(self, path: str, value: float | None = None) -> str:
+        """The number at a dotted path as it was written, or another value of it (SI) in its unit; errors as `number`."""
+        return self.in_unit(self.number(path) if value is None else value, self.unit(path))
+
+    def in_unit(self, value: float, unit: str) -> str:
+        """A number in SI as the scene has it written, or in the unit of such numbers there."""
+        with reading(self._texts):
+            return shown(value, unit)
+
+    @property
+    def written(self) -> Texts:
+        """What was written for its numbers, by their values and units in SI."""
+        return self._texts
 
     def _numbers(self) -> Mapping[str, float]:
         if self._known_numbers is None:  # a scene never changes, and a swarm asks often

@@ -8,7 +8,8 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from hpcclear.base.errors import InputError
-from hpcclear.base.units import noting
+from hpcclear.base.units import factor, is_written_in, noting
+from hpcclear.base.written import reading
 from hpcclear.plugins.sources import using
 from hpcclear.scene import domain
 from hpcclear.scene.fields import Table, hint, invalid, nearest
@@ -34,6 +35,8 @@ _KINDS = {
     "drives": '"constant-speed", "harmonic" or "torque"',
     "loads": " or ".join(f'"{kind}"' for kind in LOADS),
 }
+_USUAL = {"m": "mm", "rad": "deg", "rad/s": "rpm", "Pa": "GPa", "Pa*s": "mPa*s", "kg": "g"}
+"""Units that drawings and data sheets have, by those of SI: a plain number that is refused is likely one of these."""
 _KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*")
 
 
@@ -65,24 +68,46 @@ def validated(model: type[Valid], content: Mapping[str, object]) -> Valid:
         raise _translated(details[0], content, more=len(details) - 1) from None
 
 
-def scene_of(kind: type[Whole], content: Mapping[str, Any]) -> Whole:
+def scene_of(
+    kind: type[Whole], content: Mapping[str, Any], before: SceneTables | None = None
+) -> Whole:
     """The scene of a file's tables, with the readings of its units; errors as `validated`.
+
+    `before`: the scene that was changed, whose numbers stay as they were written.
 
     Source text that it carries is run: `hpcclear.scene.load_scene` sees to it that it may be.
     """
     read: dict[str, str] = {}
+    texts = {} if before is None else dict(before.written)
     with noting(read.__setitem__), of_kinds(content), using(texts_of(content)) as packages:
-        scene = validated(kind, content)
+        with reading(texts):
+            scene = validated(kind, content)
         rows = {name: {"version": version} for name, version in sorted(packages.items())}
         if rows != content.get("plugins", {}).get("packages", {}):
             scene = validated(kind, replace(content, "plugins.packages", rows))
+        own = set[object](before.written) if before else set(_numbers_in(content))
+        scene._texts = {
+            key: text
+            for key, text in texts.items()
+            if is_written_in(text) or (key if before else key[0]) in own
+        }
         if scene.study is not None:
             try:
-                _check_study(scene, scene.study)
+                with reading(dict(scene.written)):
+                    _check_study(scene, scene.study)
             except InputError as error:
                 raise _told(error, (), content) from None
     scene._readings = tuple(_placed(content, read)) if read else ()
     return scene
+
+
+def _numbers_in(content: object) -> Iterator[float]:
+    """Every plain number of nested tables and lists."""
+    if isinstance(content, (Mapping, list, tuple)):
+        for one in content.values() if isinstance(content, Mapping) else content:
+            yield from _numbers_in(one)
+    elif isinstance(content, (int, float)):
+        yield content
 
 
 def _placed(content: Mapping[str, object], read: Mapping[str, str]) -> Iterator[str]:
@@ -165,10 +190,8 @@ def _check_corners(scene: SceneTables, study: Study) -> None:
             low, high = reach[name]
             corners += [("random", lower + low), ("random", upper + high)]
         for key, value in corners:
-            entries = dict.fromkeys(paths, value)
-            _check_corner(
-                type(scene), content, entries, f"study.{key}.{name}", f"{name} = {value:g}"
-            )
+            entries, words = dict.fromkeys(paths, value), scene.shown(paths[0], value)
+            _check_corner(type(scene), content, entries, f"study.{key}.{name}", f"{name} = {words}")
     for variable in study.variables:
         for option in variable.rows:
             entries = {path: float(option.entries[path]) for path in variable.entry_paths}
@@ -237,7 +260,7 @@ def _told(
     if said.key:
         below, found = _follow(tuple(said.key.split(".")), found)
         names += below
-    if said.value is not ...:
+    if said.value is not ... and (found is None or isinstance(found, (Mapping, list))):
         found = said.value
     return _wrong(names, found, said.reason, said.remedy, more)
 
@@ -245,9 +268,21 @@ def _told(
 def _wrong(
     names: tuple[str, ...], found: object, reason: str, remedy: str, more: int
 ) -> InputError:
+    key = ".".join(names)
+    usual = _USUAL.get(_unit(key)) if re.search(r"\bmust\b|than", reason) else None
+    if usual and isinstance(found, (int, float)) and found > 0:
+        size = found / float(factor(usual, _unit(key)))
+        meant = f'if {usual} are meant, write "{found:g} {usual}"'
+        remedy += f". {found:g} is {size:.6g} {usual}; {meant}"
     if more:
         remedy = f"{remedy} ({more} more after this)"
-    return InputError(".".join(names) or "scene", found, reason, remedy)
+    return InputError(key or "scene", found, reason, remedy)
+
+
+def _unit(path: str) -> str:
+    """The unit of an entry in SI, "" for none."""
+    found = quantities().get(path)
+    return found.unit if found else ""
 
 
 def _untagged(location: tuple[int | str, ...], kind: str) -> tuple[int | str, ...]:

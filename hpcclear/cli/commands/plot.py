@@ -115,6 +115,7 @@ def run(
     """
     from hpcclear.plugins import trusting
     from hpcclear.report.figures.catalogue import drawings
+    from hpcclear.report.figures.labels import in_units_of
     from hpcclear.report.figures.printing import printing
     from hpcclear.report.html.content import read
 
@@ -124,7 +125,7 @@ def run(
     responses = {n: one for n, one in content.responses.items() if n in designs or not designs}
     if animation is not None:
         _film(content, animation, seconds, revolutions)
-    with trusting(trust):
+    with trusting(trust), in_units_of(content.attribute("scene")):
         every = drawings(content.files, responses)
         chosen = {name: _known("--figure", name, every) for name in names} or every
         if output is None:

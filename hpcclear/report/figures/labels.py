@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import NamedTuple
 
@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import MEAN_GAP
 from hpcclear.base.outcome import Flag
+from hpcclear.base.units import factor
+from hpcclear.base.written import Texts, other_unit, reading, text_of
 from hpcclear.results.content import Results, Variable
 from hpcclear.results.names import DESIGN_VARIABLES
+from hpcclear.scene.loading import scene_of_text
 from hpcclear.scene.paths import described
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -47,6 +51,16 @@ class Scale(NamedTuple):
         return f"{words} ({self.unit})"
 
 
+@contextmanager
+def in_units_of(text: str) -> Iterator[None]:
+    """Within it, quantities are shown as the text of a scene has them, others in its units."""
+    texts = Texts()
+    with suppress(InputError):
+        texts = scene_of_text(text, "scene").written if text else texts
+    with reading(texts):
+        yield
+
+
 def plain(units: str) -> str:
     """A unit as the tables of this package write it: ``kg*m**2`` becomes kg m^2, none becomes 1."""
     return units.replace("**", "^").replace("*", " ").strip() or "1"
@@ -61,12 +75,14 @@ def pretty(units: str) -> str:
 
 
 def scale(units: str, values: ArrayLike) -> Scale:
-    """A unit in which the largest of the values (of any shape) reads as 1 to 999.
+    """A unit in which the largest of the values (of any shape) reads as 1 to 999; one of another system that the user wrote.
 
     Only a unit that begins with m, N, J, W, Pa or s takes a prefix (its power counts); masses stay in kg, inertias
     go to kg mm^2, and lengths from a tenth of a millimetre on to mm, as drawings have them.
     """
     units = plain(units)
+    if own := other_unit(units):
+        return Scale(1.0 / float(factor(own, units)), pretty(own))
     finite = np.abs(np.asarray(values, dtype=float))
     finite = finite[np.isfinite(finite)]
     largest = float(finite.max()) if finite.size else 0.0
@@ -91,9 +107,11 @@ PLAIN = 1e6
 
 
 def quantity(value: float, units: str, digits: int = 4) -> str:
-    """A number with its unit in a readable size, a dash where there is none."""
+    """A number with its unit as it was written (`in_units_of`) or in a readable size, a dash where there is none."""
     if not np.isfinite(value):
         return "–"
+    if text := text_of(value, units):
+        return text
     chosen = scale(units, value)
     unit = "" if chosen.unit == "–" else f" {chosen.unit}"
     shown = f"{value * chosen.factor:.{digits}g}"

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hpcclear.report.answer import answer
+from hpcclear.report.figures.labels import in_units_of
 from hpcclear.report.html import gallery, picture
 from hpcclear.report.html.content import Content, read
 from hpcclear.report.html.guard import attempt
@@ -75,7 +76,8 @@ def write_report(*places: str | Path, output: str | Path | None = None) -> Path:
     """
     content = read(*places)
     path = content.directory / NAME if output is None else Path(output)
-    files.write_bytes(path, _page(content).encode(), _MARK)
+    with in_units_of(content.attribute("scene")):
+        files.write_bytes(path, _page(content).encode(), _MARK)
     return path
 
 
