@@ -311,7 +311,7 @@ class Collected:
         self._scene, self._sample = scene, sample
         self._pieces = StepInstants(scene.output.instants_per_revolution)
         self._parts: list[dict[str, Array]] = []
-        self._taken, self._turns = 0, Turns()
+        self._taken, self._turns = 0, Turns(sample.problem.transient)
         self._kept, self._began = kept_revolutions(scene), 0.0
         self._revolutions: list[Array] = []
         self._spectra = spectra_of(scene, sample)
@@ -352,6 +352,10 @@ class Collected:
         problem = self._sample.problem
         if Status(int(record["status"][0])).valid and problem.effects.joints:
             data |= _measured(self._scene, problem, self._turns)
+            when = self._turns.when[: len(self._scene.joint_labels)]
+            kept = (when >= data["time"][0]) & (when <= data["time"][-1])
+            angles = np.interp(when, data["time"], data["crank_angle"])
+            data["peak_angle"] = np.where(kept, angles % (2.0 * np.pi), np.nan)
             data |= {} if self._spectra is None else self._spectra.measured()
             if self._spectra is not None and self._scene.bands():
                 enter_levels(self._scene, self._sample, self._turns, self._spectra, record)

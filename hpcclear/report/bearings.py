@@ -16,9 +16,6 @@ from hpcclear.scene import Scene
 from hpcclear.scene.joints import length_path
 from hpcclear.scene.loading import scene_of_text
 
-MISSED = 0.01
-"""Of a peak force: what the largest stored force may lack of it and still be the same peak."""
-
 ROUNDING = 1e-12
 """Of the largest torque: a smaller mean is zero but for rounding."""
 
@@ -36,10 +33,8 @@ class Bearing(NamedTuple):
     joint: str
     peak: float
     """Peak contact force, N; between the stored instants too."""
-    stored: float
-    """Largest stored contact force, N."""
     angle: float
-    """Crank angle of that instant, rad, 0 to 2 pi."""
+    """Crank angle of the peak, rad, 0 to 2 pi."""
     mean: float
     """Time mean of the contact force, N; from the impulse that every step adds to, where the response has it."""
     pressure: float
@@ -52,11 +47,6 @@ class Bearing(NamedTuple):
     """Share of the time in contact."""
     gap: float
     """Mean distance of the journal centre from the clearance circle, m."""
-
-    @property
-    def between_instants(self) -> bool:
-        """Whether the peak lies between two stored instants."""
-        return self.stored < (1.0 - MISSED) * self.peak
 
 
 class Torque(NamedTuple):
@@ -71,22 +61,18 @@ class Torque(NamedTuple):
 def bearings(response: Results) -> list[Bearing]:
     """Return the loads of each joint with clearance of a response (kind ``response``), in its order."""
     inside = averaged(response)
-    angles = response["crank_angle"].to_numpy()[inside]
     areas = _projected_areas(response)
     found = []
     for k, joint in enumerate(map(str, response["joint"].to_numpy())):
         peak, gap = (_known(response, name, k) for name in ("peak_contact_force", "mean_gap"))
         if gap == peak == 0.0:
             continue  # an ideal joint of a slider-crank
-        force = response["contact_force"].to_numpy()[inside, k]
-        at = int(force.argmax()) if len(force) else 0
         mean, touching = _means(response, k, inside)
         found.append(
             Bearing(
                 joint,
                 peak,
-                float(force[at]) if len(force) else np.nan,
-                float(angles[at] % (2.0 * np.pi)) if len(force) else np.nan,
+                _known(response, "peak_angle", k),
                 mean,
                 mean / areas.get(joint, np.nan),
                 _known(response, "peak_contact_pressure", k),
@@ -225,9 +211,8 @@ def _in_degrees(angle: float) -> str:
 
 
 def degrees(one: Bearing) -> str:
-    """Return the crank angle of the peak in words, a dash where no stored instant has it."""
-    known = np.isfinite(one.angle) and not one.between_instants and one.peak > 0.0
-    return f"{np.degrees(one.angle):.0f} deg" if known else "–"
+    """Return the crank angle of the peak in words, a dash where it is not known."""
+    return _in_degrees(one.angle if one.peak > 0.0 else np.nan)
 
 
 def sensitive_words(relative: float, content: Results) -> str:

@@ -55,8 +55,10 @@ def run(
     else:
         _check_one(files, beyond)
         table = writing.export(files[0], cli.place_of(output), units)
-        for name in table.attrs["left_out"]:
-            cli.say(f"Note: {name} is left out: it has too many columns. It stands in {files[0]}")
+        if left := list(table.attrs["left_out"]):
+            more = f" and {len(left) - 3} more" if len(left) > 3 else ""
+            named = f"{', '.join(left[:3])}{more}"
+            cli.say(f"Note: left out, with too many columns for a table: {named} (in {files[0]})")
     cli.show(f"written  {output}: {len(table)} rows, {len(table.columns)} columns")
     return Exit.DONE
 

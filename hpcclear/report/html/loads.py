@@ -26,8 +26,6 @@ def loads(content: Content) -> list[object] | None:
     parts: list[object] = []
     if any(found.values()):
         parts.append(_bearings(found))
-    if any(bearings.degrees(one) == "–" for each in found.values() for one in each):
-        parts.append("A dash instead of an angle: the peak lies between two stored instants.")
     if valid:
         header = ["response", "largest torque", "mean torque", "objective f", "contact model"]
         rows = [_whole(name, one) for name, one in valid.items()]
@@ -123,17 +121,6 @@ def _further(response: Results, alone: bool) -> list[tuple[str, str]]:
     if not alone:
         return rows
     rows += _crank(response)
-    if "transient_turns" in response.attrs:
-        rows += [
-            (
-                "peak between instants",
-                f"{one.joint}: angle not known; largest stored value of the averaged revolutions "
-                f"{labels.quantity(one.stored, 'N')} at {np.degrees(one.angle):.0f} deg. "
-                "Raise output.instants_per_revolution",
-            )
-            for one in bearings.bearings(response)
-            if one.between_instants
-        ]
     if "regime" in response:
         regime = Regime(int(response["regime"]))
         period = float(response["period"])

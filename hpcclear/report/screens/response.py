@@ -117,10 +117,6 @@ def _trust(response: Results, loads: Sequence[bearings.Bearing]) -> Iterator[Tru
         )
     else:
         yield Trust(Level.GREEN, "f is known within the interval beside it", "bearings")
-    if any(one.between_instants for one in loads):
-        yield Trust(
-            Level.AMBER, "A peak lies between stored instants: its angle is not known", "bearings"
-        )
     if "regime" in response and (regime := Regime(int(response["regime"]))) is not Regime.UNJUDGED:
         yield Trust(
             Level.GREEN if regime is Regime.REGULAR else Level.AMBER,

@@ -51,6 +51,8 @@ KIND = ResultKind(
         "penetration": number(("time", "joint"), "m", "overlap of journal and bearing"),
         "contact_force": number(("time", "joint"), "N", "normal contact force; with an oil film the sum of both"),
         "friction_force": number(("time", "joint"), "N", "tangential contact force"),
+        "peak_angle": number(("joint",), "rad",
+            "crank angle of the integration step with the largest contact force, in the averaged revolutions"),
         "reaction_x": number(("time", "joint"), "N", "x force on the rod in an ideal joint"),
         "reaction_y": number(("time", "joint"), "N", "y force on the rod in an ideal joint"),
         "bearing_x": number(("time",), "N", "x force of the frame on the crank"),

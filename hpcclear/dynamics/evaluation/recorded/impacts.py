@@ -20,13 +20,35 @@ def _columns(first: int, size: int = at.MAX_JOINTS) -> slice:
 
 @dataclass
 class Turns:
-    """Integrals of the measures at the ends of revolutions, from steps as they come."""
+    """Integrals of the measures at the ends of revolutions, from steps as they come, and when forces are largest.
 
+    Attributes
+    ----------
+    transient : int
+        Revolutions before those in which the largest forces count.
+    """
+
+    transient: int = 0
+    largest: Array = field(default_factory=lambda: np.zeros(at.MAX_JOINTS))
+    """Largest mean square of each contact force over a step, N^2."""
+    when: Array = field(default_factory=lambda: np.full(at.MAX_JOINTS, np.nan))
+    """Middle of that step, s."""
     ends: dict[int, tuple[float, Array]] = field(default_factory=dict)
     """Time and integrals since the start, by the revolutions finished."""
 
     def take(self, steps: Steps) -> None:
-        """Note the revolutions that end between rows of these steps."""
+        """Note the revolutions that end between rows of these steps, and the steps of largest force."""
+        length = np.diff(steps.time)
+        squares = np.diff(steps.measures[:, _columns(at.FORCE_SQUARES)], axis=0)
+        counts = (steps.revolution[1:] >= self.transient) & (length > 0.0)
+        mean = np.where(counts, 1.0 / np.where(counts, length, 1.0), 0.0)[:, None] * squares
+        if len(mean):
+            step = mean.argmax(axis=0)
+            most = mean[step, np.arange(mean.shape[1])]
+            self.when = np.where(
+                most > self.largest, 0.5 * (steps.time[1:] + steps.time[:-1])[step], self.when
+            )
+            self.largest = np.maximum(most, self.largest)
         closing = np.flatnonzero(np.diff(steps.revolution) > 0)
         for k in closing:
             self.ends[int(steps.revolution[k]) + 1] = (steps.time[k], steps.measures[k].copy())
