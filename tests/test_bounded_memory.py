@@ -12,7 +12,7 @@ from hpcclear.base.outcome import Status
 from hpcclear.dynamics import response
 from hpcclear.dynamics.evaluation.recorded import between
 from hpcclear.dynamics.evaluation.recorded import steps as recorded
-from hpcclear.dynamics.evaluation.recorded.steps import Steps, pieces
+from hpcclear.dynamics.evaluation.recorded.steps import StepInstants, Steps
 from hpcclear.dynamics.response import simulate
 from hpcclear.dynamics.stepping import record as rec
 from hpcclear.scene import load_scene
@@ -91,6 +91,12 @@ def test_time_series_that_do_not_fit_are_refused(monkeypatch, count: int):
         simulate(scene)
 
 
+def pieces(chunks, count):
+    """All pieces of the steps of a sample."""
+    made = StepInstants(count)
+    return [*(piece for chunk in chunks for piece in made.take(chunk)), made.finish()]
+
+
 def test_pieces_are_the_whole():
     """Chunks of any size distribute the same instants over the same steps."""
     scene = scene_with(SMOOTH, 3, 1e-6)
@@ -99,7 +105,7 @@ def test_pieces_are_the_whole():
 
     def instants(size: int, count: int) -> np.ndarray:
         parts = (rows[k : k + size] for k in range(1, len(rows), size))
-        found = list(pieces((rows[:1], *parts), count))
+        found = pieces((rows[:1], *parts), count)
         return np.concatenate([np.column_stack([p.times, p.steps.time[p.k]]) for p in found])
 
     for count in (0, 720):

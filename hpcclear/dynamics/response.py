@@ -21,21 +21,19 @@ from hpcclear.dynamics.evaluation.evaluator import (
 )
 from hpcclear.dynamics.evaluation.recorded.between import seen_between
 from hpcclear.dynamics.evaluation.recorded.impacts import Turns, measured_of
-from hpcclear.dynamics.evaluation.recorded.sounding import enter_levels, spectra_of
+from hpcclear.dynamics.evaluation.recorded.sounding import Heard, instants_of
 from hpcclear.dynamics.evaluation.recorded.steps import (
     ITSELF,
     Piece,
     Recorded,
     Recording,
-    StepInstants,
 )
 from hpcclear.dynamics.evaluation.steady.wording import recorded
-from hpcclear.dynamics.linkage.passage import cubic
 from hpcclear.dynamics.planar.curves import curve_at
 from hpcclear.dynamics.planar.prescribed import prescribed_series
 from hpcclear.dynamics.planar.problem import cautions_of, linkage_of, refused_of
-from hpcclear.dynamics.planar.response import ResponseStates, pins_of, wound_up
 from hpcclear.dynamics.planar.response import labels as planar_labels
+from hpcclear.dynamics.planar.response import pins_of, wound_up
 from hpcclear.dynamics.planar.response import series as planar_series
 from hpcclear.dynamics.planar.tables import mechanism_of
 from hpcclear.dynamics.setup.parameters import parameters
@@ -57,23 +55,6 @@ if TYPE_CHECKING:
 
 MOST = 0.5
 """Share of the machine's memory that the time series of a response may take."""
-
-
-def _works_between(sample: Recorded, piece: Piece, s: Array) -> Array:
-    """Works (t, 4) by the cubic through works and powers at both ends of the step."""
-    steps, k = piece.steps, piece.k
-    after = np.minimum(k + 1, len(steps.time) - 1)
-    rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
-    ends = np.hstack([steps.q[rows], steps.v[rows]])
-    turn_time = steps.turn_time[rows]
-    began = steps.time[rows] - turn_time
-    powers = sample.observe(ends, steps.contacts[rows], turn_time, began)[1].powers
-    before, behind = np.split(powers[where], 2)
-    h = (steps.time[after] - steps.time[k])[:, None]
-    s = s[:, None]
-    w0, w1 = steps.works[k], steps.works[after]
-    p0, p1 = h * before, h * behind
-    return cubic(w0, p0, w1, p1, s)
 
 
 def simulate(
@@ -197,7 +178,7 @@ def _response(
         data["slider_load"] = curve_at(
             scene.effects.slider_load,
             data["crank_angle"],
-            _turns(scene),
+            turns_of(scene.linkage),
             scene.numerics.interpolation,
         )
     reported = {name: record[name][0] for name in names}
@@ -234,14 +215,9 @@ def _dimensions(scene: Scene) -> dict[str, tuple[str, ...]]:
 def _kept(scene: Scene) -> dict[str, str | int]:
     """Turns of the transient that are stored; of a scene that keeps the last revolutions alone, how many."""
     kept = kept_revolutions(scene)
-    transient = max(kept - scene.numerics.averaged_revolutions, 0) * _turns(scene)
+    transient = max(kept - scene.numerics.averaged_revolutions, 0) * turns_of(scene.linkage)
     asked = {} if scene.output.keep_revolutions is None else {"keep_revolutions": kept}
     return {"transient_turns": transient, **asked}
-
-
-def _turns(scene: Scene) -> int:
-    """Turns of a revolution."""
-    return turns_of(scene.linkage)
 
 
 def _reason(scene: Scene, data: dict[str, Any]) -> dict[str, str | int]:
@@ -304,26 +280,25 @@ def _prescribed(scene: Scene) -> Found:
     return times[kept], {name: one[kept] for name, one in data.items()}, record
 
 
-class Collected:
-    """Time series of one sample of a recording, as its steps come."""
+class Collected(Heard):
+    """Time series of one sample of a recording, as its steps come; raises InputError where they do not fit into memory."""
 
     def __init__(self, scene: Scene, sample: Recorded) -> None:
-        self._scene, self._sample = scene, sample
-        self._pieces = StepInstants(scene.output.instants_per_revolution)
+        super().__init__(
+            scene, sample, scene.output.instants_per_revolution, instants_of(scene, sample)
+        )
         self._parts: list[dict[str, Array]] = []
-        self._taken, self._turns = 0, Turns(sample.problem.transient)
+        self._taken = 0
         self._kept, self._began = kept_revolutions(scene), 0.0
         self._revolutions: list[Array] = []
-        self._spectra = spectra_of(scene, sample)
 
-    def take(self, rows: Array) -> None:
-        """Take rows (m, columns) of the record; raises InputError where time series do not fit into memory."""
-        for piece in self._pieces.take(rows):
-            self._add(piece)
-
-    def _add(self, piece: Piece) -> None:
-        count = self._scene.output.instants_per_revolution
-        series = {"time": piece.times, **_series_between(self._scene, self._sample, piece)}
+    def add(self, piece: Piece) -> None:
+        """Take a piece."""
+        super().add(piece)
+        count = self.scene.output.instants_per_revolution
+        seen, first = seen_between(self.sample, piece, works=True), self.scene.bristles
+        seen = seen._replace(q=seen.q[:, first:], v=seen.v[:, first:])
+        series = {"time": piece.times, **planar_series(self.scene, self.sample.par, seen)}
         if not self._taken:
             self._began = float(series["energy_residual"][0])
         self._taken += len(piece.times)
@@ -333,40 +308,36 @@ class Collected:
         latest = self._revolutions[-1].max(initial=0.0)
         while self._revolutions[0].max(initial=0.0) < latest - self._kept:
             del self._parts[0], self._revolutions[0]
-        self._turns.take(piece.steps)
-        if self._spectra is not None:
-            self._spectra.take(piece)
         stored = sum(len(part["time"]) for part in self._parts)
         least = max(stored, count * self._kept)
-        _refuse_what_does_not_fit(least * _bytes_an_instant(self._parts[0]), count)
+        first = self._parts[0]
+        size = sum(one.nbytes for one in first.values()) / max(len(first["time"]), 1)
+        _refuse_what_does_not_fit(least * size, count)
 
     def finish(self, record: Records) -> Found:
         """Return what it comes to, with the outcome (1,)."""
-        last = self._pieces.finish()
-        self._add(last)
-        self._turns.finish(last.steps)
+        self.end()
         data, shown = {}, self._shown(record)
         for name in list(self._parts[0]):
             data[name] = np.concatenate([part.pop(name) for part in self._parts])[shown]
         data["energy_residual"] -= self._began
-        problem = self._sample.problem
+        problem = self.sample.problem
         if Status(int(record["status"][0])).valid and problem.effects.joints:
-            data |= _measured(self._scene, problem, self._turns)
-            when = self._turns.when[: len(self._scene.joint_labels)]
+            data |= _measured(self.scene, problem, self.turns)
+            when = self.turns.when[: len(self.scene.joint_labels)]
             kept = (when >= data["time"][0]) & (when <= data["time"][-1])
             angles = np.interp(when, data["time"], data["crank_angle"])
             data["peak_angle"] = np.where(kept, angles % (2.0 * np.pi), np.nan)
-            data |= {} if self._spectra is None else self._spectra.measured()
-            if self._spectra is not None and self._scene.bands():
-                enter_levels(self._scene, self._sample, self._turns, self._spectra, record)
+            data |= {} if self.spectra is None else self.spectra.measured()
+            self.enter_levels(record)
         return data.pop("time"), data, record
 
     def _shown(self, record: Records) -> slice:
         """The instants of the revolutions to keep, of those that were simulated."""
-        problem, revolution = self._sample.problem, np.concatenate(self._revolutions)
+        problem, revolution = self.sample.problem, np.concatenate(self._revolutions)
         ended = Status(int(record["status"][0])).valid
         end = problem.transient + problem.averaged if ended else revolution.max(initial=0.0) + 1
-        count = self._scene.output.instants_per_revolution
+        count = self.scene.output.instants_per_revolution
         if ended and count:
             return slice(max(len(revolution) - count * self._kept - 1, 0), None)
         return slice(max(int(np.searchsorted(revolution, end - self._kept)) - 1, 0), None)
@@ -382,10 +353,6 @@ def _measured(scene: Scene, problem: Problem, turns: Turns) -> dict[str, Any]:
     }
 
 
-def _bytes_an_instant(part: dict[str, Array]) -> float:
-    return sum(one.nbytes for one in part.values()) / max(len(part["time"]), 1)
-
-
 def _refuse_what_does_not_fit(size: float, count: int) -> None:
     """Raise InputError where time series of so many bytes would take more than `MOST` of the machine's memory."""
     memory = host.memory()
@@ -397,11 +364,3 @@ def _refuse_what_does_not_fit(size: float, count: int) -> None:
             "Write fewer instants per revolution (0: every accepted step), or simulate fewer revolutions; "
             "hpcclear sample stores no time series",
         )
-
-
-def _series_between(scene: Scene, sample: Recorded, piece: Piece) -> dict[str, Array]:
-    """Every time series at the instants of a piece."""
-    seen = seen_between(sample, piece)
-    works = _works_between(sample, piece, seen.share)
-    q, v = (one[:, scene.bristles :] for one in seen[:2])
-    return planar_series(scene, sample.par, ResponseStates(q, v, *seen[2:6], works, seen.pins))

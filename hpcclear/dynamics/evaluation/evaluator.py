@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcclear.base.arrays import Array, Booleans, Integers, Records
+from hpcclear.base.arrays import Array, Integers, Records
 from hpcclear.base.cache import first_level_cache
 from hpcclear.base.errors import InputError
 from hpcclear.base.jit import doubles_in_a_vector
@@ -319,7 +319,7 @@ def outcome_records(
     known |= {name: one for name, one in made.items() if name in responses}
     if "sliding_work" in (record.names or ()):
         known |= {
-            "sliding_work": sliding_work(outcome),
+            "sliding_work": outcome.sliding_power * _revolution(outcome),
             "sliding_waves": outcome.profile * _revolution(outcome),
         }
     if objective.rate is not None:
@@ -331,7 +331,8 @@ def outcome_records(
     latched = outcome.latched == 1.0
     records["latched"] = (latched & valid[:, None])[:, : records["latched"].shape[1]]
     flags = int(Flag.LATCHED) * latched.any(axis=1)
-    flags += int(Flag.BEYOND_HERTZ) * beyond_hertz(outcome, par)
+    deep = outcome.deepest > Parameters(par).deepest_valid  # nowhere at places without a joint
+    flags += int(Flag.BEYOND_HERTZ) * deep.any(axis=1)
     flags += int(Flag.STIFF) * (outcome.stiff_steps > 0.0)
     records["flags"] = np.where(valid, flags, 0)
     return records
@@ -364,23 +365,7 @@ def measures(outcome: Outcome) -> dict[str, Array]:
     }
 
 
-def sliding_work(outcome: Outcome) -> Array:
-    """Normal force times sliding distance in a revolution, J, shape (m, MAX_JOINTS).
-
-    Of the averaged revolutions; one of a crank that is free lasts as long as all do on average.
-    """
-    work: Array = outcome.sliding_power * _revolution(outcome)
-    return work
-
-
 def _revolution(outcome: Outcome) -> Array:
     """How long one lasts, s, (m, 1)."""
     duration: Array = (outcome.time / outcome.revolutions)[:, None]
     return duration
-
-
-def beyond_hertz(outcome: Outcome, par: Array) -> Booleans:
-    """Whether a penetration in the averaged revolutions left the range of its law, shape (m,)."""
-    # places without a joint have no penetration
-    beyond: Booleans = np.any(outcome.deepest > Parameters(par).deepest_valid, axis=1)
-    return beyond

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import carray
 
 from hpcclear.base.arrays import Array, Integers
 from hpcclear.base.jit import lane_function
@@ -94,6 +95,15 @@ def numbers_of(rules: Rules, width: int, n: int, measures: int) -> Integers:
     numbers[[Asking.WIDTH, Asking.COORDINATES, Asking.MEASURES]] = width, n, measures
     numbers[Asking.RULES :] = rules
     return numbers
+
+
+@lane_function
+def block_at(W, work, stages, par, book):
+    """W lanes at these addresses; `book` may be None."""
+    return Block(
+        carray(work, at.WORK * W), carray(stages, at.MAX_COORDINATES * W), carray(par, at.PARAMETERS * W),
+        None if book is None else carray(book, at.BOOK * W),
+    )  # fmt: skip
 
 
 @lane_function

@@ -3,10 +3,23 @@
 import math
 
 from hpcclear.base.jit import scalar_function
+from hpcclear.dynamics import layout as at
 
 KINK_REACH = 1e-3
 """Part of a step that a gap's zero may stand from either end: a kink of the force there does no harm, as its effect falls with
 the 2.5th power, and what the gap does between the two is straight."""
+
+
+@scalar_function
+def gap_in_step(lane, W, work, p):
+    """Joint p's gap at both ends of a lane's step, and its rates there times the step: d0, m0, d1, m1, of a cubic."""
+    h = work[at.STEP * W + lane]
+    return (
+        work[(at.RATE_OLD + at.GAP + p) * W + lane],
+        h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane],
+        work[(at.RATE_NOW + at.GAP + p) * W + lane],
+        h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane],
+    )
 
 
 @scalar_function

@@ -54,12 +54,23 @@ def is_deepest(d0, r0, d1, r1):
     return 1.0 if (r0 > 0.0) & (r1 < 0.0) & (max(d0, d1) > 0.0) else 0.0
 
 
+@lane_function
+def ends_of(work, p, i, W):
+    """Gaps, their rates and forces of joint p at both ends of a lane's step: d0, r0, d1, r1, f0, f1."""
+    old, now = at.RATE_OLD + p, at.RATE_NOW + p
+    gaps = work[(old + at.GAP) * W + i], work[(now + at.GAP) * W + i]
+    rates = work[(old + at.GAP_RATE) * W + i], work[(now + at.GAP_RATE) * W + i]
+    forces = work[(old + at.FORCE) * W + i], work[(now + at.FORCE) * W + i]
+    return gaps[0], rates[0], gaps[1], rates[1], forces[0], forces[1]
+
+
 @scalar_function
-def peak_force(d0, r0, d1, r1, lift, n, c, h, f0, f1):
-    """Largest force over a time h in contact with a peak inside: gaps, their rates and forces at both ends.
+def peak_force(ends, lift, n, c, h):
+    """Largest force over a time h in contact with a peak inside; `ends` as of `ends_of`.
 
     `lift` makes a quartic of the gap's cubic: of s^2 (1 - s)^2.
     """
+    d0, r0, d1, r1, f0, f1 = ends
     m0, m1 = h * r0, h * r1
     c2 = 3.0 * (d1 - d0) - 2.0 * m0 - m1
     c3 = 2.0 * (d0 - d1) + m0 + m1
@@ -75,11 +86,7 @@ def peak_force(d0, r0, d1, r1, lift, n, c, h, f0, f1):
         bend = 2.0 * c2 + 6.0 * s * c3 + 2.0 * lift * (tilt * tilt - 2.0 * turn)
         slope = force_slope(d, rate, bend, n, c, h)
         if slope > 0.0:
-            low, above, below = (
-                s,
-                slope,
-                0.5 * below,
-            )  # halved, or one end would stay for ever (Illinois)
+            low, above, below = s, slope, 0.5 * below  # halved, or one end would stay (Illinois)
         else:
             high, below, above = s, slope, 0.5 * above
     force, end, rate_there = (f0, d0, r0) if f0 > f1 else (f1, d1, r1)
@@ -93,10 +100,7 @@ def peak_force(d0, r0, d1, r1, lift, n, c, h, f0, f1):
 @lane_function
 def lane_has_peak(rules, work, par, p, i, W):
     """1 where an accepted step that counts holds a peak of joint p that may be the largest so far."""
-    d0, d1 = work[(at.RATE_OLD + at.GAP + p) * W + i], work[(at.RATE_NOW + at.GAP + p) * W + i]
-    r0 = work[(at.RATE_OLD + at.GAP_RATE + p) * W + i]
-    r1 = work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
-    f0, f1 = work[(at.RATE_OLD + at.FORCE + p) * W + i], work[(at.RATE_NOW + at.FORCE + p) * W + i]
+    d0, r0, d1, r1, f0, f1 = ends_of(work, p, i, W)
     n, c = shape(rules, work, par, p, i, W)
     high = 1.0 if NEAR * max(f0, f1) > work[(at.PEAK + p) * W + i] else 0.0
     deep = 1.0 if NEAR * max(d0, d1) > work[(at.DEEPEST + p) * W + i] else 0.0
@@ -109,25 +113,17 @@ def lane_has_peak(rules, work, par, p, i, W):
 def take_peak(rules, work, par, p, i, W):
     """Force and penetration of joint p inside a lane's step, where they are the largest so far."""
     h = work[at.STEP * W + i]
-    d0, d1 = work[(at.RATE_OLD + at.GAP + p) * W + i], work[(at.RATE_NOW + at.GAP + p) * W + i]
-    r0 = work[(at.RATE_OLD + at.GAP_RATE + p) * W + i]
-    r1 = work[(at.RATE_NOW + at.GAP_RATE + p) * W + i]
-    f0, f1 = work[(at.RATE_OLD + at.FORCE + p) * W + i], work[(at.RATE_NOW + at.FORCE + p) * W + i]
+    ends = ends_of(work, p, i, W)
+    d0, r0, d1, r1, _, _ = ends
+    m0, m1 = h * r0, h * r1
     n, c = shape(rules, work, par, p, i, W)
     # the mean over the step, better than the cubic's, tells how far the gap bulges between its ends
     mean = work[(at.RATE_SUM + at.GAP + p) * W + i]
-    lift = 30.0 * (mean - hermite_integral(d0, h * r0, d1, h * r1, 1.0))
-    keep_peak(work, p, i, W, d0, r0, d1, r1, lift, n, c, h, f0, f1)
-
-
-@scalar_function
-def keep_peak(work, p, i, W, d0, r0, d1, r1, lift, n, c, h, f0, f1):
-    """The same of any two instants of an accepted step, a time h apart."""
+    lift = 30.0 * (mean - hermite_integral(d0, m0, d1, m1, 1.0))
     if has_peak(d0, r0, d1, r1, n, c, h) == 1.0:
-        force = peak_force(d0, r0, d1, r1, lift, n, c, h, f0, f1)
+        force = peak_force(ends, lift, n, c, h)
         work[(at.PEAK + p) * W + i] = max(work[(at.PEAK + p) * W + i], force)
     if is_deepest(d0, r0, d1, r1) == 1.0:
-        m0, m1 = h * r0, h * r1
         depth = hermite(d0, m0, d1, m1, interior_peak(d0, m0, d1, m1))
         work[(at.DEEPEST + p) * W + i] = max(work[(at.DEEPEST + p) * W + i], depth)
 

@@ -12,7 +12,7 @@ from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Block, Counter, Queue, rules_in
+from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Counter, Queue, block_at, rules_in
 from hpcclear.dynamics.layout.views import Outcome, RunSettings, Start
 from hpcclear.dynamics.stepping.rows import next_rows, stop_at_rows
 from hpcclear.dynamics.stepping.sample import OK, UNFINISHED, end_revolution, failure, finish, load
@@ -91,12 +91,7 @@ def special(
     """`answer` for arrays at addresses."""
     of = carray(numbers, NUMBERS)
     W = of[Asking.WIDTH]
-    block = Block(
-        carray(work, at.WORK * W),
-        carray(stages, at.MAX_COORDINATES * W),
-        carray(par, at.PARAMETERS * W),
-        carray(book, at.BOOK * W),
-    )
+    block = block_at(W, work, stages, par, book)
     entries, counts = carray(settings, RunSettings.size), carray(counters, Counter.COUNT)
     slots = counts[Counter.SLOTS]
     queue = Queue(

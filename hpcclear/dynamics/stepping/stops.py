@@ -8,6 +8,7 @@ from hpcclear.dynamics.stepping.control import FIRST_PART, SHRINK
 from hpcclear.dynamics.stepping.events import (
     KINK_REACH,
     absolute_integral,
+    gap_in_step,
     impact_fraction,
     root,
     zero_at_end,
@@ -29,12 +30,8 @@ def meet_impact(lane, W, work, settings, p):
     """
     if work[(at.ACTIVE + p) * W + lane] == 1.0:
         return 2.0
-    h = work[at.STEP * W + lane]
     tolerance = settings[RunSettings.gap_tolerance]
-    d0 = work[(at.RATE_OLD + at.GAP + p) * W + lane]
-    d1 = work[(at.RATE_NOW + at.GAP + p) * W + lane]
-    m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane]
-    m1 = h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane]
+    d0, m0, d1, m1 = gap_in_step(lane, W, work, p)
     if abs(d1) <= tolerance and m1 > 0.0:
         return 1.0
     fraction = impact_fraction(d0, m0, d1, m1, 0.5 * tolerance)
@@ -97,13 +94,9 @@ def cut(lane, W, work, fraction):
 @lane_event
 def before_kink(lane, W, work, settings, p):
     """Fraction of this step at which joint p's gap changes sign; 2 if it does not, or so near an end that it does no harm."""
-    d0 = work[(at.RATE_OLD + at.GAP + p) * W + lane]
-    d1 = work[(at.RATE_NOW + at.GAP + p) * W + lane]
+    d0, m0, d1, m1 = gap_in_step(lane, W, work, p)
     if d0 * d1 >= 0.0 or min(abs(d0), abs(d1)) <= settings[RunSettings.gap_tolerance]:
         return 2.0
-    h = work[at.STEP * W + lane]
-    m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane]
-    m1 = h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane]
     if zero_at_start(d0, m0) or zero_at_end(d1, m1):
         return 2.0
     fraction = root(d0, m0, d1, m1, 1.0)
@@ -118,11 +111,8 @@ def too_far_in(lane, W, work, p):
     function of the step that has zeros beyond the range where it means anything. One impact in a million was passed like that,
     with an error a thousand times what was allowed.
     """
-    d0 = work[(at.RATE_OLD + at.GAP + p) * W + lane]
-    d1 = work[(at.RATE_NOW + at.GAP + p) * W + lane]
-    in_ = work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane] > 0.0
-    out = work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane] < 0.0
-    return in_ and out and d1 > 0.0 and FIRST_PART * d1 > d0
+    d0, m0, d1, m1 = gap_in_step(lane, W, work, p)
+    return m0 > 0.0 and m1 < 0.0 and d1 > 0.0 and FIRST_PART * d1 > d0
 
 
 @lane_event
@@ -139,19 +129,14 @@ def stop_at_kinks(rules, lane, W, work, settings):
             if too_far_in(lane, W, work, p):
                 fraction = min(fraction, SHRINK)
         if fraction < 1.0:
-            work[at.ACCEPT * W + lane] = 0.0
-            work[at.NEXT_STEP * W + lane] = fraction * work[at.STEP * W + lane]
+            cut(lane, W, work, fraction)
 
 
 @lane_event
 def integrate_gap(lane, W, work, p):
     """Integral of joint p's |gap| over a step in which the gap changes sign."""
-    h = work[at.STEP * W + lane]
-    d0 = work[(at.RATE_OLD + at.GAP + p) * W + lane]
-    d1 = work[(at.RATE_NOW + at.GAP + p) * W + lane]
+    d0, m0, d1, m1 = gap_in_step(lane, W, work, p)
     if d0 * d1 < 0.0:
-        m0 = h * work[(at.RATE_OLD + at.GAP_RATE + p) * W + lane]
-        m1 = h * work[(at.RATE_NOW + at.GAP_RATE + p) * W + lane]
         mean = work[(at.RATE_SUM + at.GAP + p) * W + lane]
         work[(at.RATE_SUM + at.GAP + p) * W + lane] = absolute_integral(mean, d0, m0, d1, m1)
 
@@ -177,15 +162,9 @@ def stop_free_crank(lane, W, block, settings, last):
     if beyond > tolerance:
         h = work[at.STEP * W + lane]
         before = work[(at.Q + last) * W + lane] - end
-        fraction = impact_fraction(
-            before,
-            h * work[(at.V + last) * W + lane],
-            beyond,
-            h * work[(at.VS + last) * W + lane],
-            0.0,
-        )
-        work[at.ACCEPT * W + lane] = 0.0
-        work[at.NEXT_STEP * W + lane] = fraction * h
+        m0, m1 = h * work[(at.V + last) * W + lane], h * work[(at.VS + last) * W + lane]
+        fraction = impact_fraction(before, m0, beyond, m1, 0.0)
+        cut(lane, W, work, fraction)
     return OK
 
 

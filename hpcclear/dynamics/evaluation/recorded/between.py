@@ -1,39 +1,25 @@
-"""States and rates of a recorded sample between its accepted steps."""
-
-from typing import NamedTuple
+"""States, rates and works of a recorded sample between its accepted steps."""
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.evaluation.recorded.steps import Piece, Recorded
-from hpcclear.dynamics.layout.views import Rates
+from hpcclear.dynamics.linkage.passage import cubic
+from hpcclear.dynamics.planar.response import ResponseStates
 
 
-class Between(NamedTuple):
-    """Instants of a piece: coordinates in their revolution and velocities (t, n), time in the revolution, its number, contacts
-    (t, 2 MAX_JOINTS), rates, how far each lies in its step, from 0 to 1 (t,), forces of ideal pins (t, 2, MAX_PINS)."""
-
-    q: Array
-    v: Array
-    turn_time: Array
-    revolution: Array
-    contacts: Array
-    rates: Rates
-    share: Array
-    pins: Array
-
-
-def seen_between(sample: Recorded, piece: Piece) -> Between:
-    """What the motion is at the instants of a piece."""
-    problem, times = sample.problem, piece.times
-    q, v, share = _state(piece, problem.wraps)
+def seen_between(sample: Recorded, piece: Piece, *, works: bool = False) -> ResponseStates:
+    """What the motion is at the instants of a piece; `works`: those too, else there are none."""
+    wraps = sample.problem.wraps
+    q, v, share = _state(piece, wraps)
     steps, k = piece.steps, piece.k
     revolution, contacts = steps.revolution[k], steps.contacts[k]
     began = (steps.time - steps.turn_time)[k]
-    turn_time = times - began
-    q = q - problem.wraps * revolution[:, None]  # counted as the kernel does
+    turn_time = piece.times - began
+    q = q - wraps * revolution[:, None]  # counted as the kernel does
     _, rates, pins = sample.observe(np.hstack([q, v]), contacts, turn_time, began)
-    return Between(q, v, turn_time, revolution, contacts, rates, share, pins)
+    done = _works(sample, piece, share[:, None]) if works else np.zeros((len(k), 0))
+    return ResponseStates(q, v, turn_time, revolution, contacts, rates, done, pins)
 
 
 def _state(piece: Piece, wraps: Array) -> tuple[Array, Array, Array]:
@@ -57,3 +43,19 @@ def _state(piece: Piece, wraps: Array) -> tuple[Array, Array, Array]:
     position = q0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
     velocity = (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
     return position, velocity, s[:, 0]
+
+
+def _works(sample: Recorded, piece: Piece, s: Array) -> Array:
+    """Works (t, 4) at shares (t, 1) of steps, by the cubic through works and powers at both ends of the step."""
+    steps, k = piece.steps, piece.k
+    after = np.minimum(k + 1, len(steps.time) - 1)
+    rows, where = np.unique(np.concatenate([k, after]), return_inverse=True)
+    ends = np.hstack([steps.q[rows], steps.v[rows]])
+    turn_time = steps.turn_time[rows]
+    began = steps.time[rows] - turn_time
+    powers = sample.observe(ends, steps.contacts[rows], turn_time, began)[1].powers
+    before, behind = np.split(powers[where], 2)
+    h = (steps.time[after] - steps.time[k])[:, None]
+    w0, w1 = steps.works[k], steps.works[after]
+    p0, p1 = h * before, h * behind
+    return cubic(w0, p0, w1, p1, s)

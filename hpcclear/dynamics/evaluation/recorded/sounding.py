@@ -49,7 +49,7 @@ class SoundingEvaluator:
     ) -> None:
         self.scene, self.lanes = scene, lanes
         self._columns, self._perturbations = columns, perturbations
-        self._count = instants_of(scene)
+        self._count = _instants_of_bands(scene)
         self._waiting: deque[tuple[int, Array]] = deque()
         self._running: list[int] = []
         self._current: Iterator[Records | None] | None = None
@@ -93,7 +93,7 @@ class SoundingEvaluator:
         recording = Recording(
             self.scene, (), self._perturbations, self.scene.objective, design=design
         )
-        heard = [_Heard(self.scene, sample, self._count) for sample in recording.samples]
+        heard = [Heard(self.scene, sample, 1, self._count) for sample in recording.samples]
         for rows in recording.chunks():
             for slot, one in enumerate(heard):
                 one.take(rows[rows[:, rec.SLOT] == slot])
@@ -101,52 +101,60 @@ class SoundingEvaluator:
         records = recording.record()
         records["sample"] = index
         for k, one in enumerate(heard):
-            one.finish(records[k : k + 1])
+            one.end()
+            one.enter_levels(records[k : k + 1])
         yield records
 
 
-class _Heard:
-    """One sample of a recording, as its steps come."""
+class Heard:
+    """One sample of a recording, as its steps come.
 
-    def __init__(self, scene: Scene, sample: Recorded, count: int) -> None:
-        self._scene, self._sample = scene, sample
-        self._pieces, self._turns = StepInstants(1), Turns()
-        self._spectra = Spectra(scene, sample, count)
+    Parameters
+    ----------
+    instants : int
+        Of a revolution that its pieces have.
+    count : int
+        Of a revolution that spectra are made of; 0 for none.
+    """
+
+    def __init__(self, scene: Scene, sample: Recorded, instants: int, count: int) -> None:
+        self.scene, self.sample, self.turns = scene, sample, Turns(sample.problem.transient)
+        self._pieces = StepInstants(instants)
+        self.spectra = Spectra(scene, sample, count) if count else None
 
     def take(self, rows: Array) -> None:
         """Take rows (m, columns) of the record."""
         for piece in self._pieces.take(rows):
-            self._add(piece)
+            self.add(piece)
 
-    def _add(self, piece: Piece) -> None:
-        self._turns.take(piece.steps)
-        self._spectra.take(piece)
+    def add(self, piece: Piece) -> None:
+        """Take a piece."""
+        self.turns.take(piece.steps)
+        if self.spectra is not None:
+            self.spectra.take(piece)
 
-    def finish(self, record: Records) -> None:
-        """Enter what was heard into its record (1,), a view."""
+    def end(self) -> None:
+        """Take what is left once all rows have come."""
         last = self._pieces.finish()
-        self._add(last)
-        self._turns.finish(last.steps)
-        if Status(int(record["status"][0])).valid:
-            enter_levels(self._scene, self._sample, self._turns, self._spectra, record)
+        self.add(last)
+        self.turns.finish(last.steps)
+
+    def enter_levels(self, record: Records) -> None:
+        """Enter levels in the scene's bands, and half-widths, into the sample's record (1,), if it ended well."""
+        bands = np.array(self.scene.bands())
+        if self.spectra is None or not len(bands) or not Status(int(record["status"][0])).valid:
+            return
+        periods, integrals = self.turns.averaged(self.sample.problem.transient)
+        known = measured_of(self.scene, self.sample.problem, periods, integrals)
+        known |= self.spectra.levels(bands) | {"band": bands}
+        for name in LEVELS:
+            if name in known:
+                found = np.asarray(known[name])
+                place: Any = (0, *map(slice, found.shape))
+                record[name][place] = found
 
 
-def enter_levels(
-    scene: Scene, sample: Recorded, turns: Turns, heard: Spectra, record: Records
-) -> None:
-    """Enter levels in the scene's bands, and half-widths, into a record (1,) of a recorded sample that ended well."""
-    bands = np.array(scene.bands())
-    periods, integrals = turns.averaged(sample.problem.transient)
-    known = measured_of(scene, sample.problem, periods, integrals)
-    known |= heard.levels(bands) | {"band": bands}
-    for name in LEVELS:
-        if name in known:
-            found = np.asarray(known[name])
-            place: Any = (0, *map(slice, found.shape))
-            record[name][place] = found
-
-
-def instants_of(scene: Scene) -> int:
+def _instants_of_bands(scene: Scene) -> int:
     """Instants a revolution by which spectra of a sample reach as far as the scene's bands, and as far as its response's do.
 
     Raises
@@ -171,10 +179,7 @@ def instants_of(scene: Scene) -> int:
     return max(needed, scene.output.instants_per_revolution, LEAST)
 
 
-def spectra_of(scene: Scene, sample: Recorded) -> Spectra | None:
-    """Those of a response, None where it stores too few instants, or has no contacts."""
-    count = scene.output.instants_per_revolution
-    if scene.bands():
-        count = instants_of(scene)
-    there = count >= FEWEST_INSTANTS and sample.problem.effects.joints
-    return Spectra(scene, sample, count) if there else None
+def instants_of(scene: Scene, sample: Recorded) -> int:
+    """Those that spectra of a response are made of; 0 where it stores too few instants, or has no contacts."""
+    count = _instants_of_bands(scene) if scene.bands() else scene.output.instants_per_revolution
+    return count if count >= FEWEST_INSTANTS and sample.problem.effects.joints else 0

@@ -5,7 +5,7 @@ body does, at most `most_kept` steps of an unfinished revolution are held.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -204,22 +204,6 @@ class Piece:
     times: Array
     steps: Steps
     k: NDArray[np.intp]  # (t,): each lies in the step that begins with row k
-
-
-def pieces(chunks: Iterable[Array], count: int) -> Iterator[Piece]:
-    """Distribute instants over the steps of one sample, in their order, a piece for some revolutions.
-
-    Parameters
-    ----------
-    chunks : iterable of ndarray, shape (m, columns)
-        Of `Recording.chunks`.
-    count : int
-        As of `StepInstants`.
-    """
-    made = StepInstants(count)
-    for chunk in chunks:
-        yield from made.take(chunk)
-    yield made.finish()
 
 
 class StepInstants:

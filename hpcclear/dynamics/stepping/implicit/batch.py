@@ -15,7 +15,7 @@ from hpcclear.base.jit import FASTMATH, lane_function, scalar_function
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import COUNTS, DOUBLES
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Block, Stepped, rules_in
+from hpcclear.dynamics.layout.arguments import NUMBERS, Asking, Stepped, block_at, rules_in
 from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.stepping.implicit import memory as mem
 from hpcclear.dynamics.stepping.implicit.columns import (
@@ -315,25 +315,13 @@ def is_held(m):
     return held
 
 
-@lane_function
-def unpacked(numbers, work, stages, par, measures):
-    """Numbers, effects and lanes from their addresses."""
-    of = carray(numbers, NUMBERS)
-    W = of[Asking.WIDTH]
-    lanes = Block(
-        carray(work, at.WORK * W),
-        carray(stages, at.MAX_COORDINATES * W),
-        carray(par, at.PARAMETERS * W),
-        None,
-    )
-    return of, Stepped(rules_in(of), carray(measures, of[Asking.MEASURES])), lanes
-
-
 @scalar_function
 def batch_steps(numbers, work, stages, par, settings, tables, measures, memory):
     """`eight_steps` of all stiff lanes, with arrays at addresses."""
-    of, effects, block = unpacked(numbers, work, stages, par, measures)
+    of = carray(numbers, NUMBERS)
     W = of[Asking.WIDTH]
+    block = block_at(W, work, stages, par, None)
+    effects = Stepped(rules_in(of), carray(measures, of[Asking.MEASURES]))
     moved = Moved(
         of[Asking.OBSERVING_EIGHT],
         of[Asking.MOTION_OF_EIGHT],
