@@ -18,7 +18,7 @@ FEATURES = {
     "unknowns of a machine from measured signals":
         "identify/* */identified.py cli/commands/identify.py",
     "laws, objectives, distributions, searches of a user":
-        "plugins/* laws/checks.py laws/translate.py laws/formula.py "
+        "plugins/* laws/checks.py laws/quantities.py laws/translate.py laws/formula.py "
         "laws/constant.py scene/plugged.py base/arithmetic.py statistics/search/foreign.py "
         "statistics/search/asking.py",
     "wear and service lives":

@@ -3,20 +3,18 @@
 import math
 from dataclasses import replace
 
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TorqueDrive
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.parts import (
     Body,
     Clearance,
-    ConstantSpeed,
     Fixed,
-    Harmonic,
     IdealFriction,
     LooseSlide,
     LooseSlot,
     Revolute,
     Slide,
     Slot,
-    TorqueDrive,
     split,
 )
 from hpcclear.scene.loads import KINDS

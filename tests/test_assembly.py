@@ -22,8 +22,9 @@ from linkages import (
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.drives import ConstantSpeed
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Body, ConstantSpeed, Fixed, Slide, split
+from hpcclear.dynamics.linkage.parts import Body, Fixed, Slide, split
 from hpcclear.dynamics.linkage.prescribed import prescribed_motion
 
 PRESCRIBED = {

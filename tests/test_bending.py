@@ -12,19 +12,12 @@ from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, TorqueDrive
 from hpcclear.dynamics.linkage.elements import held_inverse, sign_of
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import (
-    Bending,
-    Body,
-    Clearance,
-    ConstantSpeed,
-    Revolute,
-    Slide,
-    TorqueDrive,
-)
+from hpcclear.dynamics.linkage.parts import Bending, Body, Clearance, Revolute, Slide
 from hpcclear.dynamics.setup.problem import coordinate_count, implicit_method
 from hpcclear.scene.switches import Off, switches
 from hpcclear.scene.tables import plain

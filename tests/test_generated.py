@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import assemble
-from hpcclear.dynamics.linkage.parts import ConstantSpeed
+from hpcclear.dynamics.linkage.drives import ConstantSpeed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "analysis"))
 

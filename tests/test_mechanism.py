@@ -6,16 +6,9 @@ import pytest
 from linkages import LINKAGES, MOTOR, bar, four_bar, load, pins, slider_crank
 
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import (
-    Body,
-    Clearance,
-    ConstantSpeed,
-    Fixed,
-    Harmonic,
-    Revolute,
-    Slide,
-)
+from hpcclear.dynamics.linkage.parts import Body, Clearance, Fixed, Revolute, Slide
 from hpcclear.dynamics.linkage.trees import forest
 
 BASE = four_bar("o2", "o3")

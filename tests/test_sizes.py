@@ -1,6 +1,5 @@
 """Sizes come from one place: sums over any number of coordinates, what does not fit is refused."""
 
-import dis
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +14,8 @@ from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.layout.arguments import Stepped, rules_of
 from hpcclear.dynamics.layout.views import Start
 from hpcclear.dynamics.setup.problem import problem_of
-from hpcclear.dynamics.stepping.control import commit_measures
 from hpcclear.dynamics.stepping.explicit import tableau as tab
 from hpcclear.dynamics.stepping.explicit.combine import Step, stage_state, step_error
-from hpcclear.dynamics.stepping.explicit.steps import weigh_rates
-from hpcclear.dynamics.stepping.implicit.columns import leave
-from hpcclear.dynamics.stepping.implicit.newton import observe_stages
 from hpcclear.scene import load_scene
 
 W = 4
@@ -100,14 +95,3 @@ def test_a_scene_of_too_many_coordinates_is_refused_with_their_number():
     with pytest.raises(InputError, match="89") as caught:
         problem_of(load_scene({"mechanism": mechanism, "effects": {"contact": {"law": "hertz"}}}))
     assert "88 at most" in caught.value.reason
-
-
-# ---- what is integrated ----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("traversal", [weigh_rates, observe_stages, leave, commit_measures])
-def test_every_stepper_integrates_all_of_the_list(traversal):
-    """The gaps of the joints that are open (`commit` has its own); the rest is measured."""
-    seen = {one.argval for one in dis.get_instructions(traversal.py_func)}
-    assert "measures" in seen
-    assert {"begin", "end"} <= seen or traversal is commit_measures

@@ -10,9 +10,10 @@ from plain_lane import Lane
 from scipy.integrate import solve_ivp
 
 from hpcclear.dynamics.linkage.assembly import assemble
+from hpcclear.dynamics.linkage.drives import TorqueDrive
 from hpcclear.dynamics.linkage.generator import On
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import Body, Revolute, TorqueDrive
+from hpcclear.dynamics.linkage.parts import Body, Revolute
 
 D, DA, E, EA, ZF, FA, RR, RA = 0.028, 0.0115, 0.02, 0.01421, 0.02, 0.01421, 0.007, 0.00092
 SS, SA, SB, SC, SD, TA, TB = 0.035, 0.01874, 0.01043, 0.018, 0.02, 0.02308, 0.00916

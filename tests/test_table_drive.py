@@ -8,8 +8,8 @@ import pytest
 
 from hpcclear import load_scene, simulate
 from hpcclear.base.errors import InputError
+from hpcclear.dynamics.linkage.drives import TableDrive
 from hpcclear.dynamics.linkage.loops import words_of
-from hpcclear.dynamics.linkage.parts import TableDrive
 from hpcclear.dynamics.planar.curves import angle_pieces
 from hpcclear.dynamics.planar.problem import linkage_of
 

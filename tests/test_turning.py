@@ -16,8 +16,8 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.evaluation import evaluate_records
 from hpcclear.dynamics.layout.views import Outcome, Parameters, Start
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TorqueDrive
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import ConstantSpeed, Harmonic, TorqueDrive
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.dynamics.setup.parameters import parameters
 from hpcclear.dynamics.setup.problem import problem_of

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 from hpcclear import simulate
 from hpcclear.base.outcome import Status
+from hpcclear.dynamics.linkage.drives import ConstantSpeed
 from hpcclear.dynamics.linkage.generator import On, Rows, generate
-from hpcclear.dynamics.linkage.parts import ConstantSpeed
 from hpcclear.dynamics.planar.problem import linkage_of
 from hpcclear.scene import Scene
 from hpcclear.scene.describing import implausible

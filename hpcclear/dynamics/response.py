@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -118,7 +118,7 @@ def simulate_together(
     Every response has the bytes of ``simulate(scene, copy=..., checked=False)``, with a number of `copies` for each. A scene
     whose kernel differs is simulated alone.
     """
-    groups: dict[Any, list[int]] = {}
+    groups: dict[tuple[object, ...], list[int]] = {}
     for k, scene in enumerate(scenes):
         kernel = kernel_of(scene)
         groups.setdefault((k,) if kernel is None else kernel, []).append(k)
@@ -141,7 +141,7 @@ def simulate_together(
             yield k, _response(scene, scene, found, scene.objective)
 
 
-def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
+def kernel_of(scene: Scene) -> tuple[object, ...] | None:
     """Return what scenes of one batch have in common, or None if a scene has to be simulated alone."""
     steady = scene.numerics.target_error is not None and scene.clearance_joints()
     if steady or coordinate_count(scene) == 0 or refused_of(scene) is not None:
@@ -153,7 +153,7 @@ def kernel_of(scene: Scene) -> tuple[Any, ...] | None:
     return (*motions, settings, problem.tables.tobytes(), problem.tableau.packed().tobytes())
 
 
-Found = tuple[Array, dict[str, Any], Records]
+Found = tuple[Array, dict[str, Array], Records]
 """Instants, time series and outcome record (1,)."""
 
 
@@ -220,7 +220,7 @@ def _kept(scene: Scene) -> dict[str, str | int]:
     return {"transient_turns": transient, **asked}
 
 
-def _reason(scene: Scene, data: dict[str, Any]) -> dict[str, str | int]:
+def _reason(scene: Scene, data: dict[str, Array]) -> dict[str, str | int]:
     """Where a linkage that cannot turn locks, or what is to be known of one that turns and of its series, as an attribute."""
     refusal = refused_of(scene)
     if refusal is not None:
@@ -310,8 +310,8 @@ class Collected(Heard):
             del self._parts[0], self._revolutions[0]
         stored = sum(len(part["time"]) for part in self._parts)
         least = max(stored, count * self._kept)
-        first = self._parts[0]
-        size = sum(one.nbytes for one in first.values()) / max(len(first["time"]), 1)
+        part = self._parts[0]
+        size = sum(one.nbytes for one in part.values()) / max(len(part["time"]), 1)
         _refuse_what_does_not_fit(least * size, count)
 
     def finish(self, record: Records) -> Found:
@@ -343,7 +343,7 @@ class Collected(Heard):
         return slice(max(int(np.searchsorted(revolution, end - self._kept)) - 1, 0), None)
 
 
-def _measured(scene: Scene, problem: Problem, turns: Turns) -> dict[str, Any]:
+def _measured(scene: Scene, problem: Problem, turns: Turns) -> dict[str, Array]:
     """Measures of impact and noise of the averaged revolutions, and the coordinate that goes with them."""
     periods, integrals = turns.averaged(problem.transient)
     first = problem.transient + 1

@@ -1,20 +1,21 @@
 """Checks of a law that nobody here wrote, before anything runs: what it uses, its units, its numbers, its energy."""
 
 import keyword
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from hpcclear.base.unit_names import UNITS, parts
+from hpcclear.base.arrays import Array, Booleans
 from hpcclear.laws.declared import (
     JOINT,
     LAW_NUMBERS,
     VARYING,
     ContactLaw,
     FrictionLaw,
+    Function,
     Law,
     Parameter,
 )
@@ -26,6 +27,7 @@ from hpcclear.laws.numbers import (
     stored,
     with_words,
 )
+from hpcclear.laws.quantities import WORDS, Quantity, registry, unit_of
 from hpcclear.laws.sources import text_of
 from hpcclear.laws.translate import LawError
 
@@ -145,53 +147,13 @@ def check_shape(law: Law) -> None:
 
 
 # ---- units ----------------------------------------------------------------------------------------
-@lru_cache(maxsize=1)
-def registry() -> Any:
-    """Pint's units."""
-    from pint import UnitRegistry
-
-    return UnitRegistry()
-
-
-def _pure(x: Any) -> Any:
-    return x.to("").magnitude if hasattr(x, "magnitude") else x
-
-
-def _size_and_sign(x: Any, y: Any) -> Any:
-    sign = -1.0 if getattr(y, "magnitude", y) < 0 else 1.0
-    return abs(x) * sign
-
-
-def _of_pure(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    def of(x: Any) -> Any:
-        if np.iscomplexobj(pure := _pure(x)):
-            raise ValueError("complex number")
-        return registry().Quantity(float(function(pure)), "")
-
-    return of
-
-
-WORDS = {
-    "sqrt": lambda x: x**0.5,
-    "fabs": abs,
-    "absolute": abs,
-    "copysign": _size_and_sign,
-    "pow": lambda x, y: x ** _pure(y),
-    "power": lambda x, y: x ** _pure(y),
-    "minimum": min,
-    "maximum": max,
-    **{name: _of_pure(getattr(np, name)) for name in ("exp", "log", "tanh", "arctan")},
-    "atan": _of_pure(np.arctan),
-}
-
-
-def check_units(law: Law, values: Mapping[str, Any]) -> None:
+def check_units(law: Law, values: Mapping[str, object]) -> None:
     """LawError unless each function, run on quantities, returns one of its own unit; `values` of the parameters, SI."""
     import pint
 
     given = _quantities(law, values)
 
-    def run(title: str, function: Callable[..., Any], unit: str) -> Any:
+    def run(title: str, function: Function, unit: str) -> Quantity:
         asked = (given[name] for name in law.arguments(function))
         try:
             with np.errstate(all="ignore"):
@@ -223,7 +185,7 @@ def check_units(law: Law, values: Mapping[str, Any]) -> None:
         run("energy", law.energy, "J")
 
 
-def _quantities(law: Law, values: Mapping[str, Any]) -> dict[str, Any]:
+def _quantities(law: Law, values: Mapping[str, Any]) -> dict[str, Quantity]:
     """What a law's functions may require, with units."""
     made = registry().Quantity
     given = {name: made(TYPICAL[name], unit) for name, unit in JOINT.items()}
@@ -232,41 +194,11 @@ def _quantities(law: Law, values: Mapping[str, Any]) -> dict[str, Any]:
     for one in law.parameters:
         value, unit = values[one.name], unit_of(one.unit, one.name)
         several = isinstance(value, tuple)
-        found = [v * unit for v in (value if several else [value])]
-        given[one.name] = tuple(found) if several else found[0]
+        given[one.name] = tuple(v * unit for v in value) if several else value * unit
     return given
 
 
-_NAMED = {
-    frozenset(dimensions.items()): name
-    for name, dimensions in (
-        ("newton", UNITS["N"][1]), ("pascal", UNITS["Pa"][1]), ("joule", UNITS["J"][1]), ("watt", UNITS["W"][1]),
-    )
-}  # fmt: skip
-"""Pint's names of units, so that fractional powers of one cancel to the last digit."""
-
-
-def unit_of(unit: str, name: str) -> Any:
-    """One of a unit, as pint has it; LawError says of which number it is not known."""
-    made = registry().Quantity(1.0, "")
-    if not isinstance(unit, str):
-        raise LawError(f"the unit of {name} is {unit!r}", 'Write it in quotes, "s/m"')
-    try:
-        for _, (size, own), power in parts(unit) if unit else ():
-            known = _NAMED.get(frozenset(own.items()))
-            powers = (
-                {base: float(one) for base, one in own.items()} if known is None else {known: 1.0}
-            )
-            scale = size if known is None else size / 1000
-            one = registry().Quantity(float(scale), registry().UnitsContainer(powers))
-            made = made * one ** float(power)
-    except ValueError:
-        reason = f"the unit {unit!r} of {name} is not known"
-        raise LawError(reason, "Write, say, s/m") from None
-    return made
-
-
-def _in_unit(law: Law, found: Any, title: str, unit: str) -> Any:
+def _in_unit(law: Law, found: Quantity, title: str, unit: str) -> Quantity:
     """What a function returned, in its unit; of ``once`` each number in its own."""
     if isinstance(found, Mapping):
         missing = found.keys() - law.numbers.keys()
@@ -309,7 +241,7 @@ def check_numbers(law: Law, values: Mapping[str, object]) -> None:
         _check_friction(law, given)
 
 
-def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
+def _check_contact(law: ContactLaw, given: Mapping[str, object]) -> None:
     depth, rate, impact = DEPTHS[:, None, None], RATES[None, :, None], IMPACT_SPEEDS[None, None]
     varying = {
         "depth": depth,
@@ -320,7 +252,7 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
     shape = (len(DEPTHS), len(RATES), len(IMPACT_SPEEDS))
     force = np.broadcast_to(force_of(law, {**given, **varying}), shape)
 
-    def where(bad: Any) -> str:
+    def where(bad: Booleans) -> str:
         i, j, k = np.argwhere(np.broadcast_to(bad, shape))[0]
         at_speed = f", impact speed {IMPACT_SPEEDS[k]:g} m/s" if law.latched else ""
         return f"at depth {DEPTHS[i]:.3g} m, rate {RATES[j]:g} m/s{at_speed}"
@@ -355,7 +287,7 @@ def _check_contact(law: ContactLaw, given: Mapping[str, Any]) -> None:
         )
 
 
-def _check_stored(law: ContactLaw, given: Mapping[str, Any], at_rest: Any) -> None:
+def _check_stored(law: ContactLaw, given: Mapping[str, object], at_rest: Array) -> None:
     """LawError unless the force at rest (depths, impact speeds), N, is the elastic part, and that the slope of the energy."""
     if np.ptp(at_rest, axis=1).max() > SAME * at_rest.max():
         raise LawError(
@@ -413,7 +345,7 @@ def _check_friction(law: FrictionLaw, given: Mapping[str, object]) -> None:
 
 
 @lru_cache(maxsize=256)
-def _checked(law: Law, values: tuple[tuple[str, Any], ...]) -> None:
+def _checked(law: Law, values: tuple[tuple[str, object], ...]) -> None:
     check_shape(law)
     check_units(law, dict(values))
     check_numbers(law, dict(values))

@@ -7,16 +7,16 @@ writes into its formula thus come to the same machine code.
 
 import ast
 import inspect
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from types import FunctionType
-from typing import Any
+from typing import Any, TypeVar
 
-from hpcclear.laws.declared import LAW_NUMBERS, VARYING, Law
+from hpcclear.laws.declared import LAW_NUMBERS, VARYING, Function, Law
 from hpcclear.laws.formula import function_of
 from hpcclear.laws.translate import LawError, definition_of
 
+Own = TypeVar("Own", bound=Law)
 COSTLY = (ast.Div, ast.Pow, ast.Call)
 LONGEST_PART = 200
 """Nodes of a constant part that is written out for its name: names of names of names double at each step."""
@@ -24,7 +24,7 @@ IMPACT, INVERSE = "impact_speed", "inverse_impact_speed"
 
 
 @cache
-def with_constants(law: Any) -> Any:
+def with_constants(law: Own) -> Own:
     """The law with such parts in ``once``; itself where there are none, or more than it has rows for."""
     try:
         known: dict[tuple[str, int], str] = {}
@@ -39,7 +39,7 @@ def with_constants(law: Any) -> Any:
         changed["kinks"] = tuple(changed.pop(k, made[k].own) for k in kinks)
     once = [one.once() for one in made.values() if one.constants]
     numbers = {name: "" for one in made.values() for name in one.constants.values()}
-    found: Law = replace(
+    found = replace(
         law, **changed, once=(*law.worked_out(), *once), numbers={**law.numbers, **numbers}
     )
     return found if len(found.read) <= LAW_NUMBERS else law
@@ -49,7 +49,7 @@ class _Parts(ast.NodeTransformer):
     """One function without its constant parts, and these; `known`: names of those of the functions before."""
 
     def __init__(
-        self, kind: str, title: str, own: Callable[..., Any], known: dict[tuple[str, int], str]
+        self, kind: str, title: str, own: Function, known: dict[tuple[str, int], str]
     ) -> None:
         self.own, self.title, self.known, self.constants = own, title, known, dict[str, str]()
         self.tree = definition_of(own)
@@ -109,16 +109,14 @@ class _Parts(ast.NodeTransformer):
         self.constants[text] = name
         return ast.Name(name, ast.Load())
 
-    def _made(self, name: str, names: list[str], body: str) -> Callable[..., Any]:
+    def _made(self, name: str, names: list[str], body: str) -> Function:
         """A function of the same surroundings."""
         around = {**self.own.__globals__, **inspect.getclosurevars(self.own).nonlocals}
         around.pop("__name__", None)  # its lines are in no module
-        made: Callable[..., Any] = function_of(
-            f"def {name}({', '.join(names)}):\n{body}\n", name, around
-        )
+        made: Function = function_of(f"def {name}({', '.join(names)}):\n{body}\n", name, around)
         return made
 
-    def function(self) -> Callable[..., Any]:
+    def function(self) -> Function:
         """What is left."""
         body = "\n".join(ast.unparse(ast.fix_missing_locations(one)) for one in self.tree.body)
         used = {one.id for one in ast.walk(ast.parse(body)) if isinstance(one, ast.Name)}
@@ -126,7 +124,7 @@ class _Parts(ast.NodeTransformer):
         indented = "".join(f"    {line}\n" for line in body.splitlines())
         return self._made(self.title, [one for one in names if one in used], indented)
 
-    def once(self) -> Callable[..., Any]:
+    def once(self) -> Function:
         """What gives the constants."""
         used = {
             one.id
@@ -147,7 +145,7 @@ def _count(tree: ast.AST) -> int:
 class _Short(ast.NodeTransformer):
     """Writes out calls of other functions that are one formula of what is known here."""
 
-    def __init__(self, own: Callable[..., Any]) -> None:
+    def __init__(self, own: Function) -> None:
         self.around = own.__globals__
 
     def visit_Call(self, node: ast.Call) -> ast.expr:

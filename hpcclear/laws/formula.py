@@ -10,7 +10,7 @@ from typing import Any
 
 from hpcclear.base.arithmetic import WORDS, read
 from hpcclear.base.unit_names import dimensions
-from hpcclear.laws.declared import JOINT, VARYING, ContactLaw, FrictionLaw, Law, Parameter
+from hpcclear.laws.declared import JOINT, VARYING, ContactLaw, FrictionLaw, Function, Law, Parameter
 from hpcclear.laws.translate import LawError
 
 LONGEST = 500
@@ -85,10 +85,11 @@ def _check_si(name: str, unit: str) -> None:
         raise LawError(reason, f'Write, say, "s/m"; the value of {name} may have any unit')
 
 
-def function_of(text: str, name: str, around: Mapping[str, Any] | None = None) -> Any:
+def function_of(text: str, name: str, around: Mapping[str, object] | None = None) -> Function:
     """The function `name` of a text, whose lines `inspect` finds; `around`: what it may use."""
     path = f"<formula {hashlib.sha256(text.encode()).hexdigest()[:12]}>"
     linecache.cache[path] = (len(text), None, text.splitlines(keepends=True), path)
     names: dict[str, Any] = {**(around or {})}
     exec(compile(text, path, "exec"), names)
-    return names[name]
+    made: Function = names[name]
+    return made

@@ -1,11 +1,11 @@
 """Hertz's contact, and the family of laws F = K d^1.5 (1 + a(c_e) d'/d'_0) that has it for its elastic part."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from hpcclear.base.arrays import Array
-from hpcclear.laws.declared import ContactLaw, Parameter
+from hpcclear.laws.declared import ContactLaw, Function, Parameter
 
 Number = TypeVar("Number", float, Array)
 """A float, or an array of them."""
@@ -16,7 +16,7 @@ def reduced_compliance(youngs_modulus: Number, poisson_ratio: Number) -> Number:
     return (1.0 - poisson_ratio**2) / youngs_modulus
 
 
-def dundurs(moduli: Any, ratios: Any) -> tuple[Any, Any]:
+def dundurs(moduli: Sequence[Array], ratios: Sequence[Array]) -> tuple[Array, Array]:
     """Dundurs' parameters alpha, beta of journal against bearing, in plane strain; (bearing's, journal's) moduli and ratios.
 
     Dundurs 1969, doi:10.1115/1.3564739.
@@ -99,7 +99,7 @@ def _nothing_at_rest(name):
 
 def by_restitution(
     name: str,
-    factor: Callable[[Any], Any],
+    factor: Function,
     *,
     words: str,
     source: str,

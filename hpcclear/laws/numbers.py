@@ -5,14 +5,14 @@ where that does not do (an ``if``), number by number.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
-from hpcclear.laws.declared import LAW_NUMBERS, ContactLaw, FrictionLaw, Law
+from hpcclear.laws.declared import LAW_NUMBERS, ContactLaw, FrictionLaw, Function, Law
 from hpcclear.laws.translate import LawError
 
 _ARRAYS = {
@@ -25,8 +25,8 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 def with_words(
-    function: Callable[..., object], words: Mapping[str, object], own: Mapping[str, object]
-) -> Any:
+    function: Function, words: Mapping[str, object], own: Mapping[str, object]
+) -> Function:
     """The same function, and those of its module that it calls, with other functions for those of `math` and of Python."""
     if not isinstance(function, FunctionType):
         return function
@@ -54,7 +54,7 @@ def with_words(
     return result
 
 
-def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> Any:
+def evaluate(function: Function, given: Mapping[str, object]) -> Any:
     """A function of arrays that broadcast, of any shape: an array, or a dict of such."""
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     values = [given[name] for name in names]
@@ -66,7 +66,7 @@ def evaluate(function: Callable[..., object], given: Mapping[str, object]) -> An
             return _one_by_one(function, values)
 
 
-def _one_by_one(function: Callable[..., object], values: list[Any]) -> Any:
+def _one_by_one(function: Function, values: list[Any]) -> Any:
     shape = np.broadcast_shapes(*(np.shape(one) for one in values))
     flat = [np.broadcast_to(np.asarray(one, float), shape).ravel() for one in values]
     rows = [_safely(function, list(row)) for row in zip(*flat, strict=True)]
@@ -75,7 +75,7 @@ def _one_by_one(function: Callable[..., object], values: list[Any]) -> Any:
     return np.array(rows, float).reshape(shape)
 
 
-def _safely(function: Callable[..., object], row: list[float]) -> Any:
+def _safely(function: Function, row: list[float]) -> Any:
     """A value; infinite or NaN where Python's own arithmetic gives no real one."""
     numbers = [np.float64(one) for one in row]
     try:
@@ -93,7 +93,7 @@ def _safely(function: Callable[..., object], row: list[float]) -> Any:
 _UNREAL = (ZeroDivisionError, OverflowError, ValueError, TypeError)
 
 
-def _with_numpy(function: Callable[..., object]) -> Any:
+def _with_numpy(function: Function) -> Function:
     """The same function with NumPy's floats for its constants: dividing by 0 gives infinity, a root of -1 NaN."""
     if not isinstance(function, FunctionType):
         return function
@@ -121,7 +121,7 @@ def sample_numbers(law: Law, given: Mapping[str, object]) -> dict[str, Any]:
     return found
 
 
-def force_of(law: ContactLaw, given: Mapping[str, object]) -> Any:
+def force_of(law: ContactLaw, given: Mapping[str, object]) -> Array:
     """Normal force before the cut, N; arrays that broadcast, of any shape."""
     if law.factor is None:
         return evaluate(law.force, given)
@@ -142,7 +142,7 @@ def read_from(law: Law, rows: Array) -> dict[str, Array]:
     return {name: rows[..., k] for k, name in enumerate(law.read)}
 
 
-def elastic_at(law: ContactLaw, depth: Any, numbers: Mapping[str, Any]) -> Any:
+def elastic_at(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Array:
     """Elastic part of the force at a depth, N; arrays that broadcast, of any shape."""
     at_rest = {**numbers, "depth": depth, "rate": 0.0 * depth}
     if law.elastic is not None:
@@ -151,7 +151,7 @@ def elastic_at(law: ContactLaw, depth: Any, numbers: Mapping[str, Any]) -> Any:
     return force_of(law, {**at_rest, "impact_speed": one, "inverse_impact_speed": one})
 
 
-def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Any:
+def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Array:
     """Energy stored at a depth >= 0, J, of its shape: declared, or the integral of the elastic part."""
     if law.energy is not None:
         return evaluate(law.energy, {**numbers, "depth": depth})
@@ -163,7 +163,7 @@ def stored(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Any:
     return total
 
 
-def swing(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Any:
+def swing(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Array:
     """Stiffness dF/dd where the elastic part is `force` (m,), N/m."""
     if law.swing is not None:
         return evaluate(law.swing, {**numbers, "force": force})
@@ -171,7 +171,7 @@ def swing(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Any:
     return _slope(law, depth, numbers)
 
 
-def _slope(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Any:
+def _slope(law: ContactLaw, depth: Array, numbers: Mapping[str, object]) -> Array:
     step = 1e-5 * depth
     low, high = (elastic_at(law, depth + sign * step, numbers) for sign in (-1, 1))
     return (high - low) / (2.0 * step)
@@ -187,7 +187,7 @@ def depth_at(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> Ar
     return 10.0 ** (0.5 * (low + high))
 
 
-def shape_near(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> tuple[Any, Any]:
+def shape_near(law: ContactLaw, force: Array, numbers: Mapping[str, object]) -> tuple[Array, Array]:
     """Exponent of the depth and factor of the rate (`latched`: over the impact speed), as F ~ d^n (1 + c d') where the elastic
     part is `force` (m,): what peaks between steps are found by."""
     if law.exponent is not None and law.damping is not None:

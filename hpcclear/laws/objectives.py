@@ -1,14 +1,14 @@
 """Objectives with a rate of their own: it is written into the lanes like a law, and checked before anything runs."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
 from hpcclear.base.objectives import MADE, OF_ALL, OF_JOINTS, RECORDED, Objective, arguments
 from hpcclear.base.outcome import FIELDS
-from hpcclear.laws.checks import TYPICAL, WORDS, registry, unit_of
+from hpcclear.laws.checks import TYPICAL
 from hpcclear.laws.numbers import evaluate, with_words
+from hpcclear.laws.quantities import WORDS, Quantity, registry, unit_of
 from hpcclear.laws.sources import HEAD
 from hpcclear.laws.translate import LawError, written
 
@@ -148,7 +148,9 @@ def _check_value(objective: Objective, numbers: Mapping[str, object]) -> None:
         _fits(made, objective.unit, "its value")
 
 
-def _with_unit(function: Callable[..., object], given: Mapping[str, object], title: str) -> Any:
+def _with_unit(
+    function: Callable[..., object], given: Mapping[str, object], title: str
+) -> Quantity:
     """A function of quantities; None where it is no arithmetic of these."""
     import pint
 
@@ -161,7 +163,7 @@ def _with_unit(function: Callable[..., object], given: Mapping[str, object], tit
         return None
 
 
-def _fits(found: Any, unit: str, what: str) -> None:
+def _fits(found: Quantity, unit: str, what: str) -> None:
     """LawError unless a quantity is of a unit."""
     try:
         expected = unit_of(unit, what).units

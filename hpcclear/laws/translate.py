@@ -75,7 +75,7 @@ class _Writer:
         self.title = title
         self.depth = depth
         self.helpers: list[str] = []
-        self.names: dict[Any, str] = {}
+        self.names: dict[object, str] = {}
 
     def function(self, function: Callable[..., object], name: str) -> list[str]:
         """Its text and those before it."""

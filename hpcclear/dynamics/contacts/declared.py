@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hpcclear.base.arrays import Array
+from hpcclear.dynamics.layout.views import Parameters
 
 Get = Callable[[str], Array]
 """Values of an entry of the joint's table, (m,), by its name."""
@@ -40,7 +41,7 @@ class ContactGeometry:
     words: str
     force: Any
     shape: Callable[[Get], Shape]
-    reach: Callable[[Any, int], Array]
+    reach: Callable[[Parameters, int], Array]
     """From `views.Parameters` and a place: how far the journal may be from the bearing until they touch, m."""
     along_a_line: bool = False
     """Whether it lies at a guide's line: `frame` is the unit vector across it, `relative` counts from the line."""

@@ -23,6 +23,7 @@ from hpcclear.dynamics.contacts.forces import (
     swept,
     tangential_force,
 )
+from hpcclear.dynamics.layout.views import Parameters
 
 
 @apart
@@ -70,23 +71,25 @@ def shape(get: Get) -> Shape:
     return Shape(clearance, half, radius, (radius, radius, radius), radius)
 
 
-def reach(parameters: Any, place: int) -> Array:
+def reach(parameters: Parameters, place: int) -> Array:
     """Of a corner's centre from the line, m, shape (...): of samples."""
-    found: Array = parameters.bearing_radius[..., place] - parameters.journal_radius[..., place]
-    return found
+    apart: Array = parameters.bearing_radius[..., place] - parameters.journal_radius[..., place]
+    return apart
 
 
-def corner(middle: Any, size: Any, radius: Any, which: str) -> tuple[Any, Any]:
+def corner(
+    middle: tuple[float, float], size: tuple[float, float], radius: float, which: str
+) -> tuple[float, float]:
     """Centre of a corner's circle in the slider's axes, m; `middle` of the slider, `size`: length and height."""
     (x, y), (ahead, aside) = middle, CORNERS[which]
     return x + ahead * (0.5 * size[0] - radius), y + aside * (0.5 * size[1] - radius)
 
 
-def gap_of(joint: Any, which: str, offset: Any, tilt: Any) -> Any:
+def gap_of(joint: Any, which: str, offset: float, tilt: float) -> Array | float:
     """Gap of a corner, m, below 0 in flight, of a slider `offset` from the middle of its channel and tilted by `tilt`, rad."""
     x, y = corner((0.0, 0.0), (joint.length, joint.height), joint.corner_radius, which)
     side = CORNERS[which][1]
-    away = side * (offset + x * np.sin(tilt) + y * np.cos(tilt))
+    away: Array | float = side * (offset + x * np.sin(tilt) + y * np.cos(tilt))
     return away + joint.corner_radius - 0.5 * joint.height - joint.clearance
 
 

@@ -3,7 +3,6 @@
 import hashlib
 from functools import cache
 from types import ModuleType
-from typing import Any
 
 from hpcclear.base.generated import module_of
 from hpcclear.base.objectives import Objective
@@ -45,7 +44,7 @@ class InLanes:
     def __hash__(self) -> int:
         return hash(self._made_of)
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         return InLanes, self._made_of
 
 

@@ -5,7 +5,6 @@ forces exerts no net couple; angles counter-clockwise; gravity towards -y.
 """
 
 import math
-from typing import Any
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.bits import no_less
@@ -22,6 +21,7 @@ from hpcclear.dynamics.contacts.forces import (
 )
 from hpcclear.dynamics.contacts.lubrication import film_of, pressed
 from hpcclear.dynamics.contacts.roundness import less, store_angles, tilted, waves_here
+from hpcclear.dynamics.layout.views import Parameters
 
 _TINY = 1e-300  # keeps the normal of a centred journal defined (and zero)
 
@@ -90,7 +90,7 @@ def shape(get: Get) -> Shape:
     return Shape(*radii, radii, bearing * journal / clearance)
 
 
-def reach(parameters: Any, place: int) -> Array:
+def reach(parameters: Parameters, place: int) -> Array:
     """The clearance, m, shape (...): of samples."""
     found: Array = parameters.clearance[..., place]
     return found

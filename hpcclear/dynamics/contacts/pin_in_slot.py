@@ -6,6 +6,7 @@ whose circle is the whole pin: see `guide.corner_force`. The pin turns freely in
 
 from typing import Any
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import WALLS
 from hpcclear.dynamics.contacts import guide
 from hpcclear.dynamics.contacts.declared import ContactGeometry, Get, Shape
@@ -17,9 +18,10 @@ def shape(get: Get) -> Shape:
     return Shape(clearance, radius + clearance, radius, (radius, radius, radius), radius)
 
 
-def gap_of(joint: Any, which: str, offset: Any) -> Any:
+def gap_of(joint: Any, which: str, offset: float) -> Array | float:
     """Gap at a wall, m, below 0 in flight, of a pin `offset` to the left of the slot's line."""
-    return WALLS[which] * offset - joint.clearance
+    away: Array | float = WALLS[which] * offset - joint.clearance
+    return away
 
 
 GEOMETRY = ContactGeometry(

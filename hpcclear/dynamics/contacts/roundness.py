@@ -7,7 +7,7 @@ before, across it by h'/|e| of that, and moments h' on both bodies. That is the 
 not along e but by h'/|e| aside, to first order in h/c.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hpcclear.base.jit import lane_function
 from hpcclear.base.unrolled import written_out
@@ -19,13 +19,13 @@ HIGHER = range(1, at.WAVE_ROWS // 2)
 class Here(NamedTuple):
     """What waves come to where journal and bearing touch."""
 
-    bearing: Any  # depth, m
-    journal: Any
-    slope: Any  # of the bearing's depth, m/rad
-    rise: Any  # of the journal's
-    widening: Any  # rate of both depths there, m/s
-    own: Any  # cosine and sine of the contact's angle in the bearing
-    other: Any  # in the journal
+    bearing: float  # depth, m
+    journal: float
+    slope: float  # of the bearing's depth, m/rad
+    rise: float  # of the journal's
+    widening: float  # rate of both depths there, m/s
+    own: tuple[float, float]  # cosine and sine of the contact's angle in the bearing
+    other: tuple[float, float]  # in the journal
 
 
 @lane_function

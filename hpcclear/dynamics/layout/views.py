@@ -35,7 +35,7 @@ class Column:
         values: Array = view.rows[..., self.column]
         return values
 
-    def __set__(self, view: "View", values: Any) -> None:
+    def __set__(self, view: "View", values: Array | float) -> None:
         view.rows[..., self.column] = values
 
 

@@ -1,7 +1,6 @@
 """What a load may use of the motion that it is written into (`hpcclear.scene.loads`)."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sized
 
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage import piecewise
@@ -87,7 +86,7 @@ class Acting:
         """`slope` times what is above 0 of a term."""
         return piecewise.hinge(self._writer, name, beyond, ZERO, slope)
 
-    def piecewise(self, rows: tuple[Any, ...], place: Term, rate: Term) -> Term:
+    def piecewise(self, rows: Sized, place: Term, rate: Term) -> Term:
         """The value of a table of `Load.straight` at a place that changes at a rate; steps end at its rows.
 
         Its parameters are ``base.pieces.hinges`` of the load's name.

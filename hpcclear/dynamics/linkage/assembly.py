@@ -12,7 +12,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, typical_length
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight, uncentred
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Slide, as_complex, split
+from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Number, Pair, Slide, as_complex, split
 from hpcclear.dynamics.linkage.trees import forest
 
 MOST_STEPS = 40
@@ -86,8 +86,8 @@ def _about_centres(made: Assembly, mechanism: Mechanism) -> Assembly:
 
 
 def placed(
-    assembly: Assembly, place: str, at: tuple[Any, Any] | None = None
-) -> tuple[Any, Any, Any, Any]:
+    assembly: Assembly, place: str, at: Pair | None = None
+) -> tuple[Any, Any, Number, Number]:
     """Position and velocity (complex) of a place of an assembly, or of one `at` the body's own axes; angle and angular velocity
     of its body."""
     mechanism: Mechanism = assembly.loops.mechanism
@@ -175,7 +175,7 @@ def is_open(mechanism: Mechanism, owner: str) -> bool:
 
 def _eccentricities(loops: Loops) -> Array:
     """What each constraint is to be at the start."""
-    wanted: list[Any] = [0.0] * len(loops.owners)
+    wanted: list[Number] = [0.0] * len(loops.owners)
     for joint in loops.mechanism.clearances:
         rows = [r for r, owner in enumerate(loops.owners) if owner == f"joints.{joint.name}"]
         for r, apart in zip(rows, joint.start_eccentricity, strict=True):
@@ -249,7 +249,7 @@ def _newton(loops: Loops, q: Array, wanted: Array) -> tuple[Array, int, Array, I
 def rough_pose(loops: Loops) -> Array:
     """Coordinates (n,) or (n, m) of the bodies at their start angles, hung one after the other on what stands already."""
     mechanism = loops.mechanism
-    placed: dict[str, tuple[Any, Any]] = {GROUND: (0j, 0.0)}
+    placed: dict[str, tuple[Any, Number]] = {GROUND: (0j, 0.0)}
     bodies = {body.name: body for body in mechanism.bodies}
 
     def at(place: str) -> Any:
@@ -263,7 +263,7 @@ def rough_pose(loops: Loops) -> Array:
                 body, carrier = split(own)[0], split(other)[0]
                 if body in placed or carrier not in placed:
                     continue
-                angle = bodies[body].start_angle
+                angle: Number = bodies[body].start_angle
                 if isinstance(joint, (Slide, Fixed)):
                     turned = joint.angle if own == joint.point else -joint.angle
                     angle = placed[carrier][1] + turned

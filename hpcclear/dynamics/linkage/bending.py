@@ -13,13 +13,14 @@ The axial force is in it: of inertia by G and B, of what pulls at b by delta. Wh
 inertia leave beside the uniform bar (`uniform_share`) is rigid: big ends, bosses.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.dynamics.linkage.expression import ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.parts import Body
+from hpcclear.dynamics.linkage.parts import Body, Number
 
 SHORTEST = 0.005
 """By how much of its length a bar may get shorter: 4.5 % of deflection in the first mode.
@@ -199,7 +200,7 @@ def entries(modes: int) -> tuple[str, ...]:
     )
 
 
-def uniform_share(mass: Any, inertia: Any, length: Any, center: Any) -> Any:
+def uniform_share(mass: Number, inertia: Number, length: Number, center: Number) -> Number:
     """Mass of the largest uniform bar that leaves a rigid body, kg: of a uniform bar, all of it.
 
     What it leaves of mass, first moment and inertia is that of a body as long as no mass is negative:
@@ -214,12 +215,12 @@ def uniform_share(mass: Any, inertia: Any, length: Any, center: Any) -> Any:
 class Bar(NamedTuple):
     """A bar's numbers, single ones or of samples (m,): kg, kg m2, m, mass centre from a in m, N m2, 1."""
 
-    mass: Any
-    inertia: Any
-    length: Any
-    center: Any
-    stiffness: Any
-    damping: Any
+    mass: Number
+    inertia: Number
+    length: Number
+    center: Number
+    stiffness: Number
+    damping: Number
 
 
 def bar_of(body: Body) -> Bar:
@@ -231,12 +232,12 @@ def bar_of(body: Body) -> Bar:
     )
 
 
-def numbers(bar: Bar, modes: int) -> dict[str, Any]:
+def numbers(bar: Bar, modes: int) -> dict[str, Number]:
     """Values of `entries`, SI."""
     share = uniform_share(bar.mass, bar.inertia, bar.length, bar.center)
     length, c = bar.length, bar.center
     density = share / length
-    found: dict[str, object] = {"mass": 0.5 * share, "inverse_mass": 2.0 / share}
+    found: dict[str, Number] = {"mass": 0.5 * share, "inverse_mass": 2.0 / share}
     found["most"] = SHORTEST * length
     wave = {i: i * np.pi / length for i in range(1, modes + 1)}
     for i, a in wave.items():
@@ -263,10 +264,10 @@ def numbers(bar: Bar, modes: int) -> dict[str, Any]:
     return found
 
 
-def _moment(i: int, j: int, length: Any, power: int) -> Any:
+def _moment(i: int, j: int, length: Number, power: int) -> Number:
     """Integral of s^power cos(i pi s/L) cos(j pi s/L) over the bar; power 1 or 2."""
 
-    def one(k: int) -> Any:
+    def one(k: int) -> Number:
         if k == 0:
             return length ** (power + 1) / (power + 1)
         sign = -1.0 if k % 2 else 1.0
@@ -290,7 +291,9 @@ class Bent(NamedTuple):
         return found
 
 
-def bent(found: dict[str, Any], q: Array, v: Array, turning: tuple[Any, Any, Any]) -> Bent:
+def bent(
+    found: Mapping[str, Number], q: Array, v: Array, turning: tuple[Array, Array, Array]
+) -> Bent:
     """Of amplitudes and velocities (modes, m).
 
     Parameters
@@ -304,15 +307,12 @@ def bent(found: dict[str, Any], q: Array, v: Array, turning: tuple[Any, Any, Any
     rows = range(1, len(q) + 1)
     along, across, spin = turning
 
-    def quadratic(entry: str, a: Array, b: Array) -> Any:
-        return sum(
-            found[f"{entry}_{min(i, j)}{max(i, j)}"] * a[i - 1] * b[j - 1]
-            for i in rows
-            for j in rows
-        )
+    def quadratic(entry: str, a: Array, b: Array) -> Array:
+        pairs = ((found[f"{entry}_{min(i, j)}{max(i, j)}"], i, j) for i in rows for j in rows)
+        return np.asarray(sum(one * a[i - 1] * b[j - 1] for one, i, j in pairs))
 
-    def linear(entry: str, a: Any) -> Any:
-        return sum(found[f"{entry}_{i}"] * a[i - 1] for i in rows)
+    def linear(entry: str, a: Array) -> Array:
+        return np.asarray(sum(found[f"{entry}_{i}"] * a[i - 1] for i in rows))
 
     sideways, inwards = linear("lateral", q), -0.5 * quadratic("axial", q, q)
     rate_across = linear("lateral", v) + spin * inwards
@@ -327,7 +327,7 @@ def bent(found: dict[str, Any], q: Array, v: Array, turning: tuple[Any, Any, Any
     )  # fmt: skip
 
 
-def shortened(found: dict[str, Any], q: Array, v: Array) -> tuple[Array, Array]:
+def shortened(found: Mapping[str, Number], q: Array, v: Array) -> tuple[Array, Array]:
     """delta (m) and its rate (m/s), shape (m,), of amplitudes and velocities (modes, m); `found`: of `numbers`."""
     by = [found[f"nearer_{mode}"] for mode in range(1, len(q) + 1)]
     return (

@@ -7,17 +7,15 @@ what c'' has to be besides them.
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, Drive, RunUp
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover, Point
 from hpcclear.dynamics.linkage.parts import (
     GROUND,
     Aligned,
-    ConstantSpeed,
-    Drive,
     Fixed,
     Joint,
     Revolute,
-    RunUp,
     Slide,
     Slot,
     split,

@@ -9,16 +9,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import Bend
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.expression import NOWHERE, ONE, ZERO, Term, Vector, Writer, named
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    ConstantSpeed,
-    Harmonic,
-    Slide,
-    TableDrive,
-    TorqueDrive,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, Slide, split
 from hpcclear.dynamics.linkage.trees import Forest
 
 CENTER = "center"

@@ -2,7 +2,6 @@
 
 from functools import cached_property
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.bending import Bent, bent, entries, kind_of
 from hpcclear.dynamics.linkage.compiled import module_with
+from hpcclear.dynamics.linkage.drives import curves_of, straight_of
 from hpcclear.dynamics.linkage.generator import Motion, On, generate
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, coupled, gain_of
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import Revolute, curves_of, straight_of
+from hpcclear.dynamics.linkage.parts import Number, Revolute
 from hpcclear.dynamics.linkage.piecewise import starts
 from hpcclear.dynamics.linkage.poses import Pose, Poses
 from hpcclear.dynamics.linkage.rows import Rows
@@ -170,7 +170,7 @@ class Linkage:
         return module_with(self._text(on), self.places)
 
     def fill(
-        self, par: Array, sample: Mechanism, gravity: Any, feedback: tuple[float, float]
+        self, par: Array, sample: Mechanism, gravity: Number, feedback: tuple[float, float]
     ) -> None:
         """Write the rows of its own into parameters (m, PARAMETERS), of a mechanism with numbers (m,) or single ones."""
         base = values(sample, self.cartesian, gravity=gravity, feedback=feedback)

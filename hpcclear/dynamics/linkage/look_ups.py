@@ -3,9 +3,7 @@
 from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage.expression import Writer, named
-from hpcclear.dynamics.linkage.kinematics import Kinematics
-from hpcclear.dynamics.linkage.parts import (
+from hpcclear.dynamics.linkage.drives import (
     Drive,
     LoadTerms,
     RunUp,
@@ -14,6 +12,8 @@ from hpcclear.dynamics.linkage.parts import (
     curves_of,
     seconds_of,
 )
+from hpcclear.dynamics.linkage.expression import Writer, named
+from hpcclear.dynamics.linkage.kinematics import Kinematics
 from hpcclear.dynamics.linkage.rows import Rows
 from hpcclear.dynamics.linkage.trees import Forest
 

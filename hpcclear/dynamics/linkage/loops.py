@@ -3,7 +3,7 @@
 The terms are those of `closing.Closing`, evaluated by Python or, for many instants at once, by numpy.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -11,32 +11,34 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics.linkage import elements
 from hpcclear.dynamics.linkage.closing import Closing
+from hpcclear.dynamics.linkage.drives import TableDrive
 from hpcclear.dynamics.linkage.expression import Writer
 from hpcclear.dynamics.linkage.kinematics import Kinematics, Mover
 from hpcclear.dynamics.linkage.mechanism import Mechanism, straight
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import TableDrive
+from hpcclear.dynamics.linkage.parts import Number
 from hpcclear.dynamics.linkage.trees import forest
 
 
-def sincos(angle: Any) -> tuple[Any, Any]:
+def sincos(angle: Array) -> tuple[Array, Array]:
     """Sine and cosine of numbers or arrays, any shape."""
     return np.sin(angle), np.cos(angle)
 
 
-def sign_of(value: Any) -> Any:
+def sign_of(value: Array) -> Array:
     """`elements.sign_of` for arrays, any shape."""
     return np.where(value >= 0.0, 1.0, -1.0)
 
 
-def saturated(value: Any) -> Any:
+def saturated(value: Array) -> Array:
     """`friction.saturated` for arrays, any shape."""
     return np.clip(value, -1.0, 1.0)
 
 
-WORDS: dict[str, Callable[..., Any]] = elements.functions() | {
+WORDS: dict[str, Callable[..., object]] = elements.functions() | {
     "sincos": sincos,
     "sign_of": sign_of,
     "saturated": saturated,
@@ -44,7 +46,9 @@ WORDS: dict[str, Callable[..., Any]] = elements.functions() | {
 """What texts call, for arrays."""
 
 
-def on_arrays(mechanism: Mechanism, source: str, **functions: Any) -> Callable[..., None]:
+def on_arrays(
+    mechanism: Mechanism, source: str, **functions: Callable[..., object]
+) -> Callable[..., None]:
     """The function of a text of terms, evaluated by Python or, for many instants or samples at once, by numpy.
 
     `functions`: what its loads call besides.
@@ -73,7 +77,7 @@ def words_of(mechanism: Mechanism) -> dict[str, Callable[[Array], tuple[Array, .
     }
 
 
-def _all_at(pieces: tuple[Any, ...], time: Array) -> tuple[Array, ...]:
+def _all_at(pieces: tuple[Pieces, ...], time: Array) -> tuple[Array, ...]:
     return tuple(one.at(time) for one in pieces)
 
 
@@ -131,11 +135,11 @@ class Loops:
         self.scales = np.array([1.0 if c.kind == "angle" else length for c in columns])
         self.row_scales = np.where(angles, 1.0, length)
 
-    def take(self, base: dict[str, Any]) -> None:
+    def take(self, base: Mapping[str, Number]) -> None:
         """Other numbers of the same mechanism, by names as of `numbers.values`: single ones, or arrays of samples (m,)."""
         self._par = {row: base[name] for name, row in self._rows.items()}
 
-    def at(self, q: Array, v: Array, time: Any) -> State:
+    def at(self, q: Array, v: Array, time: Number) -> State:
         """Constraints of coordinates and velocities (n, ...) at times (...) in s."""
         rows, shape = len(self.owners), np.shape(time)
         error, rate = np.zeros((2, rows, *shape))
@@ -146,12 +150,13 @@ class Loops:
         return State(error, rate, jacobian)
 
 
-def typical_length(mechanism: Mechanism) -> Any:
+def typical_length(mechanism: Mechanism) -> Number:
     """The largest distance between points of a body, or of the ground, m; of samples, (m,)."""
     groups = [list(mechanism.ground.values())]
     groups += [[*body.points.values(), body.center] for body in mechanism.bodies]
-    largest: Any = 0.0
+    largest: Number = 0.0
     for points in groups:
         for a, b in combinations(points, 2):
             largest = np.maximum(largest, np.hypot(a[0] - b[0], a[1] - b[1]))
-    return np.where(largest > 0.0, largest, 1.0)[()]
+    found: Number = np.where(largest > 0.0, largest, 1.0)[()]
+    return found

@@ -9,28 +9,27 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import MAX_JOINTS
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Body,
-    Clearance,
-    Contact,
+from hpcclear.dynamics.linkage.drives import (
     Drive,
-    Fixed,
     Harmonic,
-    Joint,
     LoadTerms,
-    Loose,
-    LooseSlide,
-    LooseSlot,
-    Pair,
     Release,
-    Revolute,
     RunUp,
-    Slide,
-    Slot,
     TableDrive,
     TorqueDrive,
     seconds_of,
+)
+from hpcclear.dynamics.linkage.parts import (
+    GROUND,
+    Body,
+    Contact,
+    Fixed,
+    Joint,
+    Loose,
+    Pair,
+    Revolute,
+    Slide,
+    Slot,
     split,
 )
 
@@ -94,9 +93,8 @@ class Mechanism:
     @property
     def clocked(self) -> bool:
         """Whether a load or drive goes by the time since the start."""
-        return any(map(seconds_of, self.loads)) or any(
-            isinstance(drive, RunUp) for drive in self.drives
-        )
+        by_drive = any(isinstance(drive, RunUp) for drive in self.drives)
+        return by_drive or any(map(seconds_of, self.loads))
 
     def drive_of(self, body: str) -> Drive | None:
         """What drives a body."""
@@ -183,7 +181,7 @@ def _places(m: Mechanism) -> None:
                 continue
             listed = ", ".join(sorted(words)) or "none yet"
             raise InputError(f"{key}.{entry}", place, reason, f"Known are: {listed}")
-        for entry in ("body", "other"):
+        for entry in ("body", "other", "angle_of"):
             acted_on = getattr(one, entry, None)
             if acted_on is not None and acted_on not in known.keys() - {GROUND}:
                 raise InputError(
@@ -191,7 +189,6 @@ def _places(m: Mechanism) -> None:
                     f"Known are: {', '.join(sorted(known.keys() - {GROUND}))}",
                 )  # fmt: skip
     _turned(m)
-    _looked_up(m)
     for joint in m.joints:
         first, second = (split(place)[0] for place in joint.places)
         if first == second:
@@ -239,8 +236,8 @@ def _turned(m: Mechanism) -> None:
         gains |= {name: {gain_of(m, drive) for drive in driven} for name in names}
     for load in m.loads:
         body, other = (getattr(load, entry, None) for entry in ("body", "other"))
-        for entry, name in (("body", body), ("other", other)):
-            if name in still:
+        for entry in ("body", "other", "angle_of"):
+            if (name := getattr(load, entry, None)) in still:
                 raise InputError(
                     f"loads.{load.name}.{entry}", name, "this body cannot rotate",
                     "Name a body that does",
@@ -260,19 +257,6 @@ def _turned(m: Mechanism) -> None:
             )  # fmt: skip
 
 
-def _looked_up(m: Mechanism) -> None:
-    """Bodies whose angles tables go by can turn."""
-    still = next(names for names in joined(m, (Slide, Fixed)) if GROUND in names)
-    known = {body.name for body in m.bodies} - still
-    for load in m.loads:
-        body = getattr(load, "angle_of", None)
-        if body is not None and body not in known:
-            raise InputError(
-                f"loads.{load.name}.angle_of", body, "there is no such body that can rotate",
-                f"Known are: {', '.join(sorted(known))}",
-            )  # fmt: skip
-
-
 def _numbers(m: Mechanism) -> None:
     """Inertias that have to be there, motion at all, and reactions that are known."""
     light = massless_angles(m)
@@ -284,9 +268,8 @@ def _numbers(m: Mechanism) -> None:
             )  # fmt: skip
     for drive in m.drives:
         if isinstance(drive, Harmonic) and drive.amplitude == 0:
-            raise InputError(
-                f"drives.{drive.name}.amplitude", 0.0, "there would be no motion", "Write an amplitude"
-            )  # fmt: skip
+            key = f"drives.{drive.name}.amplitude"
+            raise InputError(key, 0.0, "there would be no motion", "Write an amplitude")
     for joint in m.ideal:
         if isinstance(joint, Revolute) and joint.friction is not None and modes_of(m):
             raise InputError(
@@ -397,8 +380,8 @@ def _one_period(m: Mechanism) -> None:
 
 def freedom(m: Mechanism) -> int:
     """Degrees of freedom by counting (Gruebler), the drives' counted off: bodies 3, pins and guides 2, held bodies 3."""
-    taken = {Revolute: 2, Slide: 2, Slot: 1, Fixed: 3, Clearance: 0, LooseSlide: 0, LooseSlot: 0}
-    ideal = sum(taken[type(joint)] for joint in m.joints)
+    taken = {Revolute: 2, Slide: 2, Slot: 1, Fixed: 3}
+    ideal = sum(taken[type(joint)] for joint in m.ideal)
     return 3 * len(m.bodies) - ideal - sum(drive.prescribed for drive in m.drives)
 
 

@@ -1,34 +1,27 @@
 """The numbers of a mechanism by the names that generated texts use: base parameters, and derived ones from their texts."""
 
 import math
-from typing import Any
 
 import numpy as np
 
 from hpcclear.base.pieces import hinges
 from hpcclear.dynamics.linkage import bending
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, Harmonic, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.generator import Motion
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import (
-    Aligned,
-    ConstantSpeed,
-    Harmonic,
-    TableDrive,
-    TorqueDrive,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import Aligned, Number, split
 from hpcclear.dynamics.linkage.trees import Forest, forest
 
 
 def values(
-    mechanism: Mechanism, cartesian: bool = False, *, gravity: float = 0.0,
+    mechanism: Mechanism, cartesian: bool = False, *, gravity: Number = 0.0,
     feedback: tuple[float, float] = (0.0, 0.0),
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Number]:  # fmt: skip
     """Base parameters by name, SI; `feedback`: alpha and beta in 1/s (paper eq. 11)."""
     trees = forest(mechanism, cartesian)
     alpha, beta = feedback
-    found: dict[str, object] = {"gravity": gravity, "alpha2": 2.0 * alpha, "beta2": beta * beta}
+    found: dict[str, Number] = {"gravity": gravity, "alpha2": 2.0 * alpha, "beta2": beta * beta}
     for name, (x, y) in mechanism.ground.items():
         found |= {f"ground_{name}_x": x, f"ground_{name}_y": y}
     _bodies(trees, found)
@@ -44,7 +37,7 @@ def values(
     return found
 
 
-def _bodies(trees: Forest, found: dict[str, Any]) -> None:
+def _bodies(trees: Forest, found: dict[str, Number]) -> None:
     mechanism = trees.mechanism
     for body in mechanism.bodies:
         drive = mechanism.drive_of(body.name)
@@ -81,7 +74,7 @@ def _bodies(trees: Forest, found: dict[str, Any]) -> None:
             }
 
 
-def _outside(trees: Forest, found: dict[str, Any]) -> None:
+def _outside(trees: Forest, found: dict[str, Number]) -> None:
     """Drives and loads."""
     for drive in trees.mechanism.drives:
         frame = trees.frames[drive.body]
@@ -109,7 +102,7 @@ def _outside(trees: Forest, found: dict[str, Any]) -> None:
         found |= load.numbers()
 
 
-def row_of(motion: Motion, base: dict[str, Any]) -> dict[int, Any]:
+def row_of(motion: Motion, base: dict[str, Number]) -> dict[int, Number]:
     """Values by row of `par`: base parameters as they are, derived ones worked out from their texts."""
     found = {}
     for name, row in motion.parameters.items():

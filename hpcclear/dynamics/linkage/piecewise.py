@@ -3,12 +3,12 @@
 Their rows are parameters, as they may differ from sample to sample; steps end at them (`stepping.rows`).
 """
 
-from typing import Any
+from collections.abc import Sized
 
 from hpcclear.dynamics.linkage.expression import Term, Writer, named
 
 
-def starts(name: str, rows: tuple[Any, ...]) -> list[str]:
+def starts(name: str, rows: Sized) -> list[str]:
     """Names of the parameters where a table bends."""
     return [f"{name}_start_{k}" for k in range(len(rows))]
 

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from hpcclear.dynamics.linkage.expression import Term, Writer, named
 from hpcclear.dynamics.linkage.kinematics import CENTER, Kinematics
 from hpcclear.dynamics.linkage.loops import of_terms
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Slide
+from hpcclear.dynamics.linkage.parts import GROUND, Aligned, Number, Slide
 from hpcclear.dynamics.linkage.trees import Forest
 
 
@@ -70,7 +70,7 @@ class Poses:
     def _angle(kin: Kinematics, frame: str) -> Term:
         return Term("0") if frame == GROUND else _needed(kin, frame)
 
-    def par_of(self, base: Mapping[str, Any]) -> Array:
+    def par_of(self, base: Mapping[str, Number]) -> Array:
         """Parameters (rows,) of this object's rows, by names as of `numbers.values`."""
         par = np.zeros(max(self.rows.values(), default=0) + 1)
         for name, row in self.rows.items():
@@ -121,7 +121,7 @@ def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tup
     mechanism : Mechanism
         Where the mass centres are: single ones, or those of samples (m,).
     """
-    found: list[tuple[Any, Any]] = []
+    found: list[tuple[Number, Number]] = []
     for one in forest.coordinates:
         place = assembly.loops.forest.index(one.kind, one.body)
         if one.kind == "slide":
@@ -141,7 +141,7 @@ def coordinates(forest: Forest, assembly: Assembly, mechanism: Mechanism) -> tup
     return both[:, 0], both[:, 1]
 
 
-def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Any, Any]:
+def _along(forest: Forest, assembly: Assembly, body: str) -> tuple[Number, Number]:
     """How far a body has come along its guide, m, and how fast it moves."""
     hang = forest.hangs[body]
     assert isinstance(hang.joint, Slide)

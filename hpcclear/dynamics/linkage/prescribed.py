@@ -15,12 +15,13 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, check_ranks, placed
+from hpcclear.dynamics.linkage.drives import seconds_of
 from hpcclear.dynamics.linkage.generator import On, generate
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.loops import Loops, on_arrays
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
 from hpcclear.dynamics.linkage.numbers import row_of, values
-from hpcclear.dynamics.linkage.parts import GROUND, seconds_of, split
+from hpcclear.dynamics.linkage.parts import GROUND, split
 from hpcclear.dynamics.linkage.passage import BESIDE, NEARER, Passage, WalkPose, walked
 from hpcclear.dynamics.linkage.poses import Poses, coordinates
 from hpcclear.dynamics.linkage.rows import Rows

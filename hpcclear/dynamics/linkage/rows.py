@@ -1,9 +1,25 @@
-"""Where a generated text finds and leaves its numbers."""
+"""Where a generated text finds and leaves its numbers, and what it has in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from hpcclear.dynamics import layout as at
+
+
+class On(NamedTuple):
+    """Which effects and outputs a text has, besides the mechanism's own loads and drives."""
+
+    friction: bool = False  # in the joints with clearance: of contact or of a film
+    gravity: bool = False
+    energies: bool = False  # energy balance
+    series: bool = False  # drive moment, for time series
+    responses: bool = False  # drive moment and what is followed
+    impacts: bool = False  # force on the frame
+    pins: bool = False  # forces of ideal pins
+    follow: str = ""  # a guided body, or body.point
+    objective: str = ""  # its rate: "joints", or "whole" of the mechanism
+    waves: bool = False  # surfaces of the joints with clearance are out of round
 
 
 @dataclass(frozen=True)

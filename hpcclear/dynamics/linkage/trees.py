@@ -11,17 +11,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 from hpcclear.dynamics.linkage.bending import kind_of
+from hpcclear.dynamics.linkage.drives import Drive
 from hpcclear.dynamics.linkage.mechanism import Mechanism
-from hpcclear.dynamics.linkage.parts import (
-    GROUND,
-    Drive,
-    Fixed,
-    Joint,
-    Revolute,
-    Slide,
-    Slot,
-    split,
-)
+from hpcclear.dynamics.linkage.parts import GROUND, Fixed, Joint, Revolute, Slide, Slot, split
 
 
 class Coordinate(NamedTuple):

@@ -1,6 +1,6 @@
 """The mechanical energy of whole states, and how well a run closed its balance."""
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -58,7 +58,9 @@ def energies(
     return kinetic, kinetic + potential + elastic
 
 
-def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: Any) -> Array:
+def stored_energy(
+    scene: Scene, par: Array, gaps: Array, active: Array, places: Sequence[int]
+) -> Array:
     """Energy stored in the contacts at `places`, J, (t,); parameters (PARAMETERS,) or (t, PARAMETERS), gaps and contact flags
     (t, places): under `latched` laws a penetration counts only while in contact."""
     table = scene.effects.contact
@@ -74,7 +76,9 @@ def stored_energy(scene: Scene, par: Array, gaps: Array, active: Array, places: 
     return total
 
 
-def _depth(scene: Scene, par: Array, place: int, direction: Array, turns: Any) -> Array | float:
+def _depth(
+    scene: Scene, par: Array, place: int, direction: Array, turns: Sequence[Array | float]
+) -> Array | float:
     """How much wider than round a joint is in a direction (m,), m; `turns`: angles of bearing and journal, rad."""
     counts = scene.waves()
     row = at.WAVES + 4 * sum(counts.values()) * place

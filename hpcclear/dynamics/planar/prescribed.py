@@ -1,7 +1,7 @@
 """Linkages without clearance whose drives prescribe everything: time series and extremes, nothing integrated."""
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -10,11 +10,12 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import breaks
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import placed
+from hpcclear.dynamics.linkage.drives import TableDrive, seconds_of, straight_of
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism
 from hpcclear.dynamics.linkage.numbers import values
-from hpcclear.dynamics.linkage.parts import Slide, TableDrive, seconds_of, split, straight_of
+from hpcclear.dynamics.linkage.parts import Slide, split
 from hpcclear.dynamics.linkage.passage import cubic
 from hpcclear.dynamics.linkage.poses import Poses
 from hpcclear.dynamics.linkage.prescribed import Prescribed, prescribed_motion
@@ -69,7 +70,7 @@ def held_extremes(scene: Scene, points: Points | None, count: int) -> Array:
     return found
 
 
-def _curves(scene: Scene) -> dict[str, Any]:
+def _curves(scene: Scene) -> dict[str, Callable[[Array], Array]]:
     """Tabulated loads by name, each as a function of the angle or time that it goes by."""
     curves = curves_of(scene.linkage, scene.numerics.interpolation)
     return {name: curve.at for name, curve in curves.items()}

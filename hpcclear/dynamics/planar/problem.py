@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import lru_cache, reduce
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -12,16 +11,17 @@ from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, placed
+from hpcclear.dynamics.linkage.drives import ConstantSpeed
 from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, turning
-from hpcclear.dynamics.linkage.parts import GROUND, ConstantSpeed, Slide, split
+from hpcclear.dynamics.linkage.parts import GROUND, Number, Slide, split
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import changes, refused
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
-from hpcclear.scene.points import Points
+from hpcclear.scene.points import Numbers, Points
 
 PLACEHOLDER = 1e-3
 """Stands for a number that is zero in the scene and varied by its study: zeros are left out of the generated source."""
@@ -189,7 +189,7 @@ def check_columns(scene: Scene, points: Points | None) -> None:
                 )  # fmt: skip
 
 
-def parameters_of(scene: Scene, get: Any, points: Points | None) -> Array:
+def parameters_of(scene: Scene, get: Numbers, points: Points | None) -> Array:
     """Kernel parameters of each sample but for those of the joints, shape (samples, PARAMETERS)."""
     check_columns(scene, points)
     linkage = linkage_of(scene)
@@ -225,19 +225,19 @@ def sample_of(scene: Scene, points: Points | None) -> Mechanism:
 _LAST: list[tuple[Scene, Points, Mechanism]] = []
 
 
-def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Any:
+def start_of_turns(mechanism: Mechanism, cartesian: bool) -> Number:
     """Return the start of the angle that the period's body has as a coordinate, rad; of samples, (m,)."""
     body = mechanism.period.body
     return mechanism.body(body).start_angle - forest(mechanism, cartesian).offsets[body]
 
 
-def driven_length(mechanism: Mechanism) -> Any:
+def driven_length(mechanism: Mechanism) -> Array:
     """The largest distance between points of the body that gives the period, m, of samples (m,): how fast the mechanism is
     goes by it."""
     body = mechanism.body(mechanism.period.body)
     places = [*body.points.values(), body.center]
     apart = (np.hypot(a[0] - b[0], a[1] - b[1]) for a, b in combinations(places, 2))
-    longest: Any = reduce(np.maximum, apart, np.float64(0.0))
+    longest: Number = reduce(np.maximum, apart, np.float64(0.0))
     return np.where(longest > 0.0, longest, 1.0)
 
 

@@ -15,6 +15,7 @@ from hpcclear.dynamics.linkage.parts import (
     GROUND,
     LooseSlide,
     LooseSlot,
+    Number,
     Revolute,
     as_complex,
     split,
@@ -96,19 +97,20 @@ def pin_series(mechanism: Mechanism, pins: Array) -> dict[str, Array]:
     return {f"pin_force_{axis}": pins[:, k, :count] for k, axis in enumerate("xy") if count}
 
 
-def wound_up(mechanism: Mechanism, series: Mapping[str, Any]) -> list[str]:
+def wound_up(mechanism: Mechanism, series: Mapping[str, Array]) -> list[str]:
     """A sentence for each load that goes by an angle and was turned by more than a revolution."""
     names, found = [body.name for body in mechanism.bodies], []
     for load in mechanism.loads:
         if load.by_angle and "body_angle" in series:
-            angle = series["body_angle"][:, names.index(load.body)]  # type: ignore[attr-defined]
-            if (other := getattr(load, "other", None)) is not None:
+            body, other = (getattr(load, entry, None) for entry in ("body", "other"))
+            angle = series["body_angle"][:, names.index(str(body))]
+            if other is not None:
                 angle = angle - series["body_angle"][:, names.index(other)]
             turns = float(np.ptp(angle)) / at.TURN
             if turns > 1.0:
                 found.append(
                     f"the load {load.name} is wound up by {turns:.3g} turns: its torque goes by the whole angle of "
-                    f"{load.body}. Couple bodies that go round together if it is not meant to"  # type: ignore[attr-defined]
+                    f"{body}. Couple bodies that go round together if it is not meant to"
                 )
     return found
 
@@ -208,7 +210,7 @@ def guide_series(mechanism: Mechanism, pose: Pose) -> dict[str, Array]:
     return {"guide_offset": offsets, "guide_tilt": tilts}
 
 
-def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Any]:
+def _place(mechanism: Mechanism, pose: Pose, place: str) -> tuple[Any, Number]:
     """Where a place is (t,), x + iy, and the angle of its body."""
     name = split(place)[0]
     if name == GROUND:
@@ -251,7 +253,7 @@ def bodies_and_points(
 
     `shorter`: by how much the ends b of bars that bend come nearer, m, (t,), by the bodies' numbers.
     """
-    found: dict[str, Any] = {
+    found: dict[str, Array] = {
         "body_x": pose.x.T,
         "body_y": pose.y.T,
         "body_angle": pose.angle.T,

@@ -7,7 +7,7 @@ from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
 from hpcclear.base.pieces import Pieces, periodic
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.linkage import parts
+from hpcclear.dynamics.linkage import drives, parts
 from hpcclear.dynamics.linkage.mechanism import Mechanism, with_numbers
 from hpcclear.dynamics.planar.curves import angle_pieces, speed_pieces
 from hpcclear.laws.hertz_contact import (
@@ -68,7 +68,7 @@ def _put(table: Any, keys: list[str], value: Array) -> Any:
     return table.model_copy(update={head: _put(getattr(table, head), rest, value)})
 
 
-def _tables(planar: Any) -> dict[str, Any]:
+def _tables(planar: Planar) -> dict[str, Any]:
     joints = tuple(_joint(joint) for joint in planar.joints)
     return {
         "bodies": tuple(_with_corners(_body(body), joints) for body in planar.bodies),
@@ -102,7 +102,7 @@ def _with_corners(body: parts.Body, joints: tuple[parts.Joint, ...]) -> parts.Bo
     return replace(body, points=points)
 
 
-def _part(kind: type[Made], table: Any, /, **more: Any) -> Made:
+def _part(kind: type[Made], table: object, /, **more: Any) -> Made:
     """A part with the entries of a table that have the names of its fields; what is not given has its default there."""
     entries = {one.name: getattr(table, one.name, None) for one in fields(kind)}  # type: ignore[arg-type]
     given = {name: value for name, value in entries.items() if value is not None}
@@ -143,27 +143,27 @@ def _rubbing(joint: Any) -> parts.IdealFriction | None:
     return None if joint.friction is None else _part(parts.IdealFriction, joint.friction)
 
 
-def _drive(drive: Any) -> parts.Drive:
+def _drive(drive: Any) -> drives.Drive:
     match drive:
         case PlanarSpeed():
-            return _part(parts.ConstantSpeed, drive)
+            return _part(drives.ConstantSpeed, drive)
         case PlanarHarmonic():
-            return _part(parts.Harmonic, drive)
+            return _part(drives.Harmonic, drive)
         case PlanarTable():
             pieces = angle_pieces(drive.angle)
-            return _part(parts.TableDrive, drive, rows=drive.angle, pieces=pieces)
+            return _part(drives.TableDrive, drive, rows=drive.angle, pieces=pieces)
         case PlanarFree():
-            return _part(parts.Release, drive, torque=0.0)
+            return _part(drives.Release, drive, torque=0.0)
         case PlanarRunUp():
             rows = drive.speed_by_time
             return _part(
-                parts.RunUp, drive, torque=0.0, inertia=drive.flywheel_inertia, rows=rows, pieces=speed_pieces(rows),
+                drives.RunUp, drive, torque=0.0, inertia=drive.flywheel_inertia, rows=rows, pieces=speed_pieces(rows),
                 initial_speed=rows[0][1], expected_speed=max(speed for _, speed in rows),
             )  # fmt: skip
     table = isinstance(drive.torque, tuple)
     torque = 1.0 if table or drive.torque is None else drive.torque
     return _part(
-        parts.TorqueDrive, drive, torque=torque, table=table, inertia=drive.flywheel_inertia,
+        drives.TorqueDrive, drive, torque=torque, table=table, inertia=drive.flywheel_inertia,
         by_speed=drive.torque_by_speed,
     )  # fmt: skip
 

@@ -12,14 +12,10 @@ import numpy as np
 from hpcclear.base.errors import InputError
 from hpcclear.base.outcome import Status
 from hpcclear.dynamics.linkage.assembly import Assembly, assemble, is_open
+from hpcclear.dynamics.linkage.drives import ConstantSpeed, TorqueDrive
 from hpcclear.dynamics.linkage.loops import Loops
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom
-from hpcclear.dynamics.linkage.parts import (
-    ConstantSpeed,
-    Joint,
-    Loose,
-    TorqueDrive,
-)
+from hpcclear.dynamics.linkage.parts import Joint, Loose
 from hpcclear.dynamics.linkage.passage import MOST_ROUNDS, POOR, Passage, WalkPose
 from hpcclear.dynamics.linkage.prescribed import angle_of, passage_of, pose_at, refusal
 

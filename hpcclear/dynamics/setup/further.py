@@ -1,6 +1,6 @@
 """Kernel parameters that few scenes have: waves of surfaces, thresholds of wear, films that are solved for once a bearing."""
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -89,7 +89,7 @@ def wave_paths(scene: Scene, joint: str) -> list[str]:
     ]
 
 
-def _solved_films(scene: Scene) -> dict[str, Any]:
+def _solved_films(scene: Scene) -> dict[str, Callable[[float], Array]]:
     """Joints whose films have further numbers, and the functions that give these."""
     known = {name: laws("film")[film.model].further for name, film in scene.films().items()}
     return {name: further for name, further in known.items() if further is not None}

@@ -94,7 +94,7 @@ def joint_numbers(scene: Scene, get: Numbers, label: str) -> dict[str, Array]:
     }
 
 
-def _given(get: Numbers, kind: str, table: Any) -> dict[str, Any]:
+def _given(get: Numbers, kind: str, table: Any) -> dict[str, object]:
     """A law's parameters of samples, (m,); lists as they are."""
     values = {one.name: table.value(one.name) for one in table.declared.parameters}
     return {

@@ -7,8 +7,8 @@ from hpcclear.base.pieces import Pieces
 from hpcclear.dynamics import layout as at
 from hpcclear.dynamics.contacts.laws import in_lanes, rate_in_lanes
 from hpcclear.dynamics.layout.views import Parameters
+from hpcclear.dynamics.linkage.drives import RunUp, TableDrive, TorqueDrive
 from hpcclear.dynamics.linkage.linkage import Linkage
-from hpcclear.dynamics.linkage.parts import RunUp, TableDrive, TorqueDrive
 from hpcclear.dynamics.planar import problem as planar
 from hpcclear.dynamics.planar.tables import curves_of
 from hpcclear.dynamics.planar.tolerances import STIFF, absolute_tolerances, swings

@@ -1,7 +1,6 @@
 """The stepper's arrays and its queue: queue samples, advance, collect what finished; or run all at once."""
 
 import time
-from typing import Any
 
 import numpy as np
 
@@ -143,7 +142,7 @@ class Lanes:
         observe(self._observer, par, tables, states, contacts, both, out, self.width)
         return out
 
-    def _arguments(self, budget: int) -> tuple[Any, ...]:
+    def _arguments(self, budget: int) -> tuple[object, ...]:
         arrays = (self._rules, self._block, self._queue, self._method)
         memory = () if self._memory is None else (self._memory,)
         return (self.problem.coordinates, self._codes, *arrays, self.record, *memory, budget)

@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
+from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.outcome import Status
 from hpcclear.base.pieces import Pieces, breaks
 from hpcclear.dynamics import layout as at
@@ -113,7 +113,7 @@ class Problem:
         ]
         return np.array([0.0] * at.bristles_of(self.effects) + gained)
 
-    def motion(self, effects: at.Effects, width: int) -> Any:
+    def motion(self, effects: at.Effects, width: int) -> Compiled:
         """The compiled motion of so many lanes with these effects (`rhs.compiled_motion`)."""
         return compiled_motion(self.linkage.module(effects), effects, width)
 

@@ -5,8 +5,9 @@ unroll first, and leave a loop whose rows stand at known distances, which the co
 are it need not know.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from hpcclear.base.arrays import Array
 from hpcclear.base.jit import lane_function
 from hpcclear.base.unrolled import written_out
 from hpcclear.dynamics import layout as at
@@ -19,14 +20,14 @@ class Step(NamedTuple):
     velocities from MAX_COORDINATES on); how many lanes there are, as a number that the compiler does not know: a loop of few
     instructions it would else write out, and not vectorise."""
 
-    work: Any
-    stages: Any
-    par: Any
-    weights: Any
-    n: Any
-    rtol: Any
-    atol: Any
-    lanes: Any
+    work: Array
+    stages: Array
+    par: Array
+    weights: Array
+    n: int
+    rtol: float
+    atol: Array
+    lanes: int
 
 
 @lane_function
