@@ -47,7 +47,7 @@ def joint_force(effects, work, par, joint, relative, turns, i, W):
     nx = ex * inverse
     ny = ey * inverse
     round_gap = distance - par[(block + at.CLEARANCE) * W + i]
-    here = waves_here(effects.waves, effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
+    here = waves_here(effects, par, joint, moving, (nx, ny, inverse), turns, i, W)
     gap = less(effects.waves, round_gap, here.bearing + here.journal)
     rate = less(effects.waves, vx * nx + vy * ny, here.widening)
     depth = no_less(gap, 0.0)

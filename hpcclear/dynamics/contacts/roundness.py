@@ -78,9 +78,9 @@ def waves_at(flag, par, row, cosine, sine, i, W):
 
 
 @lane_function
-def waves_here(flag, effects, par, joint, relative, normal, turns, i, W):
+def waves_here(effects, par, joint, relative, normal, turns, i, W):
     """What waves come to where journal and bearing touch; `normal`: its direction, and 1/|e|; 0 of round ones."""
-    if flag is not None:
+    if effects.waves is not None:
         _, _, vx, vy, spin_journal, spin_bearing = relative
         nx, ny, inverse = normal
         cb, sb, cj, sj = turns

@@ -27,20 +27,14 @@ class Linkage:
 
     Parameters
     ----------
-    friction : bool
-        In the joints with clearance: of contact or of a film.
+    on : On
+        What all its texts have.
     cartesian : bool
         Every body by itself, with multipliers and feedback.
-    waves : bool
-        Whether surfaces of joints with clearance are out of round.
-    follow : str
-        A guided body, or a point ``body.point``, whose acceleration is a response; "" for none.
-    objective : str
-        The objective's own rate: "joints", or "whole" of the mechanism; "" for none.
-    bristled : bool
-        Whether friction in the joints with clearance has bristles, whose coordinates come before the mechanism's.
-    places : tuple of int, optional
-        Places of the contacts among the kernel's, one behind the other; from the first on by default.
+    bristles : int
+        Of friction in the joints with clearance, whose coordinates come before the mechanism's.
+    places : tuple of int
+        Of the contacts among the kernel's, one behind the other.
 
     Raises
     ------
@@ -49,16 +43,11 @@ class Linkage:
     """
 
     def __init__(
-        self, mechanism: Mechanism, *, gravity: bool, friction: bool, cartesian: bool, follow: str = "",
-        objective: str = "", bristled: bool = False, waves: bool = False, places: tuple[int, ...] | None = None,
+        self, mechanism: Mechanism, on: On, *, cartesian: bool, bristles: int, places: tuple[int, ...]
     ) -> None:  # fmt: skip
-        self.mechanism = mechanism
-        self._bristles = len(mechanism.contacts) if bristled else 0
-        self.cartesian, self.follow = cartesian, follow
-        self.places = tuple(range(len(mechanism.contacts))) if places is None else places
-        self._on = On(
-            friction=friction, gravity=gravity, follow=follow, objective=objective, waves=waves
-        )
+        self.mechanism, self._on = mechanism, on
+        self._bristles, self.places = bristles, places
+        self.cartesian, self.follow = cartesian, on.follow
         self._texts: dict[On, Motion] = {}
         self._given: dict[str, int] = {}
         self._free = at.OWN

@@ -1,5 +1,6 @@
 """Forces and accelerations at given states: the stepper's equations of motion, read instead of integrated by it."""
 
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from hpcclear.dynamics.linkage.rhs import run_motion
 
 
 def observe(
-    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: tuple[Array, Array],
+    motion: int, par: Array, tables: Array, states: Array, contacts: Array, times: Sequence[Array] | Array,
     out: Array, width: int = 1,
 ) -> None:  # fmt: skip
     """Fill `out` (instants, n + RATES) with accelerations and rates; with further columns, forces of pins as `PINS` has them.
@@ -24,7 +25,8 @@ def observe(
     revolution, and when that was; `tables`: as `Problem.tables`.
     """
     lanes = np.repeat(new_lane(par), width)
-    observing_code()(motion, width, lanes, tables, states, contacts, *times, out)
+    both = np.ascontiguousarray(times)
+    observing_code()(motion, width, lanes, tables, states, contacts, both, out)
 
 
 def new_lane(par: Array) -> Array:
@@ -33,14 +35,14 @@ def new_lane(par: Array) -> Array:
 
 
 @scalar_function
-def _observe(motion, W, lanes, tables, states, contacts, times, began, out):
+def _observe(motion, W, lanes, tables, states, contacts, times, out):
     """`observe` by free lanes; those that are left over at the end repeat the last instant."""
-    n, count = states.shape[1] // 2, len(times)
+    n, count = states.shape[1] // 2, len(states)
     for first in range(0, count, W):
         for i in range(W):
             row = min(first + i, count - 1)
-            put_state(lanes, contacts[row], times[row], states[row], n, W, i)
-            lanes[at.BEGAN * W + i] = began[row]
+            put_state(lanes, contacts[row], times[0, row], states[row], n, W, i)
+            lanes[at.BEGAN * W + i] = times[1, row]
         run_motion(motion, lanes, tables)
         for i in range(min(W, count - first)):
             for k in range(n):
@@ -52,7 +54,7 @@ def _observe(motion, W, lanes, tables, states, contacts, times, began, out):
 
 
 _ROW, _TABLE = Kind("array", (DOUBLE, 1)), Kind("array", (DOUBLE, 2))
-_KINDS = (Kind(WHOLE), Kind(WHOLE), _ROW, _ROW, _TABLE, _TABLE, _ROW, _ROW, _TABLE)
+_KINDS = (Kind(WHOLE), Kind(WHOLE), _ROW, _ROW, _TABLE, _TABLE, _TABLE, _TABLE)
 
 
 @cache
@@ -89,7 +91,6 @@ def new_seen(n: int, par: Array, joints: int = 2) -> Derivative:
     return Derivative(np.empty(2 * n + joints), np.zeros((joints, 3)), new_lane(par))
 
 
-# nine arguments: packed into named tuples, a call from Python takes 32 us in place of 17
 @scalar_function
 def derivative(motion, tables, contacts, time, y, out, joints, lane):
     """Rates of y = (coordinates, velocities, integrals of the absolute gaps) at `time` since the start of the revolution.

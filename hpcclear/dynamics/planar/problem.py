@@ -16,6 +16,7 @@ from hpcclear.dynamics.linkage.kinematics import CENTER
 from hpcclear.dynamics.linkage.linkage import Linkage
 from hpcclear.dynamics.linkage.mechanism import Mechanism, freedom, turning
 from hpcclear.dynamics.linkage.parts import GROUND, Number, Slide, split
+from hpcclear.dynamics.linkage.rows import On
 from hpcclear.dynamics.linkage.trees import forest
 from hpcclear.dynamics.planar.tables import mechanism_of, with_columns
 from hpcclear.dynamics.planar.turning import changes, refused
@@ -54,17 +55,15 @@ def linkage_of(scene: Scene) -> Linkage:
     follow = scene.linkage.followed or guided(mechanism)
     _check_followed(scene, follow)
     _check_room(scene, len(forest(mechanism, cartesian).coordinates))
-    return Linkage(
-        mechanism,
-        follow=follow,
-        gravity=scene.effects.gravity > 0.0,
+    on = On(
         friction=scene.effects.friction.law != "none" or bool(scene.films()),
-        cartesian=cartesian,
+        gravity=scene.effects.gravity > 0.0,
+        follow=follow,
         objective=scene.objective.rate_of,
-        bristled=scene.bristles > 0,
         waves=any(scene.waves().values()),
-        places=scene.open_places,
     )
+    places = scene.open_places
+    return Linkage(mechanism, on, cartesian=cartesian, bristles=scene.bristles, places=places)
 
 
 def _check_followed(scene: Scene, follow: str) -> None:

@@ -137,15 +137,15 @@ class Lanes:
         the first step.
         """
         out = np.zeros((len(times), self.problem.coordinates + at.RATES + 2 * at.MAX_PINS))
-        states, contacts, times, began = map(np.ascontiguousarray, (states, contacts, times, began))
+        states, contacts = map(np.ascontiguousarray, (states, contacts))
         tables, both = self.problem.tables, (times, began)
         observe(self._observer, par, tables, states, contacts, both, out, self.width)
         return out
 
     def _arguments(self, budget: int) -> tuple[object, ...]:
-        arrays = (self._rules, self._block, self._queue, self._method)
+        arrays = (self._block, self._queue, self._method)
         memory = () if self._memory is None else (self._memory,)
-        return (self.problem.coordinates, self._codes, *arrays, self.record, *memory, budget)
+        return (self._codes, *arrays, self.record, *memory, budget)
 
     def _accept_queue(self, par: Array, start: Array, labels: Integers) -> None:
         count = len(labels)

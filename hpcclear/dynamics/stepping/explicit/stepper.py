@@ -13,7 +13,7 @@ from hpcclear.base.jit import FASTMATH, lane_function, narrow_vectors
 from hpcclear.base.lowering.compiled import Compiled
 from hpcclear.base.lowering.values import Kind
 from hpcclear.dynamics import layout as at
-from hpcclear.dynamics.layout.arguments import Asking, Block, Stepped
+from hpcclear.dynamics.layout.arguments import Asking, Block, Stepped, rules_in
 from hpcclear.dynamics.layout.views import RunSettings
 from hpcclear.dynamics.linkage.rhs import run_motion
 from hpcclear.dynamics.stepping.control import choose_step, commit, flag_gaps, judge_step
@@ -70,11 +70,12 @@ def ask_explicit(address, block, method):
 
 
 @lane_function
-def advance(W, n, codes, rules, block, queue, method, record, memory, budget):
+def advance(W, codes, block, queue, method, record, memory, budget):
     """Take at most `budget` block steps. Returns whether lanes are running."""
     if W == 1:
         narrow_vectors()
     settings, numbers, work = method.settings, method.numbers, block.work
+    n, rules = numbers[Asking.COORDINATES], rules_in(numbers)
     behind = beyond(work, at.STAGES * W), beyond(work, at.WORK * W)  # at known distances
     block = Block(work, behind[0], behind[1], block.book)
     running = load_lanes(codes.special, numbers, block, queue, method, W)
@@ -111,10 +112,10 @@ class Codes(NamedTuple):
 def make_stepper(W: int, kinds: tuple[Kind, ...], *, implicit: bool = False) -> Compiled:
     """Return the compiled stepper for W lanes, of any number of coordinates and any joints.
 
-    Its arguments, of these kinds: the number of coordinates, `Codes`, and of `layout.arguments` `Rules`, `Block`, `Queue`,
-    `Method`; an array for the steps of the first sample (see `record.record_step`); if `implicit` the memory of the
-    implicit method (see `columns.new_columns`); and the budget: how many block steps to take at most. It returns 1 while lanes
-    are running. A response and an ensemble call the same machine code; ensembles want at least twice the vector length.
+    Its arguments, of these kinds: `Codes`, and of `layout.arguments` `Block`, `Queue`, `Method`; an array for the steps of the
+    first sample (see `record.record_step`); if `implicit` the memory of the implicit method (see `columns.new_columns`); and
+    the budget: how many block steps to take at most. It returns 1 while lanes are running. A response and an ensemble call the
+    same machine code; ensembles want at least twice the vector length.
     """
     known: dict[str, object] = {"W": W}
     if not implicit:
