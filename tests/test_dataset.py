@@ -331,103 +331,65 @@ def test_a_file_of_another_kind_or_scene_is_refused(tmp_path):
         opened.read(path, "samples", "0" * 64)
 
 
-def spoil(content: xr.Dataset, what: str) -> xr.Dataset:
-    if what == "missing":
-        return content.drop_vars("objective")
-    if what == "coordinate":
-        return content.drop_vars("joint")
-    if what == "unknown":
-        return content.assign(surprise=("sample", np.zeros(9)))
-    if what == "type":
-        return content.assign(rhs_evaluations=content["rhs_evaluations"].astype(float))
-    if what == "dimensions":
-        return content.assign(mean_gap=content["mean_gap"].T)
-    if what == "kind":
-        return content.assign_attrs(hpcclear_kind="potato")
-    if what == "design":
-        return content.assign(C=content["C"].where(content["sample"] > 2))
-    if what == "status":
-        return content.assign(status=content["status"] + np.int8(100))
-    if what == "finished without a number":
-        return content.assign(objective=content["objective"] * np.nan)
-    if what == "failed with a number":
-        return content.assign(objective=content["objective"].fillna(0.0))
-    assert what == "order"
-    return content.isel(sample=slice(None, None, -1))
+SPOILT = {
+    "missing": lambda content: content.drop_vars("objective"),
+    "coordinate": lambda content: content.drop_vars("joint"),
+    "unknown": lambda content: content.assign(surprise=("sample", np.zeros(9))),
+    "type": lambda content: content.assign(rhs_evaluations=content["rhs_evaluations"] * 1.0),
+    "dimensions": lambda content: content.assign(mean_gap=content["mean_gap"].T),
+    "kind": lambda content: content.assign_attrs(hpcclear_kind="potato"),
+    "design": lambda content: content.assign(C=content["C"].where(content["sample"] > 2)),
+    "status": lambda content: content.assign(status=content["status"] + np.int8(100)),
+    "finished without a number": lambda content: content.assign(
+        objective=content["objective"] * np.nan
+    ),
+    "failed with a number": lambda content: content.assign(
+        objective=content["objective"].fillna(0.0)
+    ),
+    "order": lambda content: content.isel(sample=slice(None, None, -1)),
+}
 
 
-@pytest.mark.parametrize(
-    "what",
-    [
-        "missing",
-        "coordinate",
-        "unknown",
-        "type",
-        "dimensions",
-        "kind",
-        "design",
-        "status",
-        "finished without a number",
-        "failed with a number",
-        "order",
-    ],
-)
+@pytest.mark.parametrize("what", SPOILT)
 def test_sealed_files_that_say_what_cannot_be_are_refused(tmp_path, what):
     with xr.set_options(keep_attrs=True):
-        spoilt = spoil(samples(), what)
+        spoilt = SPOILT[what](samples())
     opened.save(spoilt, tmp_path / "x.nc")
     with pytest.raises(InputError):
         opened.read(tmp_path / "x.nc", "samples")
 
 
-def hostile(path: Path, what: str, secret: Path) -> None:
-    with h5py.File(path, "r+") as file:
-        old = file["objective_uncertainty"]
-        shape = old.shape
-        if what == "chunked bomb":
-            file.create_dataset("bomb", (10**6, 10**6), "f8", chunks=(1000, 1000))
-        elif what == "unallocated":
-            file.create_dataset("bomb", (10**12,), "f8")
-        elif what == "external data":
-            file.create_dataset("spy", shape, "i1", external=[(str(secret), 0, 80)])
-        elif what == "external link":
-            file["spy"] = h5py.ExternalLink(str(secret), "/x")
-        elif what == "soft link":
-            file["spy"] = h5py.SoftLink("/objective")
-        elif what == "virtual":
-            layout = h5py.VirtualLayout(shape, "f8")
-            layout[:] = h5py.VirtualSource(str(secret), "x", shape)
-            file.create_virtual_dataset("spy", layout)
-        elif what == "group":
-            file.create_group("objects/deep")
-        elif what == "compound":
-            file.create_dataset("spy", data=np.zeros(3, "i4,f8"))
-        elif what == "reference":
-            file.attrs["spy"] = old.ref
-        elif what == "opaque":
-            file.create_dataset("spy", data=np.void(b"cos\nsystem\n"))
+def virtual(file: h5py.File, secret: str) -> None:
+    layout = h5py.VirtualLayout((9,), "f8")
+    layout[:] = h5py.VirtualSource(secret, "x", (9,))
+    file.create_virtual_dataset("spy", layout)
 
 
-@pytest.mark.parametrize(
-    "what",
-    [
-        "chunked bomb",
-        "unallocated",
-        "external data",
-        "external link",
-        "soft link",
-        "virtual",
-        "group",
-        "compound",
-        "reference",
-        "opaque",
-    ],
-)
+HOSTILE = {
+    "chunked bomb": lambda file, secret: file.create_dataset(
+        "bomb", (10**6, 10**6), "f8", chunks=(1000, 1000)
+    ),
+    "unallocated": lambda file, secret: file.create_dataset("bomb", (10**12,), "f8"),
+    "external data": lambda file, secret: file.create_dataset(
+        "spy", (9,), "i1", external=[(secret, 0, 80)]
+    ),
+    "external link": lambda file, secret: file.__setitem__("spy", h5py.ExternalLink(secret, "/x")),
+    "soft link": lambda file, secret: file.__setitem__("spy", h5py.SoftLink("/objective")),
+    "virtual": virtual,
+    "group": lambda file, secret: file.create_group("objects/deep"),
+    "compound": lambda file, secret: file.create_dataset("spy", data=np.zeros(3, "i4,f8")),
+    "reference": lambda file, secret: file.attrs.__setitem__("spy", file["objective"].ref),
+    "opaque": lambda file, secret: file.create_dataset("spy", data=np.void(b"cos\nsystem\n")),
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
 def test_hostile_structure_under_a_forged_seal_is_refused(tmp_path, what):
     path, secret = tmp_path / "x.nc", tmp_path / "secret"
     secret.write_bytes(b"password" * 10)
     opened.write(samples(), path)
-    hostile(path, what, secret)
+    with h5py.File(path, "r+") as file:
+        HOSTILE[what](file, str(secret))
     image = path.read_bytes()
     path.write_bytes(image + netcdf.seal(image))
     with pytest.raises(InputError, match="structure"):

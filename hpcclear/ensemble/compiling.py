@@ -5,19 +5,18 @@ its node load from disk.
 """
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from hpcclear.base.quantiles import Uniform
 from hpcclear.dynamics.evaluation.evaluator import Evaluator
 from hpcclear.dynamics.response import simulated
-from hpcclear.ensemble.simulate import payload_of
+from hpcclear.ensemble.simulate import Payload, payload_of
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
 from hpcclear.statistics.random.inputs import RandomVariable
 from hpcclear.statistics.random.moments import RobustObjective
@@ -25,15 +24,9 @@ from hpcclear.statistics.search.mopso import minimise
 from hpcclear.statistics.surrogate.fitting import fit_kriging
 
 
-def compile_share(payload: Mapping[str, object], ranks: Ranks) -> None:
-    """Compile this rank's share of the parts; root and the others are at it together.
-
-    Parameters
-    ----------
-    payload : mapping
-        Of `hpcclear.ensemble.simulate.payload_of`.
-    """
-    mine: tuple[Callable[[Mapping[str, Any]], None], ...] = (_ensemble, _response, _statistics)
+def compile_share(payload: Payload, ranks: Ranks) -> None:
+    """Compile this rank's share of the parts; root and the others are at it together."""
+    mine: tuple[Callable[[Payload], None], ...] = (_ensemble, _response, _statistics)
     if ranks.size > 1 and ranks.is_root:
         # the first takes as long as the others together; then the second is there to load
         mine = mine[:2]
@@ -43,26 +36,25 @@ def compile_share(payload: Mapping[str, object], ranks: Ranks) -> None:
         part(payload)
 
 
-def _ensemble(payload: Mapping[str, Any]) -> None:
+def _ensemble(payload: Payload) -> None:
     """The kernel for many samples."""
-    columns = Points(payload["names"], np.empty((0, len(payload["names"]))), payload["paths"])
-    Evaluator(load_scene(payload["scene"], trust=True), columns, payload["lanes"]).advance(0.0)
+    Evaluator(payload.scene, payload.columns, payload.lanes).advance(0.0)
 
 
-def _response(payload: Mapping[str, Any]) -> None:
+def _response(payload: Payload) -> None:
     """The kernel for one response."""
     short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    simulated(load_scene(payload["scene"], trust=True).with_(short))
+    simulated(payload.scene.with_(short))
 
 
-def _statistics(payload: Mapping[str, Any]) -> None:
+def _statistics(payload: Payload) -> None:
     """Surrogate, its moments, and the swarm."""
     rng = np.random.default_rng(0)
     points = rng.random((12, 2))
     bounds = np.array([[0.0, 1.0], [0.0, 1.0]])
     model = fit_kriging(points, points.sum(axis=1), bounds, rng=rng, names=("x", "y"))
     model.predict(points)
-    study = load_scene(payload["scene"], trust=True).study
+    study = payload.scene.study
     if study is not None and study.surrogate.kernel not in (None, model.kernel):
         replace(model, kernel=study.surrogate.kernel).predict(points)
     objective = RobustObjective(model, ("x",), [RandomVariable("y", Uniform(0.5, 0.5))])

@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,13 +19,15 @@ from hpcclear.ensemble.certificate import Certificate, Changes, Screening, Varia
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.samples import sample_points, saving
 from hpcclear.ensemble.session import Finished, Options, Place, Session
+from hpcclear.ensemble.simulate import Payload
 from hpcclear.ensemble.trial import Trial, Wanted
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.names import SECONDS_BY_ROUND, SECONDS_PER_SAMPLE
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
+from hpcclear.statistics.random.paired import Change
 
 SAMPLES = 4096
 """Samples of a variant at most, unless another number is requested."""
@@ -35,13 +36,10 @@ LEAST = 128
 """Samples of a variant at least: a first look."""
 
 
-def compile_share(payloads: Sequence[Mapping[str, Any]], ranks: Ranks) -> None:
+def compile_share(payloads: Sequence[Payload], ranks: Ranks) -> None:
     """Compile this rank's share of some variants; what one rank has compiled the others on its node load from disk."""
     for payload in payloads[ranks.rank :: ranks.size]:
-        columns = Points(payload["names"], np.empty((0, len(payload["names"]))), payload["paths"])
-        evaluator_of(load_scene(payload["scene"], trust=True), columns, payload["lanes"]).advance(
-            0.0
-        )
+        evaluator_of(payload.scene, payload.columns, payload.lanes).advance(0.0)
 
 
 def run_effects(
@@ -128,7 +126,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     changes = [book.changes(off) for off in variants]
     counted = np.array([True, plan.scattered, plan.forces])
     reduced = trial.variant(found.recommended).scene
-    data: dict[str, Any] = {
+    data: dict[str, Array] = {
         "off": np.array([[k in off for k in range(plan.effects)] for off in variants], np.int8),
         "change": np.array([[one.value for one in _three(c)] for c in changes]),
         "limit": np.array([[one.limit for one in _three(c)] for c in changes]),
@@ -161,7 +159,7 @@ def effects_dataset(trial: Trial, found: Certificate, attributes: Mapping[str, s
     return dataset.dataset("effects", coords, data, attrs, objective=trial.scene.objective)
 
 
-def _three(changes: Changes) -> tuple[Any, Any, Any]:
+def _three(changes: Changes) -> tuple[Change, Change, Change]:
     return changes.mean, changes.deviation, changes.force
 
 

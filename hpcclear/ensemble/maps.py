@@ -1,9 +1,8 @@
 """The `map` command: one or two entries of a scene over a grid, and at each point what the motion does."""
 
 import time
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +12,11 @@ from hpcclear.ensemble.api import paths_of
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.samples import sample_points, samples_of, saving
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.simulate import first_compiled
+from hpcclear.ensemble.simulate import Payload, first_compiled
 from hpcclear.ranks.progress import Progress
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.grids import SHAPE, grid
-from hpcclear.scene import Scene, load_scene
+from hpcclear.scene import Scene
 from hpcclear.scene.points import Points, check_points
 
 __all__ = ["axis", "cells", "grid", "make_mapper", "run_map"]
@@ -107,16 +106,12 @@ def cells(scene: Scene, axes: tuple[str, ...]) -> tuple[Points, tuple[int, ...]]
     return points, grid[0].shape
 
 
-def make_mapper(payload: Mapping[str, Any], ranks: Ranks) -> "SteadyEvaluator":
+def make_mapper(payload: Payload, ranks: Ranks) -> "SteadyEvaluator":
     """A rank's worker."""
     from hpcclear.dynamics.evaluation.steady.evaluator import SteadyEvaluator
     from hpcclear.dynamics.evaluation.steady.mapping import mapped
 
-    nothing = np.empty((0, len(payload["names"])))
-    columns = Points(payload["names"], nothing, payload["paths"])
-    worker = SteadyEvaluator(
-        load_scene(payload["scene"], trust=True), columns, payload["lanes"], mapped
-    )
+    worker = SteadyEvaluator(payload.scene, payload.columns, payload.lanes, mapped)
     return first_compiled(worker, ranks)
 
 

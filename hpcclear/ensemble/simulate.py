@@ -4,8 +4,7 @@ The kernel, scenes and files are imported where they are used: inside the rank b
 that fails on one rank ends them all.
 """
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -37,35 +36,51 @@ def content_of(scene: "Scene") -> dict[str, Any]:
     return content
 
 
-def payload_of(scene: "Scene", points: "Points") -> dict[str, Any]:
+class Payload(NamedTuple):
     """What a rank needs to know before it gets points: plain content, small, the same everywhere."""
+
+    content: dict[str, Any]
+    """Of a scene, as of `content_of`."""
+    names: tuple[str, ...]
+    paths: tuple[tuple[str, ...], ...]
+    """names and paths: of the columns of points."""
+    lanes: int
+
+    @property
+    def scene(self) -> "Scene":
+        """The scene on a rank."""
+        from hpcclear.scene import load_scene
+
+        return load_scene(self.content, trust=True)
+
+    @property
+    def columns(self) -> "Points":
+        """The columns of points, without rows."""
+        from hpcclear.scene.points import Points
+
+        return Points(self.names, np.empty((0, len(self.names))), self.paths)
+
+
+def payload_of(scene: "Scene", points: "Points") -> Payload:
+    """What travels to ranks that simulate such points of a scene."""
     from hpcclear.dynamics.evaluation.evaluator import DEFAULT_LANES
 
-    return {
-        "scene": content_of(scene),
-        "names": points.names,
-        "paths": points.paths,
-        "lanes": DEFAULT_LANES,
-    }
+    return Payload(content_of(scene), points.names, points.paths, DEFAULT_LANES)
 
 
-_COMPILED: list[Mapping[str, Any]] = []
+_COMPILED: list[Payload] = []
 """Payloads whose evaluators were made in this process before: small stages need not wait for ranks to meet again."""
 
 _MOST_COMPILED = 8
 
 
-def make_evaluator(payload: Mapping[str, Any], ranks: Ranks) -> "Judge":
+def make_evaluator(payload: Payload, ranks: Ranks) -> "Judge":
     """A rank's worker."""
     from hpcclear.dynamics.evaluation import evaluator_of
     from hpcclear.dynamics.evaluation.evaluator import Judge
-    from hpcclear.scene import load_scene
-    from hpcclear.scene.points import Points
 
-    nothing = np.empty((0, len(payload["names"])))
-    columns = Points(payload["names"], nothing, payload["paths"])
-    scene = load_scene(payload["scene"], trust=True)
-    evaluator = evaluator_of(scene, columns, payload["lanes"])
+    scene = payload.scene
+    evaluator = evaluator_of(scene, payload.columns, payload.lanes)
     # All ranks have made the same ones before, so all wait for each other or none does.
     if payload not in _COMPILED:
         first_compiled(evaluator, ranks)

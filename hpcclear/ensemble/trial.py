@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from hpcclear.ensemble.certificate import (
     VariantResult,
     certificate,
 )
-from hpcclear.ensemble.simulate import payload_of
+from hpcclear.ensemble.simulate import Payload, payload_of
 from hpcclear.results.names import ALL_ON
 from hpcclear.scene import Scene
 from hpcclear.scene.points import Points
@@ -263,7 +263,7 @@ class Trial:
             evaluations.reshape(shape), work.reshape(shape),
         )  # fmt: skip
 
-    def payloads(self) -> list[dict[str, Any]]:
+    def payloads(self) -> list[Payload]:
         """What ranks need to compile the whole scene and each effect's absence (`compile_share`)."""
         asked = [
             VariantRequest((), 0, 1),

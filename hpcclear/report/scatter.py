@@ -1,7 +1,6 @@
 """Lines on the scatter of f: what contributes to it at one design and over the ranges, what tighter tolerances bring, chaos."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,9 +8,6 @@ from hpcclear.report.figures.labels import quantity
 from hpcclear.report.parts import LinesOf, Recommended
 from hpcclear.report.spread import Line
 from hpcclear.results.content import Results
-
-if TYPE_CHECKING:
-    from hpcclear.statistics.sensitivity.contributions import Falls
 
 HALF_WIDTH = 1.96
 """Half-width of a 95 % confidence interval, standard errors."""
@@ -84,9 +80,7 @@ def tighten(own: Results) -> Iterator[str]:
     prices = own["halving_cost"].to_numpy()[rows] if "halving_cost" in own else np.array([])
     if len(rows) > 1:
         joint = [float(own.get(f"halved_together{end}", np.nan)) for end in ("", "_error")]
-        from hpcclear.statistics.sensitivity.contributions import Falls  # loads SciPy
-
-        yield _first(names, Falls.of(falls, lambda _: (joint[0], joint[1])), errors, prices)
+        yield _first(names, falls, errors, prices, joint)
 
 
 def to_tighten(
@@ -100,13 +94,15 @@ def to_tighten(
     return [int(k) for k in np.argsort(-merit, kind="stable") if brings[k]][:TIGHTENED], known
 
 
-def _first(names: list[str], falls: "Falls", errors: np.ndarray, prices: np.ndarray) -> str:
-    """Which inputs to tighten first, and by how much the scatter then falls."""
+def _first(
+    names: list[str], falls: np.ndarray, errors: np.ndarray, prices: np.ndarray, joint: list[float]
+) -> str:
+    """Which inputs to tighten first, and by how much the scatter then falls: `joint` and its error."""
     chosen, known = to_tighten(falls, errors, prices)
     if not chosen:
         return "none: no single input makes a significant part of the scatter"
     listed = ", ".join(f"{names[k]} (cost {prices[k]:+.3g})" if known else names[k] for k in chosen)
-    fall, error = falls.together(chosen)
+    fall, error = joint
     if not np.isfinite(fall):
         return listed  # a file of an earlier version lacks it
     text = f"{listed}: halving {'them together' if len(chosen) > 1 else 'it'} lowers the standard deviation of f by "

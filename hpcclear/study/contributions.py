@@ -76,7 +76,7 @@ def of_designs(
         first = to_tighten(found.halved, found.halved_error, result["halving_cost"][row, columns])[
             0
         ]
-        both = (*found.halved.together(first), found.rest, found.rest_error)
+        both = (*found.together(first), found.rest, found.rest_error)
         for name, number in zip(_OF_ALL, both, strict=True):
             result[name][row] = number
     return result

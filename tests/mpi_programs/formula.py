@@ -8,7 +8,6 @@ of order 5.
 
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import last_bits
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from hpcclear.base.objectives import asked
 from hpcclear.base.outcome import JOINTS, Status, failed
 from hpcclear.ensemble import compiling, simulate, single
+from hpcclear.ensemble.simulate import Payload
 from hpcclear.ranks.stopping import Stopped
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
@@ -129,10 +129,10 @@ class FormulaWorker:
 
     lanes = 4
 
-    def __init__(self, payload: dict[str, Any]) -> None:
-        self._scene = load_scene(payload["scene"], trust=True)  # as the evaluators of the package
+    def __init__(self, payload: Payload) -> None:
+        self._scene = payload.scene  # as the evaluators of the package
         self._objective, self._record = self._scene.objective, record_of(self._scene)
-        self._paths = payload["paths"]
+        self._paths = payload.paths
         self._index, self._points = np.empty(0, int), np.empty((0, len(self._paths)))
 
     @property
@@ -173,12 +173,12 @@ def numbers(scene: Scene) -> dict[str, float]:
     return {path: scene.number(path) for path in scene.numeric_paths()}
 
 
-def make_formula(payload: dict[str, Any], ranks: Ranks) -> FormulaWorker:
+def make_formula(payload: Payload, ranks: Ranks) -> FormulaWorker:
     """Maker of the ranks' workers."""
     return FormulaWorker(payload)
 
 
-def compile_nothing(payload: dict[str, Any], ranks: Ranks) -> None:
+def compile_nothing(payload: Payload, ranks: Ranks) -> None:
     """Takes the place of the compilers."""
 
 

@@ -13,7 +13,6 @@ B. Efron and C. Stein, "The jackknife estimate of variance", Ann. Statist. 9 (19
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -29,26 +28,6 @@ FEWEST = 4
 """Values for each term of the fit, at least."""
 
 
-class Falls(np.ndarray[Any, np.dtype[np.float64]]):
-    """Relative falls of the standard deviation of f with half the scatter of one input each, shape (inputs,).
-
-    With the scatter of several inputs halved at once, it does not follow from these: correlations and interactions count.
-    """
-
-    _joint: Callable[[Sequence[int]], tuple[float, float]]
-
-    @classmethod
-    def of(cls, each: Array, joint: Callable[[Sequence[int]], tuple[float, float]]) -> "Falls":
-        """Return the falls `each`, (inputs,); `joint` is what `together` returns."""
-        found = np.asarray(each, float).view(cls)
-        found._joint = joint
-        return found
-
-    def together(self, chosen: Sequence[int]) -> tuple[float, float]:
-        """Return the fall with the scatter of these inputs halved at once, and its standard error."""
-        return self._joint(chosen)
-
-
 @dataclass(frozen=True)
 class Contributions:
     """Of the inputs of one design; all NaN where there are too few values, 0 where f does not scatter.
@@ -57,17 +36,20 @@ class Contributions:
     ----------
     share, share_error : array, shape (inputs,)
         Of the variance of f; inputs of one group have the same number, which is that of the group.
-    halved : Falls, shape (inputs,)
-        By how much the standard deviation of f falls with half the scatter of an input, over it; or of several together.
-    halved_error : array, shape (inputs,)
+    halved, halved_error : array, shape (inputs,)
+        By how much the standard deviation of f falls with half the scatter of an input, over it.
+    together : callable
+        From several inputs to this fall with the scatter of all of them halved at once, and its error. It does not follow
+        from single ones: correlations and interactions count.
     rest, rest_error : float
         Share of the variance that no input explains by the fit.
     """
 
     share: Array
     share_error: Array
-    halved: Falls
+    halved: Array
     halved_error: Array
+    together: Callable[[Sequence[int]], tuple[float, float]]
     rest: float
     rest_error: float
 
@@ -111,13 +93,13 @@ def contributions(inputs: Array, f: Array, groups: Sequence[int]) -> Contributio
     shares = estimated(lambda fit: fit.shares(groups))
     falls, errors = estimated(lambda fit: [fit.fall([k]) for k in range(size)])
     rest, doubt = estimated(lambda fit: [fit.rest])
-    return Contributions(*shares, Falls.of(falls, joint), errors, float(rest[0]), float(doubt[0]))
+    return Contributions(*shares, falls, errors, joint, float(rest[0]), float(doubt[0]))
 
 
 def _always(value: float, size: int) -> Contributions:
     """One number for all that would be found."""
     each = np.full(size, value)
-    return Contributions(each, each, Falls.of(each, lambda _: (value, value)), each, value, value)
+    return Contributions(each, each, each, each, lambda _: (value, value), value, value)
 
 
 Term = tuple[tuple[int, ...], int]
