@@ -26,6 +26,8 @@ from recorded import record
 
 from hpcclear import load_scene, simulate
 from hpcclear.dynamics.response import simulate_together
+from hpcclear.ensemble.single import SHORTEST
+from hpcclear.identify import training
 from hpcclear.identify.advice import advice
 from hpcclear.identify.features import Layout
 from hpcclear.identify.inputs import Inputs
@@ -33,7 +35,7 @@ from hpcclear.identify.judgement import features_of, judged, prepare
 from hpcclear.identify.made import write_made
 from hpcclear.identify.measured import Measured, read_measured
 from hpcclear.identify.signals import Sensor
-from hpcclear.identify.training import Ensemble, prepared_scene, simulated, units_of
+from hpcclear.identify.training import Ensemble, prepared_scene
 from hpcclear.ranks.boundary import alone
 
 JOBS = Path(__file__).resolve().parent.parent / "jobs"
@@ -128,7 +130,7 @@ def ensemble_of(folder: Path, name: str, count: int, members: int) -> Ensemble:
     plain = prepared_scene(scene)
     place = folder / f"ensemble-{name}-{count}-{members}.npz"
     if not place.exists():
-        made = simulated(plain, inputs, SIGNALS, members, 1, alone())
+        made = training.ensemble_of(plain, inputs, SIGNALS, members, 1, alone())
         with tempfile.NamedTemporaryFile(dir=folder, suffix=".npz", delete=False) as file:
             np.savez(file, places=made.places, spectra=made.spectra, failed=made.failed)
         Path(file.name).rename(place)
@@ -189,8 +191,8 @@ def run_group(folder: Path, seed: int, numbers: list[int], members: int) -> None
         return
     ensemble = ensemble_of(folder, name, count, members)
     plain = prepared_scene(model_of(name, count)[0])
-    unit = units_of(plain, [signal])[0]
-    frequency = float(frequency_of(plain))
+    response = short_response(plain)
+    frequency, unit = frequency_in(response), str(response[signal].attrs["units"])
     for k, table, place in zip(numbers, tables_of(folder, seed, numbers), places, strict=True):
         if not place.exists():
             read = read_measured(table, signal, unit, frequency)
@@ -214,9 +216,11 @@ def row_of(seed: int, k: int, ensemble: Ensemble, read: Measured) -> dict[str, A
     }  # fmt: skip
 
 
-def frequency_of(scene: Any) -> float:
-    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    response = simulate(scene.with_(short), checked=False)
+def short_response(scene: Any) -> Any:
+    return simulate(scene.with_(SHORTEST), checked=False)
+
+
+def frequency_in(response: Any) -> float:
     return 1.0 / float(response["time"][-1])
 
 
@@ -272,7 +276,7 @@ def advised(folder: Path, members: int) -> None:
     rows = [("mechanism", "signal", "first clearance", "second clearance", "correlation of errors")]
     for name in MECHANISMS:
         ensemble = ensemble_of(folder, name, 2, members)
-        frequency = frequency_of(prepared_scene(model_of(name, 2)[0]))
+        frequency = frequency_in(short_response(prepared_scene(model_of(name, 2)[0])))
         found = advice(ensemble, SIGNALS, Sensor(), frequency, 0.1, 1)
         for k, signal in enumerate(found.names):
             first, second = (f"± {1e6 * width:.0f} µm" for width in found.half_width[k, 1])
@@ -300,7 +304,7 @@ def raw(folder: Path, members: int) -> None:
     real = plain.with_(change)
     response = simulate(real, checked=False)
     ensemble = ensemble_of(folder, "chaotic", 1, members)
-    frequency = frequency_of(plain)
+    frequency = frequency_in(short_response(plain))
     for noise in NOISE:
         for name in ("slider_acceleration", "crank_moment"):
             own = response[name].to_numpy()[-5 * 1024 :]

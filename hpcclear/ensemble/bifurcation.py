@@ -1,7 +1,7 @@
 """`map --bifurcation`: one entry of a scene over a range, and what the motion does once a revolution at each value."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import sample_key
 from hpcclear.ensemble.maps import cells
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
-from hpcclear.ensemble.single import TOGETHER, responses_of
+from hpcclear.ensemble.single import SHORTEST, TOGETHER, responses_of
 from hpcclear.ranks.team import Ranks
 from hpcclear.report.figures import motion
 from hpcclear.results import dataset
@@ -115,9 +115,11 @@ def run_bifurcation(
                 "numerics.transient_revolutions": observation.transient,
                 "numerics.averaged_revolutions": observation.revolutions,
             }
-            variants = [_variant(points.paths[0], value) for value in points.values[:, 0]]
+            variants = [dict.fromkeys(points.paths[0], float(one)) for one in points.values[:, 0]]
             long = scene.with_(names)
-            what = observation.described(_short(long, variants[0]))
+            what = observation.described(
+                simulated(long.with_({**variants[0], **SHORTEST}), checked=False)
+            )
             count = observation.revolutions
             asked = long, variants, observation, (count,), ranks, "bifurcation"
             observed = responses_of(*asked, together=TOGETHER, checkpoint=session.opened())[:, 0]
@@ -131,13 +133,3 @@ def run_bifurcation(
             )  # fmt: skip
         session.close()
     return session.finished(content, began)
-
-
-def _variant(paths: tuple[str, ...], value: float) -> Mapping[str, float]:
-    return dict.fromkeys(paths, float(value))
-
-
-def _short(scene: Scene, variant: Mapping[str, float]) -> Results:
-    """A response of one revolution, for the names and units of its series."""
-    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    return simulated(scene.with_({**variant, **short}), checked=False)

@@ -14,6 +14,7 @@ from hpcclear.base.quantiles import Uniform
 from hpcclear.dynamics.evaluation.evaluator import Evaluator
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.simulate import Payload, payload_of
+from hpcclear.ensemble.single import SHORTEST
 from hpcclear.ranks.progress import Style
 from hpcclear.ranks.team import Ranks
 from hpcclear.scene import Scene
@@ -43,8 +44,7 @@ def _ensemble(payload: Payload) -> None:
 
 def _response(payload: Payload) -> None:
     """The kernel for one response."""
-    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    simulated(payload.scene.with_(short))
+    simulated(payload.scene.with_(SHORTEST))
 
 
 def _statistics(payload: Payload) -> None:

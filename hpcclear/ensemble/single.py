@@ -17,6 +17,9 @@ from hpcclear.results.checkpoint import Checkpoint
 from hpcclear.results.content import Results
 from hpcclear.scene import Scene, load_scene
 
+SHORTEST = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
+"""Entries of a scene whose response is one revolution: for names and units of its series, or to compile."""
+
 TOGETHER = 8
 """Responses in a batch where many are wanted and their memory is small."""
 

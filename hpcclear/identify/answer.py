@@ -12,6 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.identity import run_key
 from hpcclear.ensemble.session import DEFAULT_OPTIONS, Finished, Options, Place, Session
+from hpcclear.ensemble.single import SHORTEST
 from hpcclear.identify.advice import (
     NOISE,
     REVOLUTIONS,
@@ -27,11 +28,12 @@ from hpcclear.identify.judgement import Judgement, Prepared, features_of, judged
 from hpcclear.identify.measured import Measured, loaded, read_measured
 from hpcclear.identify.settings import Settings
 from hpcclear.identify.signals import Sensor, names_of, revolutions_of
-from hpcclear.identify.training import Ensemble, ensemble_of, prepared_scene, units_of
+from hpcclear.identify.training import Ensemble, ensemble_of, prepared_scene
 from hpcclear.ranks.team import Ranks
 from hpcclear.results import dataset
 from hpcclear.results.content import Results
 from hpcclear.results.kinds.identify import with_units
+from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -81,9 +83,11 @@ def _identified(
     if settings.pressure and settings.signals:
         scene = loaded(scene, settings.signals[0], settings.pressure)
     plain, seed = prepared_scene(scene), 0 if scene.study is None else scene.study.seed
-    frequency, sense, names = _driven(plain)
-    every = tuple(dict.fromkeys((*settings.names, *(names if settings.advise else ()))))
-    units = dict(zip(every, units_of(plain, every), strict=True))
+    response = simulated(plain.with_(SHORTEST), checked=False)
+    frequency, sense = _driven(plain, response)
+    usual = names_of(response) if settings.advise else ()
+    every = tuple(dict.fromkeys((*settings.names, *usual)))
+    units = {name: signal(response, name, "--signal").unit for name in every}
     turns = turns_of(plain.linkage)
     tables = [
         [read_measured(path, name, units[name], frequency, turns, sense) for name in settings.names]
@@ -106,14 +110,12 @@ def _identified(
     return identified(ensemble, found, times, gains, settings, seed, session.attributes)
 
 
-def _driven(scene: Scene) -> tuple[float, int, list[str]]:
-    """Frequency of a revolution of the drive, Hz, the sense of the crank, and the usual signals."""
-    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    response = simulated(scene.with_(short), checked=False)
+def _driven(scene: Scene, response: Results) -> tuple[float, int]:
+    """Frequency of a revolution of the drive, Hz, and the sense of the crank, of a response."""
     turns, seconds = revolutions_of(scene, response), response["time"].to_numpy()
     angle = response["crank_angle"].to_numpy()
     frequency = float((turns[-1] - turns[0]) / (seconds[-1] - seconds[0]))
-    return frequency, -1 if angle[-1] < angle[0] else 1, names_of(response)
+    return frequency, -1 if angle[-1] < angle[0] else 1
 
 
 Found = Sequence[tuple[Prepared, Judgement]]

@@ -9,7 +9,6 @@ import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.errors import InputError
-from hpcclear.dynamics.response import simulated
 from hpcclear.ensemble.single import TOGETHER, responses_of
 from hpcclear.identify.inputs import Inputs, design
 from hpcclear.identify.signals import (
@@ -21,7 +20,6 @@ from hpcclear.identify.signals import (
 )
 from hpcclear.ranks.team import Ranks
 from hpcclear.results.checkpoint import Checkpoint
-from hpcclear.results.signals import signal
 from hpcclear.scene import Scene
 from hpcclear.scene.planar import turns_of
 
@@ -75,13 +73,6 @@ def prepared_scene(scene: Scene) -> Scene:
             "output.instants_per_revolution": INSTANTS * turns_of(scene.linkage),
         }
     )
-
-
-def units_of(scene: Scene, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the units of signals; raises InputError where the mechanism lacks one."""
-    short = {"numerics.transient_revolutions": 0, "numerics.averaged_revolutions": 1}
-    found = simulated(scene.with_(short), checked=False)
-    return tuple(signal(found, name, "--signal").unit for name in names)
 
 
 def ensemble_of(
