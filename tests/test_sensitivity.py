@@ -258,7 +258,6 @@ def test_known_indices(
     first, total = truth()
     at_most(np.abs(found.first - first).max(), 0.01)
     at_most(np.abs(found.total - total).max(), 0.01)
-    assert (found.n_rows, found.n_dropped) == (2**14, 0)
 
 
 def small(seed: int, function: Function = Ishigami.evaluate, **options: float) -> SobolIndices:
@@ -305,7 +304,7 @@ def test_additive_function_on_a_skewed_box_shares_its_variance_exactly(shift: in
     assert found.mean == pytest.approx(1e6 + 6.5, rel=1e-8)
 
 
-def test_failed_rows_are_dropped_whole_and_counted() -> None:
+def test_failed_rows_are_dropped_whole() -> None:
     rng = np.random.default_rng(0)
     points = sobol_design(TORUS, 1024, rng)
     values = Ishigami.evaluate(points)
@@ -314,7 +313,6 @@ def test_failed_rows_are_dropped_whole_and_counted() -> None:
     found = analyse_sobol(broken, 3)
     kept = np.delete(values.reshape(5, -1), [3, 10, 99], axis=1).ravel()
     same = analyse_sobol(kept, 3)
-    assert (found.n_rows, found.n_dropped) == (1021, 3)
     np.testing.assert_array_equal(found.first, same.first)
     # three of 1024 rows stand in the replicate beside theirs: each share of the error moves by a few per cent
     np.testing.assert_allclose(found.total_interval, same.total_interval, atol=0.01)

@@ -41,10 +41,6 @@ class SobolIndices:
     mean: float
     variance: float
     """mean and variance: of f over the box, in its unit and its square."""
-    n_rows: int
-    n_dropped: int
-    """n_rows and n_dropped: rows (d + 2 simulations each) that counted, and rows dropped whole because a simulation in them
-    failed. Dropping leaves that corner of the box out: many of them are a warning."""
 
 
 def sobol_design(bounds: ArrayLike, n_rows: int, rng: np.random.Generator) -> Array:
@@ -82,7 +78,7 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
     Parameters
     ----------
     values : array_like, shape (n_rows * (n_inputs + 2),)
-        Those that are not finite are failed simulations; their rows are dropped and counted.
+        Those that are not finite are failed simulations; their rows are dropped.
     confidence : float
         Of the intervals, in (0, 1).
 
@@ -99,12 +95,11 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
     rows = np.arange(y.shape[1])
     replicate = rows * min(REPLICATES, len(rows)) // len(rows)
     finite = np.isfinite(y).all(axis=0)
-    n_dropped = int(np.count_nonzero(~finite))
     y, replicate = y[:, finite], replicate[finite]
     if y.shape[1] < 2:
         raise InputError(
             "values",
-            n_dropped,
+            int(np.count_nonzero(~finite)),
             "a simulation failed in nearly every row",
             "look at their status, correct the cause, or narrow the bounds",
         )
@@ -118,8 +113,6 @@ def analyse_sobol(values: ArrayLike, n_inputs: int, *, confidence: float = 0.95)
         total_interval=intervals[1],
         mean=float(y[:2].mean()),
         variance=float(y[:2].var()),
-        n_rows=y.shape[1],
-        n_dropped=n_dropped,
     )
 
 

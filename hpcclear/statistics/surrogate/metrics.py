@@ -39,8 +39,6 @@ class Accuracy:
         Root mean square error, in the unit of the function.
     n_test : int
         Test points that counted.
-    n_dropped : int
-        Test points whose simulated value was not finite (a failed simulation).
     constant : bool
         The test values are equal up to rounding, so that R2 and RMAE are undefined.
     scale : float
@@ -53,7 +51,6 @@ class Accuracy:
     rmae_mean: float
     rmse: float
     n_test: int
-    n_dropped: int
     constant: bool
     scale: float
 
@@ -73,7 +70,7 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
     Parameters
     ----------
     values : array_like, shape (n,)
-        Simulated values; those that are not finite are failed simulations, dropped and counted.
+        Simulated values; those that are not finite are failed simulations, which are dropped.
     predictions : array_like, shape (n,)
         Predictions at the same points, in the same unit.
 
@@ -115,7 +112,6 @@ def accuracy(values: ArrayLike, predictions: ArrayLike) -> Accuracy:
         rmae_mean=worst / abs(mean) if mean != 0.0 else float("nan"),
         rmse=float(np.sqrt(np.mean(error**2))),
         n_test=int(true.size),
-        n_dropped=n_dropped,
         constant=constant,
         scale=scale,
     )

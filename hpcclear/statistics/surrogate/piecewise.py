@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from hpcclear.base.errors import InputError
 from hpcclear.statistics.surrogate.kriging import Kriging
 from hpcclear.statistics.surrogate.leaf import inside
 from hpcclear.statistics.surrogate.regression import Regression
@@ -30,27 +29,12 @@ class Piecewise:
         Accuracy of each on its own test points (NaN where the test values do not vary).
     accepted : (l,) array of bool
         Whether it met the targets; a False is the best within the allowed number of pieces.
-
-    Raises
-    ------
-    InputError
-        No boxes, different names, or boxes that overlap or leave gaps.
     """
 
     leaves: tuple[Leaf, ...]
     r2: np.ndarray
     rmae: np.ndarray
     accepted: np.ndarray
-
-    def __post_init__(self) -> None:
-        if not self.leaves or any(leaf.names != self.leaves[0].names for leaf in self.leaves):
-            raise InputError("leaves", len(self.leaves), "no models of one kind", "give some")
-        lower, upper = self._corners
-        volume = np.prod((upper - lower) / (self.upper - self.lower), axis=1).sum()
-        shared = np.minimum(upper[:, None], upper) - np.maximum(lower[:, None], lower)
-        overlaps = (shared > 0).all(axis=-1).sum() > len(self.leaves)  # each overlaps itself
-        if overlaps or abs(volume - 1.0) > 1e-9:
-            raise InputError("leaves", len(self.leaves), "boxes do not tile the domain", "refit")
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -52,8 +52,8 @@ class ResponseSurface:
     leave_one_out_r2 : float
         1 - sum of squares of those errors / SST; NaN if the values do not vary. Of chosen terms
         that of points left out of the choice as well.
-    n_points, n_dropped : int
-        Points that counted, and those dropped because their value was not finite.
+    n_points : int
+        Points that counted, whose value was finite.
     """
 
     bounds: Array
@@ -66,7 +66,6 @@ class ResponseSurface:
     leave_one_out_errors: Array
     leave_one_out_r2: float
     n_points: int
-    n_dropped: int
 
     def predict(self, points: ArrayLike) -> Array:
         """Values at points of shape (n, d), in the unit of f, shape (n,).
@@ -150,7 +149,7 @@ def fit_response_surface(
     points : array_like, shape (n, d)
         Physical units, inside the bounds.
     values : array_like, shape (n,)
-        Values of f; those that are not finite are failed simulations, dropped and counted.
+        Values of f; those that are not finite are failed simulations, which are dropped.
     bounds : array_like, shape (d, 2)
         Bounds of the inputs; they fix the scaling.
     order : int
@@ -207,7 +206,6 @@ def fit_response_surface(
         if total > len(y) * rounding
         else float("nan"),
         n_points=len(y),
-        n_dropped=n_dropped,
     )
 
 
