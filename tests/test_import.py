@@ -6,7 +6,7 @@ from commands import run
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
-from hpcclear.report.figures.sketch import Placed
+from hpcclear.report.figures.placed import Placed
 from hpcclear.scene import load_scene
 from hpcclear.scene.importers import linkage_of, text_of
 

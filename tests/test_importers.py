@@ -12,7 +12,7 @@ from import_files import DIGITS, digits
 
 from hpcclear.base.errors import InputError
 from hpcclear.dynamics.planar.problem import poses_at_start
-from hpcclear.report.figures.sketch import Placed
+from hpcclear.report.figures.placed import Placed
 from hpcclear.scene import load_scene
 from hpcclear.scene.importers import drawing_of, linkage_of
 

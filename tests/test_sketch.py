@@ -12,7 +12,7 @@ from hpcclear.base.errors import InputError
 from hpcclear.cli import cli
 from hpcclear.dynamics.planar.problem import poses_at_start
 from hpcclear.report import sketch_figure
-from hpcclear.report.figures.sketch import Placed
+from hpcclear.report.figures.placed import Placed
 from hpcclear.scene import load_scene
 from hpcclear.scene.slider_crank import DRAWN_AT
 
@@ -28,7 +28,72 @@ SCENES = {
     ),
 }
 
-LINKAGES = {path.stem: path for path in (ROOT / "jobs" / "linkages").glob("*.toml")}
+GALLERY = {
+    f"{path.parent.name} {path.stem}": path
+    for folder in ("linkages", "machines", ".")
+    for path in sorted((ROOT / "jobs" / folder).glob("*.toml"))
+}
+"""Every scene that comes with the program."""
+
+
+def bars(seed):
+    """A linkage of four to eight bars as a scene: a four-bar or a driven five-bar, and pairs of bars on points of it."""
+    rng = np.random.default_rng(seed)
+    count = 4 + seed % 5
+    ground = {"o": [0.0, 0.0], "p": [rng.uniform(0.1, 0.2), rng.uniform(-0.03, 0.05)]}
+    ends = {"a": np.array([0.02, 0.03]) * rng.uniform(0.6, 1.4, 2)}
+    ends["b"] = np.add(ground["p"], [rng.uniform(-0.03, 0.03), rng.uniform(0.06, 0.12)])
+    rows = [("crank", "ground.o", "a"), ("rocker", "ground.p", "b")]
+    if count % 2:
+        ends["m"] = 0.5 * (ends["a"] + ends["b"]) + [0.0, rng.uniform(0.05, 0.1)]
+        rows += [("left", "a", "m"), ("right", "b", "m")]
+    else:
+        rows += [("coupler", "a", "b")]
+    while len(rows) < count - 1:
+        k, base = len(rows), rng.choice(sorted(ends))
+        ground[f"g{k}"] = [rng.uniform(0.2, 0.35), rng.uniform(-0.05, 0.15)]
+        ends[f"k{k}"] = ends[base] + rng.uniform([0.03, 0.04], [0.12, 0.14])
+        rows += [(f"link{k}", base, f"k{k}"), (f"lever{k}", f"ground.g{k}", f"k{k}")]
+    at = {f"ground.{name}": np.array(place) for name, place in ground.items()} | ends
+    bodies, pins, held = {}, {}, {}
+    for name, *two in rows:
+        way = at[two[1]] - at[two[0]]
+        bodies[name] = {
+            "length": float(np.hypot(*way)),
+            "mass": 0.2,
+            "inertia": 1e-4,
+            "start_angle": float(np.arctan2(way[1], way[0])),
+        }
+        for place, end in zip(two, "ab", strict=True):
+            bearing = held.setdefault(place, f"{name}.{end}") if "." not in place else place
+            if bearing != f"{name}.{end}":
+                pins[f"pin{len(pins)}"] = {
+                    "kind": "revolute", "journal": f"{name}.{end}", "bearing": bearing
+                }  # fmt: skip
+    loose = next(name for name, pin in pins.items() if "ground" not in pin["bearing"])
+    material = {"youngs_modulus": 2e11, "poisson_ratio": 0.3}
+    pins[loose] |= {
+        "kind": "clearance", "clearance": "0.2 mm", "bearing_radius": "8 mm",
+        "materials": {"bearing": material, "journal": material},
+    }  # fmt: skip
+    drives = {"motor": {"kind": "constant-speed", "body": "crank", "speed": "600 rpm"}}
+    if count % 2:
+        drives["servo"] = {
+            "kind": "harmonic", "body": "rocker", "amplitude": 0.2, "frequency": 10.0,
+            "mean": bodies["rocker"]["start_angle"],
+        }  # fmt: skip
+    last = rows[-1][0]
+    loads = {
+        "push": {"kind": "force", "place": f"{last}.b", "force": [30.0, -20.0]},
+        "spring": {
+            "kind": "spring", "first": "crank.b", "second": "ground.p", "stiffness": 1e3
+        },
+        "brake": {"kind": "torque", "body": last, "torque": -3.0},
+    }  # fmt: skip
+    mechanism = {"kind": "planar", "ground": {"points": ground}, "bodies": bodies, "joints": pins}
+    effects = {"contact": {"law": "hunt-crossley", "damping": 0.4}, "gravity": 9.81}
+    mechanism |= {"drives": drives, "loads": loads}
+    return load_scene({"mechanism": mechanism, "effects": effects})
 
 
 def drawn(scene):
@@ -44,10 +109,16 @@ def drawn(scene):
     )
 
 
-@pytest.mark.parametrize("name", [*SCENES, *LINKAGES])
-def test_no_word_of_the_drawing_covers_another_or_leaves_the_page(name):
-    scene = load_scene(LINKAGES[name]) if name in LINKAGES else engine(*SCENES[name], study=False)
-    figure, _, texts = drawn(scene)
+@pytest.mark.parametrize("name", [*SCENES, *GALLERY, *range(20)])
+def test_no_word_of_the_drawing_covers_another_or_a_bar_or_leaves_the_page(name):
+    scene = (
+        bars(name)
+        if isinstance(name, int)
+        else load_scene(GALLERY[name])
+        if name in GALLERY
+        else engine(*SCENES[name], study=False)
+    )
+    figure, axes, texts = drawn(scene)
     boxes = [(text.get_text(), text.get_window_extent()) for text in texts]
     page = figure.bbox
     for word, box in boxes:
@@ -57,11 +128,23 @@ def test_no_word_of_the_drawing_covers_another_or_leaves_the_page(name):
         assert page.containsy(box.y1), word
     for (word, one), (other, two) in itertools.combinations(boxes, 2):
         assert not one.overlaps(two), (word, other)
+    thick = [line for line in axes.lines if line.get_linewidth() >= 2.0]
+    assert len(thick) >= len([one for one in scene.linkage.bodies if one.length is not None])
+    for line in thick:
+        ends = axes.transData.transform(np.column_stack(line.get_data()))
+        way = np.vstack([np.linspace(*two, 200) for two in itertools.pairwise(ends)])
+        for word, box in boxes:
+            assert not np.any([box.contains(*place) for place in way]), word
 
 
 def test_lengths_and_mass_centres_are_to_scale():
-    _, axes, _ = drawn(engine(study=False))
-    lines = [np.column_stack(line.get_data()) for line in axes.lines]
+    _, axes, texts = drawn(engine(study=False))
+    assert {"40 mm", "140 mm"} <= {text.get_text() for text in texts}
+    lines = [
+        np.column_stack(line.get_data())
+        for line in axes.lines
+        if line.get_linewidth() >= 2.0 or line.get_marker() == "o"
+    ]
     pin = 0.04 * np.array([np.cos(DRAWN_AT), np.sin(DRAWN_AT)])
     bars = [line for line in lines if line.shape == (2, 2)]
     crank = next(line for line in bars if np.allclose(line[0], 0.0))
@@ -102,7 +185,7 @@ def test_check_draws_and_init_writes_what_check_accepts(tmp_path, options):
 
 def test_a_linkage_is_drawn_where_it_was_put_together():
     """Every joint's two places coincide, and every name is there."""
-    scene = load_scene(LINKAGES["press"])
+    scene = load_scene(GALLERY["linkages press"])
     placed = Placed(scene.mechanism, poses_at_start(scene))
     for joint in scene.mechanism.joints:
         if joint.kind in ("revolute", "clearance"):
@@ -110,7 +193,7 @@ def test_a_linkage_is_drawn_where_it_was_put_together():
                 placed.at(joint.journal), placed.at(joint.bearing), atol=1e-9
             )
     _, axes, texts = drawn(scene)
-    said = {text.get_text() for text in texts}
+    said = {line for text in texts for line in text.get_text().splitlines()}
     mechanism = scene.mechanism
     for rows in (mechanism.bodies, mechanism.joints, mechanism.drives, mechanism.loads):
         assert {row.name for row in rows} <= said

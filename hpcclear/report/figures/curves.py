@@ -18,6 +18,9 @@ HEIGHT = 26.0
 """mm of one curve."""
 _FEW = 40
 """Rows of a table up to which each is marked."""
+_TURNING = labels.Scale(float(np.degrees(1.0)), "°")
+_BY = {"time": labels.Scale(1.0, "s"), "speed": labels.Scale(30.0 / np.pi, "rpm")}
+"""Units in which what rows go by is shown; angles in `_TURNING`."""
 
 
 class Tabulated(NamedTuple):
@@ -26,40 +29,48 @@ class Tabulated(NamedTuple):
     key: str
     """Dotted path of its entry."""
     rows: tuple[tuple[float, float], ...]
-    """Angle in rad, or time in s, and value in SI."""
+    """Angle in rad, or time, speed or distance, and value in SI."""
     unit: str
     turns: int
-    """Turns after which it repeats; 0 of rows over the time."""
+    """Turns after which it repeats; 0 of rows that go by no angle."""
     over: str
     """What its rows go by."""
     acting: Pieces | None = None
-    """The curve that acts; a motion has no such entry."""
+    """The curve that acts; None where it is straight between the rows, and of a motion."""
 
 
 def tabulated(scene: Scene) -> list[Tabulated]:
-    """Every table of a scene: what acts on it, and how it is moved."""
+    """Every curve of a scene: what acts on it, and how it is moved."""
     linkage, how, found = scene.linkage, scene.numerics.interpolation, []
     turns = turns_of(linkage)
     for drive in linkage.drives:
-        key = f"mechanism.drives.{drive.name}"
+        key, torque = f"mechanism.drives.{drive.name}", getattr(drive, "torque", None)
         if drive.kind == "table":
             found.append(Tabulated(f"{key}.angle", drive.angle, "rad", 0, "time"))
         elif drive.kind == "run-up":
             acting, entry = level(drive.speed_by_time), f"{key}.speed_by_time"
             found.append(Tabulated(entry, drive.speed_by_time, "rad/s", 0, "time", acting))
-        elif isinstance(rows := getattr(drive, "torque", None), tuple):
-            curve = periodic(rows, 2.0 * np.pi * turns, how)
-            found.append(Tabulated(f"{key}.torque", rows, "N*m", turns, "crank angle", curve))
+        elif isinstance(torque, tuple):
+            curve = periodic(torque, 2.0 * np.pi * turns, how)
+            found.append(Tabulated(f"{key}.torque", torque, "N*m", turns, "crank angle", curve))
+        elif rows := getattr(drive, "torque_by_speed", None):
+            found.append(Tabulated(f"{key}.torque_by_speed", rows, "N*m", 0, "speed"))
+        elif isinstance(speed := getattr(drive, "no_load_speed", None), float):
+            rows = ((0.0, float(torque or 0.0)), (speed, 0.0))
+            found.append(Tabulated(f"{key}.torque", rows, "N*m", 0, "speed"))
     for load in linkage.loads:
+        key = f"mechanism.loads.{load.name}"
+        for rows in load.straight.values():
+            found.append(Tabulated(f"{key}.force", rows, "N", 0, "distance"))
         if not load.table:
             continue
         entry, rows, over = load.size_entry, load.timed, "time"
         if rows is None:
             rows = getattr(load, entry)
             over = f"angle of {load.angle_of}" if load.angle_of else "crank angle"
-        key = f"mechanism.loads.{load.name}.{entry}{'_by_time' if load.timed else ''}"
+        entry = f"{key}.{entry}{'_by_time' if load.timed else ''}"
         own = 0 if load.timed else 1 if load.angle_of else turns
-        found.append(Tabulated(key, rows, load.unit, own, over, load.curve(turns, how)))
+        found.append(Tabulated(entry, rows, load.unit, own, over, load.curve(turns, how)))
     return [one._replace(key=scene.path_in_scene(one.key)) for one in found]
 
 
@@ -76,26 +87,38 @@ def tables_figure(found: Results) -> "style.Figure":
     return figure
 
 
-def draw(figure: "style.Figure", curves: list[Tabulated], top: float, height: float) -> None:
-    """Draw curves below one another, from `top` down, each `height` high; shares of the figure."""
+def draw(
+    figure: "style.Figure",
+    curves: list[Tabulated],
+    top: float,
+    height: float,
+    across: tuple[float, float] = (0.0, 1.0),
+) -> None:
+    """Draw curves below one another, from `top` down, each `height` high, from a place across over a width; shares of the
+    figure."""
+    left, width = across
     for number, curve in enumerate(curves):
         bottom = top - (number + 1) * height
-        axes = figure.add_axes((0.17, bottom + 0.42 * height, 0.79, 0.42 * height))
+        axes = figure.add_axes(
+            (left + 0.17 * width, bottom + 0.42 * height, 0.79 * width, 0.42 * height)
+        )
         places, values = np.array(curve.rows).T
         shown = labels.scale(curve.unit, values)
-        factor = np.degrees(1.0) if curve.turns else 1.0
+        by = (
+            _BY.get(curve.over, _TURNING) if curve.over != "distance" else labels.scale("m", places)
+        )
+        factor = by.factor
         if curve.turns:
             places = np.mod(places, 2.0 * np.pi * curve.turns)
             axes.set_xlim(0.0, 360.0 * curve.turns)
             axes.set_xticks(np.arange(0.0, 360.0 * curve.turns + 1.0, 90.0 * curve.turns))
         else:
-            axes.set_xlim(0.0, places[-1])
+            axes.set_xlim(factor * places[0], factor * places[-1])
         x, y = (places, values) if curve.acting is None else _drawn(curve.acting)
         axes.plot(factor * x, shown(y), lw=0.9, color=style.CYCLE[2])
         if len(curve.rows) <= _FEW:
             axes.plot(factor * places, shown(values), ".", ms=3.0, color=style.CYCLE[2])
-        label = f"{curve.over} ({'°' if curve.turns else 's'})"
-        axes.set_xlabel(label, fontsize=style.SMALL, labelpad=1.0)
+        axes.set_xlabel(by.label(curve.over), fontsize=style.SMALL, labelpad=1.0)
         axes.set_title(labels.literal(shown.label(curve.key)), fontsize=style.SMALL, pad=2.0)
 
 

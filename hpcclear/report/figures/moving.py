@@ -1,11 +1,13 @@
-"""The mechanism in motion: its bodies by their points, and films of them as GIF and MP4."""
+"""The mechanism in motion: its bodies by their points, and where they are at an instant."""
 
 import numpy as np
 
 from hpcclear.base.arrays import Array
 from hpcclear.base.outcome import JOINTS
 from hpcclear.report.figures import motion
+from hpcclear.report.figures.placed import Pose, centre_of
 from hpcclear.results.content import Results
+from hpcclear.scene import Scene
 
 Drawn = tuple[list[list[int]], Array, Array]
 """Which points each body has, where these are (t, points, 2), and the bodies' angles (t, bodies)."""
@@ -20,6 +22,37 @@ def eccentricities(shown: Results) -> Array:
     """Return journal centres from bearing centres, m, shape (t, joints, 2)."""
     both = [shown[f"eccentricity_{axis}"].to_numpy() for axis in "xy"]
     return np.stack(both, axis=-1)
+
+
+def pairs(points: Array, e: Array) -> list[list[int]]:
+    """Return the two points of each joint, journal's and bearing's, whose distance is its eccentricity (t, joints, 2) at every
+    instant; `points`: as of `bodies`."""
+    count, found = points.shape[1], []
+    for joint in range(e.shape[1]):
+        off = points[:, :, None] - points[:, None, :] - e[:, joint, None, None]
+        worst = np.abs(off).max(axis=(0, 3)) + np.where(np.eye(count) > 0, np.inf, 0.0)
+        found.append([int(k) for k in np.unravel_index(int(worst.argmin()), worst.shape)])
+    return found
+
+
+def poses(scene: Scene, shown: Results, k: int) -> dict[str, Pose]:
+    """Return where the bodies of a scene are at instant k of its response."""
+    one = shown.isel(time=k)
+    if "rod_x" not in shown:
+        held = [one.isel(body=b) for b in range(shown.sizes["body"])]
+        entries = ("body_x", "body_y", "body_angle")
+        return {str(b["body"].item()): tuple(float(b[n]) for n in entries) for b in held}  # type: ignore[misc]
+    phi, crank = float(one["crank_angle"]), centre_of(scene.linkage.bodies[0])[0]
+    aside, tilt = (
+        float(one[name].to_numpy()[0]) if name in shown else 0.0
+        for name in ("guide_offset", "guide_tilt")
+    )
+    height = aside + float(getattr(scene.mechanism, "offset", None) or 0.0)
+    return {
+        "crank": (crank * np.cos(phi), crank * np.sin(phi), phi),
+        "rod": (float(one["rod_x"]), float(one["rod_y"]), float(one["rod_angle"])),
+        "slider": (float(one["slider_position"]), height, tilt),
+    }
 
 
 def _slider_crank(shown: Results, e: Array) -> Drawn:

@@ -9,9 +9,10 @@ import numpy as np
 
 from hpcclear.base.errors import InputError
 from hpcclear.base.objectives import ENDS
-from hpcclear.report.figures import catalogue, designs, labels, motion, response, style
+from hpcclear.report.figures import catalogue, designs, labels, motion, response, sketch, style
 from hpcclear.report.html.content import Content
 from hpcclear.report.html.guard import attempt
+from hpcclear.report.merit import recommended
 from hpcclear.report.parts import FigureOf, declared
 from hpcclear.results.content import Results
 
@@ -31,6 +32,9 @@ SUBJECTS = {
     "bifurcation": "quality",
 }
 """Subject of the page that a figure belongs to, by the kind of its file; of others sensitivities."""
+
+MECHANISM = "mechanism"
+"""Figure that stands above the moving mechanism."""
 
 OF_RESPONSE = ("orbit", "noise")
 """Figures of a response that the page has; `hpcclear plot` draws the others."""
@@ -63,11 +67,13 @@ def _drawings(content: Content) -> Iterator[tuple[str, str, str, "Callable[[], F
             if figure.kind in one.files:
                 caption = before + figure.captioned(one.files)
                 yield figure.name, figure.kind, caption, figure.of(one.files)
-    yield from _of_responses(content.responses)
+    verified = content.get("verification")
+    best = "" if verified is None else recommended(verified)
+    yield from _of_responses(content.responses, best)
 
 
 def _of_responses(
-    found: Mapping[str, Results],
+    found: Mapping[str, Results], best: str
 ) -> Iterator[tuple[str, str, str, "Callable[[], Figure]"]]:
     for first in range(0, len(ENDS), 2):  # two columns a picture
         pair = ENDS[first : first + 2]
@@ -83,6 +89,16 @@ def _of_responses(
             )
     if not found:
         return
+    design, before = found.get(best), found.get("original")
+    if design is None or design is before:
+        design, before = before or next(iter(found.values())), None
+    caption = "The mechanism to scale, with its dimensions."
+    if before is not None:
+        caption = (
+            f"{best}: parts that differ from the baseline design in orange, its outline dashed."
+        )
+    draw = functools.partial(sketch.mechanism_figure, design, before)
+    yield MECHANISM, "response", caption, draw
     name = "original" if "original" in found else next(iter(found))
     of = f"{'baseline' if name == 'original' else name}: " if len(found) > 1 else ""
     if len(found) == 1:

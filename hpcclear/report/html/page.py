@@ -88,7 +88,8 @@ def _page(content: Content) -> str:
     opened = attempt("The first screen", partial(screen_of, content), troubles)
     first = opened or Screen(f"Results in {_readable(content.directory.resolve().name)}")
     drawn = gallery.figures(content, troubles)
-    subjects = _subjects(content, drawn, first, troubles)
+    still = next((one for one in drawn if one["name"] == gallery.MECHANISM), None)
+    subjects = _subjects(content, [one for one in drawn if one is not still], first, troubles)
     return render(
         "page.html",
         title=f"Report on {_readable(content.directory.resolve().name)}",
@@ -99,6 +100,7 @@ def _page(content: Content) -> str:
         source=content.attribute("source") or "hpcclear",
         screen=first,
         spans=any(row.span for row in first.rows),
+        still=still,
         motions=bool(shown and shown["motions"]),
         points=bool(shown and shown["front"]["points"]),
         anchors=[one.name for one in subjects],

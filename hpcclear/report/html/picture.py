@@ -239,28 +239,19 @@ def frames(response: Results) -> dict[str, Any]:
     held = response.sel(joint=motion.pins(response))  # joints that are circles
     e = moving.eccentricities(shown.sel(joint=motion.pins(shown)))
     bodies, points, angles = moving.bodies(shown)
-    pairs = [_pair(points, e[:, j]) for j in range(e.shape[1])]
     still = np.ptp(points, axis=0).max(axis=-1) < 1e-9 * max(float(np.ptp(points)), 1e-12)
     return {
         "bodies": bodies,
         "points": _digits(points.reshape(len(points), -1)),
         "angles": _digits(angles),
         "still": [bool(one) for one in still],
-        "pairs": pairs,
+        "pairs": moving.pairs(points, e),
         "joints": list(motion.joints(held).values()),
         "clearance": np.nan_to_num(motion.clearances(held)).tolist(),
         "turn": _digits(motion.turns(shown)),
         "e": _digits(e.reshape(len(e), -1)),
         "force": _digits(shown["contact_force"].sel(joint=motion.pins(shown)).to_numpy()),
     }
-
-
-def _pair(points: np.ndarray, e: np.ndarray) -> list[int]:
-    """The two points, journal's and bearing's, whose distance is a joint's eccentricity at every instant."""
-    count = points.shape[1]
-    off = points[:, :, None] - points[:, None, :] - e[:, None, None]
-    worst = np.abs(off).max(axis=(0, 3)) + np.where(np.eye(count) > 0, np.inf, 0.0)
-    return [int(k) for k in np.unravel_index(int(worst.argmin()), worst.shape)]
 
 
 def _digits(values: np.ndarray) -> Any:

@@ -1,0 +1,63 @@
+"""Where the points of a linkage are."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcclear.base.arrays import Array
+from hpcclear.scene.planar import Planar, PlanarBody
+
+Pose = tuple[float, float, float]
+"""Of a body: its mass centre, m, and its angle, rad."""
+
+
+class Placed:
+    """Where all points of a linkage are."""
+
+    def __init__(self, mechanism: Planar, poses: Mapping[str, Pose]) -> None:
+        self.centres = {name: np.array(pose[:2]) for name, pose in poses.items()}
+        self.bodies: dict[str, dict[str, Array]] = {}
+        self.angles: dict[str, float] = {"ground": 0.0}
+        for body in mechanism.bodies:
+            x, y, angle = poses[body.name]
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            self.bodies[body.name] = {
+                name: np.array([x, y]) + turn @ (point - centre_of(body))
+                for name, point in points_of(body).items()
+            }
+            self.angles[body.name] = angle
+        self.ground = {
+            point.name: np.array([point.x, point.y]) for point in mechanism.ground.points
+        }
+        sliders: list[Any] = [j for j in mechanism.joints if getattr(j, "height", None)]
+        self._sliders = [
+            self.at(one.point) + side * one.length for one in sliders for side in (-0.5, 0.5)
+        ]
+
+    def at(self, place: str) -> Array:
+        """A place (2,), ``"body.point"``, m."""
+        owner, name = place.split(".")
+        return self.ground[name] if owner == "ground" else self.bodies[owner][name]
+
+    @property
+    def everything(self) -> Array:
+        """All points and corners about sliders, shape (points, 2)."""
+        groups = [self.ground, *self.bodies.values()]
+        return np.array([*(point for group in groups for point in group.values()), *self._sliders])
+
+
+def points_of(body: PlanarBody) -> dict[str, Array]:
+    """Points (2,) of a body in its own axes, m; those of a bar are a and b besides."""
+    found = {point.name: np.array([point.x, point.y]) for point in body.points}
+    if body.length is not None:
+        found = {"a": np.zeros(2), "b": np.array([body.length, 0.0])} | found
+    return found
+
+
+def centre_of(body: PlanarBody) -> Array:
+    """Its mass centre (2,) in its own axes, m."""
+    if body.length is None:
+        return np.array([body.center.x, body.center.y])
+    along = 0.5 * body.length if body.mass_center is None else body.mass_center
+    return np.array([along, 0.0])
